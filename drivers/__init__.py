@@ -1,1 +1,5 @@
-"""To be said."""
+"""The buses: one narrow boundary to a device, one file a bus.
+
+`boundary` says what every driver does; `modbus_tcp` talks to a device on Modbus TCP, `memory` to a valve in the
+same process and virtual time. A driver knows registers and time-outs, and nothing of control.
+"""

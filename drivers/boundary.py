@@ -1,0 +1,84 @@
+"""What every driver does: open, read, write, exchange, close. Blocking; owned by one thread.
+
+One cycle is one `exchange`: the command goes out, the measurement of the same transaction comes back. A driver
+never retries and never repeats an old measurement: what it cannot get it raises.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the device said in one transaction. None is what this device does not offer."""
+
+    position_m: float
+    pressure_pa: float | None = None
+    sample_counter: int | None = None
+    device_time_s: float | None = None
+    status: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What the device behind a driver can do."""
+
+    one_transaction: bool
+    """Command and measurement travel in one transaction."""
+    device_time: bool
+    """Each reading carries the device's own time stamp."""
+    sample_counter: bool
+    """Each reading says which sample it is, so that a repeated one is known."""
+
+
+class DriverError(Exception):
+    """A transaction did not do what was asked. The text says with whom and why, in one line."""
+
+
+class NoConnection(DriverError):
+    """The device cannot be reached, or the connection is gone."""
+
+
+class NoReply(DriverError):
+    """The device did not answer within the reply time-out; a late answer is never taken for another's."""
+
+
+class BadReply(DriverError):
+    """The answer is not one to the question: wrong function, count, echo, or a number that is none."""
+
+
+class Refused(DriverError):
+    """The device answered with an exception."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class Driver(Protocol):
+    """The boundary. Every method may raise `DriverError`; after `NoConnection` or `NoReply` call `open` again."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the device can do; known after `open`."""
+        ...
+
+    def open(self) -> float:
+        """Connect (again) and return the pressure command the device holds, in Pa. Moves nothing."""
+        ...
+
+    def read(self) -> Reading:
+        """Return a measurement. Moves nothing."""
+        ...
+
+    def write(self, command_pa: float) -> None:
+        """Command a pressure."""
+        ...
+
+    def exchange(self, command_pa: float) -> Reading:
+        """Command a pressure and return a measurement taken after it, in one transaction where possible."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device; it keeps its last command until its own time-out. Never raises."""
+        ...
