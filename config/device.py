@@ -4,14 +4,18 @@
 keeps them; the map of a real device is written in the daemon's TOML file, in the same words.
 """
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
+from pyModbusTCP.utils import valid_host
 
-from config.loading import Port, Positive, Schema
-from config.wire import Format, WireType, WordOrder
+from config.loading import Port, Schema
+from config.wire import Format, Layout, WireType, WordOrder
 
 MOST_REGISTERS = 125
 """A Modbus reply carries at most this many registers."""
@@ -58,6 +62,9 @@ QUANTITIES = (
     Quantity("communication_action", "1", "uint16", True, "0 hold, 1 vent, 2 fill"),
 )
 
+WRITABLE = frozenset(quantity.name for quantity in QUANTITIES if quantity.writable)
+"""The names of the quantities that a master sets; the others are of the sample."""
+
 
 class Place(Schema):
     """Where a quantity lies in a device's registers: value = scale * raw + offset, in the quantity's unit."""
@@ -70,9 +77,11 @@ class Place(Schema):
     offset: float = 0.0
 
     @model_validator(mode="after")
-    def _scale_is_not_zero(self) -> Self:
+    def _has_a_scale_and_room(self) -> Self:
         if self.scale == 0:
             raise ValueError("scale must not be 0")
+        if self.end > 65536:
+            raise ValueError(f"{self.type} at {self.address} reaches past register 65535")
         return self
 
     @property
@@ -84,6 +93,26 @@ class Place(Schema):
     def end(self) -> int:
         """The address just past the last register."""
         return self.address + self.format.words
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the raw value is the value."""
+        return self.scale == 1 and self.offset == 0
+
+    def value(self, raw: float) -> float:
+        """Return the value of a raw number."""
+        return raw if self.is_plain else self.scale * raw + self.offset
+
+    def raw(self, value: float) -> float:
+        """Return the raw number nearest to a value; a whole one where the type is.
+
+        Raises:
+            ValueError: not a finite number.
+        """
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is not a finite number")
+        raw = value if self.is_plain else (value - self.offset) / self.scale
+        return raw if self.type in ("float32", "float64") else round(raw)
 
 
 class ModbusMap(Schema):
@@ -103,10 +132,14 @@ class ModbusMap(Schema):
     communication_action: Place | None = None
 
     @property
+    def places(self) -> dict[str, Place]:
+        """The quantities the device has, by name, in the order of `QUANTITIES`."""
+        return {each.name: place for each in QUANTITIES if (place := getattr(self, each.name)) is not None}
+
+    @property
     def sampled(self) -> dict[str, Place]:
         """The quantities of one sample, by name."""
-        names = ("position_m", "pressure_pa", "sample_counter", "device_time_us", "status")
-        return {name: place for name in names if (place := getattr(self, name)) is not None}
+        return {name: place for name, place in self.places.items() if name not in WRITABLE}
 
     @model_validator(mode="after")
     def _can_be_read_and_written(self) -> Self:
@@ -116,11 +149,23 @@ class ModbusMap(Schema):
         span = max(place.end for place in places) - min(place.address for place in places)
         if span > MOST_REGISTERS:
             raise ValueError(f"one sample must lie within {MOST_REGISTERS} registers, it spans {span}")
-        for name in ("command_pa", "communication_timeout_s", "communication_action"):
-            place = getattr(self, name)
-            if place is not None and place.table != "holding":
+        for name, place in self.places.items():
+            if name in WRITABLE and place.table != "holding":
                 raise ValueError(f"{name} is written, so it must lie in the holding table")
         return self
+
+    @model_validator(mode="after")
+    def _nothing_overlaps(self) -> Self:
+        in_order = sorted(self.places.items(), key=lambda each: (each[1].table, each[1].address))
+        for (name, place), (next_name, next_place) in pairwise(in_order):
+            if place.table == next_place.table and place.end > next_place.address:
+                raise ValueError(f"{name} and {next_name} share register {next_place.address}")
+        return self
+
+
+def layout(places: Iterable[Place]) -> Layout:
+    """Return the layout of some places in one run of registers."""
+    return Layout([(place.address, place.format) for place in places])
 
 
 def _simulated_map() -> ModbusMap:
@@ -135,14 +180,34 @@ def _simulated_map() -> ModbusMap:
 SIMULATED_MAP = _simulated_map()
 
 
+def _host(host: str) -> str:
+    if not valid_host(host):
+        raise ValueError("must be a host name or an IP address")
+    return host
+
+
 class ModbusTcpDevice(Schema):
     """Table `[device]` of the daemon: a device on Modbus TCP."""
 
     bus: Literal["modbus"] = "modbus"
-    host: str = "127.0.0.1"
+    host: Annotated[str, AfterValidator(_host)] = "127.0.0.1"
     port: Port = 5020
     unit: Annotated[int, Field(ge=0, le=255)] = 1
-    reply_timeout_s: Positive = 0.05
+    reply_timeout_s: Annotated[float, Field(gt=0, le=60)] = 0.05
     communication_timeout_s: Annotated[float, Field(ge=0)] = 1.0
     communication_action: ActionName = "hold"
     map: ModbusMap = SIMULATED_MAP
+
+    @model_validator(mode="after")
+    def _timeout_survives_the_registers(self) -> Self:
+        place = self.map.communication_timeout_s
+        if place is None or self.communication_timeout_s == 0:
+            return self
+        raw = place.raw(self.communication_timeout_s)
+        place.format.encode(raw)
+        if place.value(raw) <= 0:  # a time-out that rounds to 0 would be none at all
+            raise ValueError(
+                f"communication_timeout_s: {self.communication_timeout_s} s becomes {place.value(raw):g} s "
+                f"in the device's {place.type} of scale {place.scale:g}"
+            )
+        return self

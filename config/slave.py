@@ -26,6 +26,17 @@ class SlaveClock(Schema):
     mode: Literal["real_time", "lockstep"] = "real_time"
     period_s: Positive = 1e-3
 
+    @property
+    def period_us(self) -> int:
+        """The period in whole microseconds, the unit of the device's clock."""
+        return round(self.period_s * 1e6)
+
+    @model_validator(mode="after")
+    def _period_is_whole_microseconds(self) -> Self:
+        if self.period_us < 1 or abs(self.period_s * 1e6 - self.period_us) > 1e-6 * self.period_us:
+            raise ValueError("period_s must be a whole number of microseconds")
+        return self
+
 
 class Sensor(Schema):
     """Table `[sensor]`: the position transmitter. White noise, then rounding to the quantum (0 is none)."""

@@ -32,9 +32,7 @@ class ValveParameters(Schema):
     @model_validator(mode="after")
     def _static_friction_is_at_least_coulomb_friction(self) -> Self:
         if self.static_n < self.coulomb_n:
-            raise ValueError(
-                f"static_n must be at least coulomb_n ({self.coulomb_n:g} N), it is {self.static_n:g} N"
-            )
+            raise ValueError(f"static_n must be at least coulomb_n ({self.coulomb_n:g} N), it is {self.static_n:g} N")
         return self
 
     @property

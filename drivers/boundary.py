@@ -24,7 +24,7 @@ class Capabilities:
     """What the device behind a driver can do."""
 
     one_transaction: bool
-    """Command and measurement travel in one transaction."""
+    """Command and measurement travel in one transaction; that they cannot may show at the first exchange."""
     device_time: bool
     """Each reading carries the device's own time stamp."""
     sample_counter: bool
@@ -44,11 +44,14 @@ class NoReply(DriverError):
 
 
 class BadReply(DriverError):
-    """The answer is not one to the question: wrong function, count, echo, or a number that is none."""
+    """The answer is not one to the question (wrong function, count, echo), or holds a number that is none.
+
+    The first kind ends the connection, since nothing on it can be trusted any more; the second does not.
+    """
 
 
 class Refused(DriverError):
-    """The device answered with an exception."""
+    """The device answered with an exception, or was not asked because it could not be told that value."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
@@ -56,7 +59,10 @@ class Refused(DriverError):
 
 
 class Driver(Protocol):
-    """The boundary. Every method may raise `DriverError`; after `NoConnection` or `NoReply` call `open` again."""
+    """The boundary. Every method may raise `DriverError`; after `NoConnection` or `NoReply` call `open` again.
+
+    A driver that is not open, or whose connection has ended, raises `NoConnection` and does nothing.
+    """
 
     @property
     def capabilities(self) -> Capabilities:
@@ -76,7 +82,11 @@ class Driver(Protocol):
         ...
 
     def exchange(self, command_pa: float) -> Reading:
-        """Command a pressure and return a measurement taken after it, in one transaction where possible."""
+        """Command a pressure and return the device's newest measurement after that.
+
+        In one transaction where possible. A device in lockstep has obeyed for one period by then; one with a
+        clock of its own answers with the latest sample of its grid, as counter and time stamp say.
+        """
         ...
 
     def close(self) -> None:

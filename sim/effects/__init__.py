@@ -1,1 +1,1 @@
-"""To be said."""
+"""The effects, one file each, named as in a valve file; `sim.effect` says how one is written."""

@@ -1,1 +1,5 @@
-"""To be said."""
+"""The simulated slave: the valve as a device on a fieldbus, in a process of its own (`positioner sim`).
+
+`device` is the I/P with position transmitter as pure logic, `clocks` says who lets its time pass, `registers` lays
+it out for Modbus, `modbus` puts valve, device, clock and server together from a slave file.
+"""

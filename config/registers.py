@@ -1,0 +1,222 @@
+"""The supervisory register table, declared once: the server, `positioner map`, `get` and `set` all read it here.
+
+Every register stands at the same address among holding and input registers, so FC3 and FC4 read the same. A value
+of two words is sent most significant word first and is written whole or not at all. Addresses are counted from 0,
+as on the wire; many tools print them from 1.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal
+
+from config.errors import InputError
+from config.wire import Format, WireType
+
+MAP_VERSION = 1
+WORD_TEST = 0xB38C
+LONG_TEST = 0x12345678
+FLOAT_TEST = 1234.5
+
+
+class Mode(IntEnum):
+    """Who commands the pressure."""
+
+    HOLD = 0
+    MANUAL = 1
+    AUTOMATIC = 2
+
+
+class Fault(IntEnum):
+    """Why the positioner has let go of the valve; latched until acknowledged."""
+
+    NONE = 0
+    NO_REPLY = 1
+    STALE = 2
+    IMPLAUSIBLE = 3
+    DEVICE = 4
+    RESTARTED = 5
+    DCS_SILENT = 6
+
+
+class Quality(IntEnum):
+    """What the last measurement is worth."""
+
+    GOOD = 0
+    REPEATED = 1
+    LOST = 2
+
+
+class Why(IntEnum):
+    """Why the law, or the excitation, is not doing what was asked."""
+
+    NOTHING = 0
+    NOT_AUTOMATIC = 1
+    NO_ESTIMATES = 2
+    NO_MOVE_ASKED = 3
+    ALPHA_BELOW_BREAKAWAY = 4
+    EXCITATION_BEYOND_LIMITS = 5
+    EXCITATION_TOO_LONG = 6
+    AMPLITUDE_ZERO = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One value of the table: `minimum` and `maximum` bound what may be written."""
+
+    name: str
+    address: int
+    type: WireType
+    unit: str
+    text: str
+    access: Literal["r", "rw"] = "r"
+    minimum: float | None = None
+    maximum: float | None = None
+
+    @property
+    def format(self) -> Format:
+        """How the value lies in its registers."""
+        return Format(self.type)
+
+    @property
+    def end(self) -> int:
+        """The address just past the last register."""
+        return self.address + self.format.words
+
+    def problem_with(self, value: float) -> str | None:
+        """Return why the value may not be written, or None when it may."""
+        if self.access == "r":
+            return f"{self.name} is read-only"
+        # Written so that NaN, for which no comparison holds, is outside.
+        low = self.minimum is None or value >= self.minimum
+        high = self.maximum is None or value <= self.maximum
+        if low and high:
+            return None
+        return f"{self.name}: allowed is {self.minimum:g} to {self.maximum:g} {self.unit}, got {value:g}"
+
+
+def _writable(name: str, address: int, type_: WireType, unit: str, low: float, high: float, text: str) -> Register:
+    return Register(name, address, type_, unit, text, "rw", low, high)
+
+
+_LARGEST_PA = 2e6
+
+COMMANDS = (
+    _writable("reference", 0, "float32", "p.u.", 0.0, 1.0, "stem position asked for"),
+    _writable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
+    _writable("mode", 3, "uint16", "1", 0, 2, "0 hold, 1 manual, 2 automatic; falls to hold on a fault"),
+    _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3)"),
+    _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
+    _writable("eta_3", 6, "uint16", "1", 0, 1, "0 switches the friction estimator on"),
+    _writable("acknowledge", 7, "uint16", "1", 0, 1, "write 1: acknowledges a fault whose cause is gone; reads 0"),
+    _writable("heartbeat", 8, "uint16", "1", 0, 65535, "the DCS writes it to show that it lives"),
+    _writable("manual_pressure", 9, "float32", "Pa", 0.0, _LARGEST_PA, "the command in manual mode"),
+    _writable("alpha", 11, "float32", "Pa", 0.0, _LARGEST_PA, "excitation, constant; 0: what keeps the stem"),
+    _writable("beta", 13, "float32", "Pa", 0.0, _LARGEST_PA, "excitation, amplitude of the sine"),
+    _writable("omega", 15, "float32", "rad/s", 1e-3, 1e3, "excitation, angular frequency"),
+)
+
+STATUS = (
+    Register("state", 100, "uint16", "1", "0 S0 start, 1 S1 up, 2 S2 down, 3 S3 identify"),
+    Register(
+        "fault",
+        101,
+        "uint16",
+        "1",
+        "0 none, 1 no reply, 2 stale, 3 implausible, 4 device, 5 device restarted, 6 DCS silent",
+    ),
+    Register("quality", 102, "uint16", "1", "of the last measurement: 0 good, 1 repeated, 2 lost"),
+    Register(
+        "why",
+        103,
+        "uint16",
+        "1",
+        "why not as asked: 0 it is, 1 not automatic, 2 no estimates, 3 no move asked, 4 alpha below break-away, "
+        "5 excitation beyond pressure limits, 6 excitation too long, 7 amplitude is zero",
+    ),
+    Register("position", 104, "float32", "p.u.", "stem position"),
+    Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
+    Register("device_status", 107, "uint16", "1", "the device's own status word"),
+    Register("position_m", 108, "float32", "m", "stem position"),
+    Register("pressure", 110, "float32", "Pa", "actuator pressure as measured"),
+    Register("command", 112, "float32", "Pa", "pressure command"),
+    Register("delta_r", 114, "float32", "p.u.", "last change of the reference, kept until the next"),
+    Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
+    Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
+)
+
+ESTIMATED = ("a", "b", "c", "k", "b_over_c", "k_over_c")
+"""What is identified, in register order."""
+
+_ESTIMATE_UNITS = {
+    "a": "1/s",
+    "b": "1/s^2",
+    "c": "m/(Pa s^2)",
+    "k": "m/s^2",
+    "b_over_c": "Pa/m",
+    "k_over_c": "Pa",
+}
+
+
+def _estimate_registers() -> tuple[Register, ...]:
+    registers: list[Register] = []
+    for index, name in enumerate(ESTIMATED):
+        base, unit = 200 + 6 * index, _ESTIMATE_UNITS[name]
+        registers += [
+            Register(f"{name}_e", base, "float32", unit, f"{name}, estimated"),
+            Register(f"{name}_std", base + 2, "float32", unit, f"standard deviation of {name}_e"),
+            Register(f"{name}_valid", base + 4, "uint16", "1", "1 when the estimate may be used"),
+            Register(f"{name}_reason", base + 5, "uint16", "1", "0 valid, else why not (positioner map --reasons)"),
+        ]
+    return tuple(registers)
+
+
+ESTIMATES = (
+    *_estimate_registers(),
+    Register("progress", 240, "float32", "1", "of the identification window, 0 to 1"),
+    Register("estimate_age", 242, "float32", "s", "time since the last sample the estimates used"),
+    Register("b_over_c_applied", 244, "float32", "Pa/m", "b/c as the law uses it; NaN: none yet"),
+    Register("k_over_c_applied", 246, "float32", "Pa", "k/c as the law uses it; NaN: none yet"),
+    Register("identifications", 248, "uint16", "1", "how many identifications were applied, wraps"),
+    Register("refusals", 249, "uint16", "1", "how many were refused, wraps"),
+    Register("refusal", 250, "uint16", "1", "why the last one was refused, as in *_reason; 0: it was not"),
+)
+
+STATISTICS = (
+    Register("cycles", 300, "uint32", "1", "cycles run, wraps"),
+    Register("missed_periods", 302, "uint32", "1", "periods in which no cycle ran"),
+    Register("lost_samples", 304, "uint32", "1", "device samples not seen"),
+    Register("lost_replies", 306, "uint32", "1", "transactions without a good answer"),
+    Register("period", 308, "float32", "s", "median of the last cycles' periods"),
+    Register("jitter_99", 310, "float32", "s", "99 % of the last periods differ from the median by less than this"),
+    Register("cycle_time", 312, "float32", "s", "median time a cycle took, bus included"),
+    Register("unrecorded", 314, "uint32", "1", "samples the recorder could not write"),
+)
+
+IDENTITY = (
+    Register("map_version", 400, "uint16", "1", f"version of this map: {MAP_VERSION}"),
+    Register("version_major", 401, "uint16", "1", "version of the software"),
+    Register("version_minor", 402, "uint16", "1", "version of the software"),
+    Register("version_patch", 403, "uint16", "1", "version of the software"),
+    Register("word_test", 404, "uint16", "1", f"constant 0x{WORD_TEST:04X}"),
+    Register("long_test", 406, "uint32", "1", f"constant 0x{LONG_TEST:08X}: tells the word order"),
+    Register("float_test", 408, "float32", "1", f"constant {FLOAT_TEST:g}: tells the word order"),
+)
+
+REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY)
+
+BY_NAME = {register.name: register for register in REGISTERS}
+
+SIZE = max(register.end for register in REGISTERS)
+"""Addresses from 0 to here (exclusive) may be read; those that hold nothing read 0."""
+
+
+def register_named(name: str) -> Register:
+    """Return the register of that name.
+
+    Raises:
+        InputError: there is none; names those that are nearest.
+    """
+    if name in BY_NAME:
+        return BY_NAME[name]
+    near = [each for each in BY_NAME if name.lower() in each or each in name.lower()]
+    raise InputError(name, f"no register of that name; allowed: {', '.join(near or BY_NAME)}")

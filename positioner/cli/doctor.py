@@ -1,0 +1,116 @@
+"""`positioner doctor`: checks a daemon's file, its bus, the machine's timing and permissions, a line each."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from config.daemon import DaemonFile
+
+HELP = "check config, bus, timing and permissions, one line each; moves nothing"
+EXAMPLE = "positioner doctor daemon.toml"
+
+PERIODS = 500
+"""Periods over which the machine's timing is watched."""
+
+
+class Ailment(Exception):
+    """A check that failed, and why."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the daemon's file")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print a line a check; exit status 1 when one failed."""
+    from config.daemon import load_daemon
+
+    file = load_daemon(arguments.config)
+    print(f"{'config':12} ok    {arguments.config}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
+    checks: dict[str, Callable[[DaemonFile, Path], str]] = {
+        "bus": _bus,
+        "supervisory": _supervisory,
+        "recorder": _recorder,
+        "timing": _timing,
+        "priority": _priority,
+    }
+    well = True
+    for name, check in checks.items():
+        try:
+            print(f"{name:12} ok    {check(file, arguments.config)}")
+        except Ailment as ailment:
+            print(f"{name:12} FAILS {ailment}")
+            well = False
+    return 0 if well else 1
+
+
+def _bus(file: "DaemonFile", config: Path) -> str:
+    import time
+
+    from drivers.boundary import DriverError
+    from positioner.cli.probe import watching_driver
+    from positioner.control.settings import Settings
+
+    driver = watching_driver(config)
+    try:
+        held_pa = driver.open()
+        started_s = time.perf_counter()
+        for _ in range(PERIODS // 5):
+            reading = driver.read()
+        took_s = (time.perf_counter() - started_s) / (PERIODS // 5)
+    except DriverError as error:
+        raise Ailment(str(error)) from None
+    finally:
+        driver.close()
+    if not Settings.of(file).limits.plausible(reading.position_m):
+        raise Ailment(f"position {reading.position_m:g} m is not plausible: check device.map")
+    if took_s > file.cycle.period_s:
+        raise Ailment(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
+    return f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"
+
+
+def _supervisory(file: "DaemonFile", _config: Path) -> str:
+    import socket
+
+    host, port = file.supervisory.host, file.supervisory.port
+    with socket.socket() as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            raise Ailment(f"{host}:{port}: {error.strerror} (is the daemon running already?)") from None
+    return f"{host}:{port} is free"
+
+
+def _recorder(file: "DaemonFile", config: Path) -> str:
+    import os
+
+    if file.recorder is None:
+        return "none configured"
+    folder = config.parent / file.recorder.folder
+    nearest = next(each for each in (folder, *folder.parents) if each.exists())
+    if not os.access(nearest, os.W_OK):
+        raise Ailment(f"{folder}: cannot be written")
+    return f"{folder}, at most {file.recorder.keep_files * file.recorder.file_bytes / 1e6:.0f} MB"
+
+
+def _timing(file: "DaemonFile", _config: Path) -> str:
+    from positioner.daemon.pacing import RealTime
+
+    pace = RealTime(file.cycle.period_s)
+    missed = sum(pace.wait() for _ in range(PERIODS))
+    if missed > PERIODS // 100:
+        raise Ailment(f"{missed} of {PERIODS} periods of {1e3 * file.cycle.period_s:g} ms missed without load")
+    return f"{missed} of {PERIODS} periods of {1e3 * file.cycle.period_s:g} ms missed"
+
+
+def _priority(_file: "DaemonFile", _config: Path) -> str:
+    import os
+    import resource
+
+    if os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] != 0:
+        return "SCHED_FIFO permitted"
+    raise Ailment("SCHED_FIFO not permitted: give the service CAP_SYS_NICE or LimitRTPRIO for punctual cycles")

@@ -1,0 +1,39 @@
+"""`positioner get`: reads the daemon's registers by name."""
+
+import argparse
+
+from positioner.cli.connection import add_connection, connected
+
+HELP = "read supervisory registers by name (all of them without a name)"
+EXAMPLE = "positioner get position state fault"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("names", nargs="*", metavar="NAME", help="a register of `positioner map`")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_connection(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the values."""
+    import json
+    import math
+
+    from config.registers import BY_NAME, register_named
+
+    names = arguments.names or list(BY_NAME)
+    for name in names:
+        register_named(name)
+    with connected(arguments) as dcs:
+        values = dcs.get_all(*names)
+    if arguments.json:
+        print(json.dumps({name: value if math.isfinite(value) else None for name, value in values.items()}))
+    elif len(values) == 1:
+        print(f"{values[names[0]]:.9g}")
+    else:
+        width = max(map(len, names))
+        for name, value in values.items():
+            unit = BY_NAME[name].unit
+            print(f"{name:{width}}  {value:.9g}{'' if unit == '1' else ' ' + unit}")
+    return 0

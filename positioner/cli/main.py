@@ -1,0 +1,55 @@
+"""`positioner COMMAND ...`: finds the command, runs it, turns bad input into one line and an exit status.
+
+Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input.
+"""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+COMMANDS = ("demo", "sim", "run", "probe", "doctor", "get", "set", "identify", "map", "simulate", "play", "reproduce")
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    from config.errors import InputError
+    from positioner.dcs import DcsError
+
+    arguments = _parser().parse_args(words)
+    try:
+        return int(arguments.run(arguments))
+    except InputError as error:
+        print(f"positioner {arguments.command}: {error}", file=sys.stderr)
+        return 2
+    except DcsError as error:
+        print(f"positioner {arguments.command}: {error}", file=sys.stderr)
+        return 1
+    except ModuleNotFoundError as error:
+        if error.name not in ("numba", "scipy", "matplotlib"):
+            raise
+        print(
+            f"positioner {arguments.command}: needs {error.name}, which is not installed: "
+            f"pip install 'positioner[sim,plot]'",
+            file=sys.stderr,
+        )
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="positioner",
+        description="Identifies and positions sticking pneumatic control valves over fieldbus.",
+        epilog="exit status: 0 done, 1 the thing asked about does not hold, 2 bad input",
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        module = importlib.import_module(f"positioner.cli.{name}")
+        command = commands.add_parser(
+            name, help=module.HELP, description=module.HELP, epilog=f"example: {module.EXAMPLE}"
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    return parser

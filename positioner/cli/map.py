@@ -1,0 +1,82 @@
+"""`positioner map`: the supervisory register map."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from config.registers import Register
+
+HELP = "print the supervisory register map"
+EXAMPLE = "positioner map --format md"
+
+COLUMNS = ("name", "address", "address_from_1", "type", "word_order", "unit", "minimum", "maximum", "access", "text")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("--format", choices=("md", "csv", "json"), default="md")
+    parser.add_argument("--reasons", action="store_true", help="print what the numbers in *_reason mean instead")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the map, or the reasons."""
+    rows = _reasons() if arguments.reasons else _map()
+    {"md": _markdown, "csv": _csv, "json": _json}[arguments.format](rows)
+    return 0
+
+
+def _map() -> list[dict[str, object]]:
+    from config.registers import REGISTERS
+
+    return [_row(register) for register in REGISTERS]
+
+
+def _row(register: "Register") -> dict[str, object]:
+    order = "most significant word first" if register.format.words > 1 else ""
+    values = (
+        register.name,
+        register.address,
+        register.address + 1,
+        register.type,
+        order,
+        register.unit,
+        register.minimum,
+        register.maximum,
+        register.access,
+        register.text,
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def _reasons() -> list[dict[str, object]]:
+    from positioner.estimation.estimate import Reason
+
+    return [{"number": int(reason), "name": reason.name.lower(), "text": reason.sentence} for reason in Reason]
+
+
+def _markdown(rows: list[dict[str, object]]) -> None:
+    print("| " + " | ".join(rows[0]) + " |")
+    print("|" + "---|" * len(rows[0]))
+    for row in rows:
+        print("| " + " | ".join(_cell(value) for value in row.values()) + " |")
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _csv(rows: list[dict[str, object]]) -> None:
+    import csv
+    import sys
+
+    writer = csv.DictWriter(sys.stdout, rows[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+
+
+def _json(rows: list[dict[str, object]]) -> None:
+    import json
+
+    print(json.dumps(rows, indent=1))

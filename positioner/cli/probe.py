@@ -1,0 +1,81 @@
+"""`positioner probe`: looks at the valve without touching it."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from drivers.boundary import Driver, Reading
+
+HELP = "read the valve once a second: bus rate, age, plausibility; moves nothing"
+EXAMPLE = "positioner probe daemon.toml --count 5"
+
+BURST = 50
+"""Readings by which the bus is timed."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the daemon's file")
+    parser.add_argument("--count", type=int, default=0, help="stop after this many lines (0: at Ctrl-C)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print a line a second; exit status 1 when the last reading was not plausible."""
+    import itertools
+    import time
+
+    from config.daemon import load_daemon
+    from drivers.boundary import DriverError
+    from positioner.control.settings import Settings
+
+    file = load_daemon(arguments.config)
+    limits = Settings.of(file).limits
+    driver = watching_driver(arguments.config)
+    good = False
+    try:
+        print(f"holds {driver.open():.1f} Pa; {driver.capabilities}")
+        for count in itertools.count(1):
+            readings, took_s = _burst(driver)
+            last = readings[-1]
+            good = limits.plausible(last.position_m) and not last.status
+            print(_line(readings, took_s, last.position_m / limits.stroke_m, good), flush=True)
+            if count == arguments.count:
+                break
+            time.sleep(max(0.0, 1.0 - took_s))
+    except DriverError as error:
+        print(f"no reading: {error}")
+        return 1
+    finally:
+        driver.close()
+    return 0 if good else 1
+
+
+def watching_driver(config: Path) -> "Driver":
+    """Return a driver that leaves the device's communication time-out as it is: a watcher sends no commands."""
+    from config.daemon import load_daemon
+    from drivers import driver_for
+
+    device = load_daemon(config).device
+    untouched = device.map.model_copy(update={"communication_timeout_s": None, "communication_action": None})
+    return driver_for(device.model_copy(update={"map": untouched}))
+
+
+def _burst(driver: "Driver") -> tuple[list["Reading"], float]:
+    import time
+
+    started_s = time.perf_counter()
+    readings = [driver.read() for _ in range(BURST)]
+    return readings, time.perf_counter() - started_s
+
+
+def _line(readings: list["Reading"], took_s: float, position_pu: float, good: bool) -> str:
+    last = readings[-1]
+    parts = [f"{len(readings) / took_s:6.0f} readings/s", f"position {last.position_m:.6f} m ({position_pu:.4f} p.u.)"]
+    if last.pressure_pa is not None:
+        parts.append(f"pressure {last.pressure_pa:.1f} Pa")
+    if last.device_time_s is not None:
+        new = len({reading.device_time_s for reading in readings})
+        parts.append(f"{new} new of {len(readings)}")
+    parts.append("plausible" if good else f"NOT plausible (status {last.status})")
+    return ", ".join(parts)

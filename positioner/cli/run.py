@@ -1,0 +1,20 @@
+"""`positioner run`: the daemon."""
+
+import argparse
+from pathlib import Path
+
+HELP = "run the daemon: position the valve of CONFIG.toml and serve its supervisory registers"
+EXAMPLE = "positioner run daemon.toml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("config", type=Path, metavar="CONFIG.toml")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run until SIGTERM or Ctrl-C, which leave the valve in its configured safe state."""
+    from config.daemon import load_daemon
+    from positioner.daemon.service import serve
+
+    return serve(load_daemon(arguments.config), arguments.config)

@@ -1,0 +1,35 @@
+"""`positioner set`: writes one of the daemon's registers by name."""
+
+import argparse
+
+from positioner.cli.connection import add_connection, connected
+
+HELP = "write a supervisory register by name"
+EXAMPLE = "positioner set reference 0.5"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("name", metavar="NAME", help="a writable register of `positioner map`")
+    parser.add_argument("value", metavar="VALUE", help="a number; for mode also hold, manual, automatic")
+    add_connection(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write it."""
+    value = _number(arguments.name, arguments.value)
+    with connected(arguments) as dcs:
+        dcs.set(arguments.name, value)
+    return 0
+
+
+def _number(name: str, text: str) -> float:
+    from config.errors import InputError
+    from config.registers import Mode
+
+    if name == "mode" and text.upper() in Mode.__members__:
+        return Mode[text.upper()]
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(name, f"{text!r} is not a number") from None

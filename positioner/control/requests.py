@@ -1,0 +1,32 @@
+"""What the DCS asks for. One immutable snapshot is read once a cycle.
+
+Events (a write of the mode, of the reference, an acknowledgement, a heartbeat) are counts that only grow, so that a
+cycle sees every one, and none twice.
+"""
+
+from dataclasses import dataclass
+
+from config.registers import Mode
+
+Eta = tuple[int, int, int]
+"""eta_1 excitation, eta_2 parameter identifier, eta_3 friction estimator: 0 switches each on."""
+
+QUIET: Eta = (1, 1, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Requests:
+    """The DCS's side of the registers. Everything starts so that nothing moves the valve."""
+
+    reference_m: float = 0.0
+    mode: Mode = Mode.HOLD
+    eta: Eta = QUIET
+    manual_pa: float = 0.0
+    alpha_pa: float = 0.0
+    beta_pa: float = 0.0
+    omega_rad_per_s: float = 1.0
+    reference_writes: int = 0
+    mode_writes: int = 0
+    manual_writes: int = 0
+    acknowledgements: int = 0
+    heartbeats: int = 0

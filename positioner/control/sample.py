@@ -1,0 +1,24 @@
+"""One measurement, as the control core sees it. Time comes in as data."""
+
+from dataclasses import dataclass
+
+from config.device import DeviceStatus
+from config.registers import Quality
+
+HEALTHY = DeviceStatus(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What one cycle knows of the valve. After a lost reply the last values stand, with quality LOST."""
+
+    now_s: float
+    """Time of this cycle, on the clock that judges ages."""
+    time_s: float
+    """Time of the measurement, on the device's clock where it has one."""
+    position_m: float
+    pressure_pa: float
+    quality: Quality = Quality.GOOD
+    status: DeviceStatus = HEALTHY
+    held_pa: float | None = None
+    """The command the device held, when the connection was made anew in this cycle."""

@@ -1,0 +1,56 @@
+"""The states of the seed's control logic (4.1), as a function of the situation.
+
+    S0 start      holds the pressure, or applies the manual one
+    S1 up         delta r > 0: the law for upward motion
+    S2 down       delta r < 0: the law for downward motion
+    S3 identify   eta_1 = 0: the excitation
+
+What must be remembered lies in delta r, so the same situation always gives the same state, and S3 gives back
+the law it interrupted by itself.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from config.registers import Why
+
+
+class State(IntEnum):
+    """Numbers as served in the registers."""
+
+    S0_START = 0
+    S1_UP = 1
+    S2_DOWN = 2
+    S3_IDENTIFY = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """Everything the choice of state depends on."""
+
+    automatic: bool
+    exciting: bool
+    law_ready: bool
+    delta_r_m: float
+
+
+def state_in(situation: Situation) -> State:
+    """Return the state that a situation calls for."""
+    if not situation.automatic:
+        return State.S0_START
+    if situation.exciting:
+        return State.S3_IDENTIFY
+    if not situation.law_ready or situation.delta_r_m == 0.0:
+        return State.S0_START
+    return State.S1_UP if situation.delta_r_m > 0.0 else State.S2_DOWN
+
+
+def why_not_the_law(situation: Situation) -> Why:
+    """Return why neither S1 nor S2 is in force; NOTHING when one is, or when S3 occupies their place."""
+    if not situation.automatic:
+        return Why.NOT_AUTOMATIC
+    if situation.exciting:
+        return Why.NOTHING
+    if not situation.law_ready:
+        return Why.NO_ESTIMATES
+    return Why.NO_MOVE_ASKED if situation.delta_r_m == 0.0 else Why.NOTHING

@@ -1,0 +1,104 @@
+"""Supervision: is the measurement fresh and plausible, does the DCS live, who commands?
+
+It knows nothing of the law. A fault is latched: the mode falls to hold, the safe action commands, and only an
+acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again.
+"""
+
+import math
+from dataclasses import dataclass
+
+from config.device import ActionName, DeviceStatus
+from config.registers import Fault, Mode, Quality
+from positioner.control.requests import Requests
+from positioner.control.sample import Sample
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What supervision holds a sample against."""
+
+    stroke_m: float
+    travel_margin: float
+    lost_after_cycles: int
+    stale_after_s: float
+    heartbeat_timeout_s: float
+    restart_tolerance_pa: float
+    """A device that comes back with a command farther than this from ours was restarted."""
+    action: ActionName
+    heartbeat_action: ActionName
+
+    def plausible(self, position_m: float) -> bool:
+        """Return whether a stem can be there; NaN is nowhere."""
+        margin_m = self.travel_margin * self.stroke_m
+        return -margin_m <= position_m <= self.stroke_m + margin_m
+
+    def action_on(self, fault: Fault) -> ActionName:
+        """Return the safe action that answers a fault."""
+        return self.heartbeat_action if fault is Fault.DCS_SILENT else self.action
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What supervision remembers from cycle to cycle."""
+
+    mode: Mode = Mode.HOLD
+    fault: Fault = Fault.NONE
+    bad_in_a_row: int = 0
+    good_s: float = -math.inf
+    heard_s: float = -math.inf
+    mode_writes: int = 0
+    acknowledgements: int = 0
+    heartbeats: int = 0
+
+
+UNFIT = DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST
+
+
+def usable(sample: Sample, limits: Limits) -> bool:
+    """Return whether a sample is new and could be true."""
+    return sample.quality is Quality.GOOD and limits.plausible(sample.position_m)
+
+
+def supervise(watch: Watch, sample: Sample, command_pa: float, requests: Requests, limits: Limits) -> Watch:
+    """Return what is known after this sample; `command_pa` is the last command given."""
+    good = usable(sample, limits)
+    bad = sample.quality is Quality.LOST or (sample.quality is Quality.GOOD and not good)
+    first = math.isinf(watch.good_s)
+    heard = first or requests.heartbeats != watch.heartbeats
+    bad_in_a_row = watch.bad_in_a_row + 1 if bad else 0
+    good_s = sample.now_s if good or first else watch.good_s
+    heard_s = sample.now_s if heard else watch.heard_s
+
+    cause = _cause(sample, command_pa, bad_in_a_row, sample.now_s - good_s, limits)
+    silent = watch.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heard_s
+    if cause is Fault.NONE and silent:
+        cause = Fault.DCS_SILENT
+    acknowledged = requests.acknowledgements != watch.acknowledgements
+    latched = Fault.NONE if acknowledged else watch.fault
+    fault = cause if cause is not Fault.NONE else latched
+    return Watch(
+        mode=_mode(watch, requests, fault),
+        fault=fault,
+        bad_in_a_row=bad_in_a_row,
+        good_s=good_s,
+        heard_s=heard_s,
+        mode_writes=requests.mode_writes,
+        acknowledgements=requests.acknowledgements,
+        heartbeats=requests.heartbeats,
+    )
+
+
+def _cause(sample: Sample, command_pa: float, bad_in_a_row: int, age_s: float, limits: Limits) -> Fault:
+    if sample.held_pa is not None and abs(sample.held_pa - command_pa) > limits.restart_tolerance_pa:
+        return Fault.RESTARTED
+    if bad_in_a_row >= limits.lost_after_cycles:
+        return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE
+    if sample.quality is not Quality.LOST and sample.status & UNFIT:
+        return Fault.DEVICE
+    return Fault.STALE if age_s > limits.stale_after_s else Fault.NONE
+
+
+def _mode(watch: Watch, requests: Requests, fault: Fault) -> Mode:
+    if fault is not Fault.NONE:
+        return Mode.HOLD
+    return requests.mode if requests.mode_writes != watch.mode_writes else watch.mode

@@ -1,0 +1,99 @@
+"""The cycle: exchange, decide, publish, record; then wait for the next.
+
+    sample_n = exchange(command_(n-1))         one transaction: the command out, the measurement back
+    command_n = decide(sample_n, requests)     supervision, S0 to S3, the law
+    publish, record                            after the deadline that matters
+
+In real time command_n reaches the wire with the exchange of cycle n + 1, one period of delay. A device in lockstep
+answers with the sample at the end of the period for which it has obeyed command_(n-1).
+"""
+
+import logging
+import time
+from threading import Event
+
+from config.registers import Quality
+from positioner.control.controller import Controller, Decision
+from positioner.control.requests import Requests
+from positioner.control.sample import Sample
+from positioner.daemon.link import Link
+from positioner.daemon.logs import say
+from positioner.daemon.pacing import Pace
+from positioner.daemon.recorder import Recorder, Row
+from positioner.daemon.snapshot import Snapshot
+from positioner.daemon.statistics import CycleStatistics
+
+log = logging.getLogger(__name__)
+
+
+class Cycle:
+    """Runs the controller on a device. One thread calls `run`; others read `snapshot` and replace `requests`.
+
+    The first cycle runs at once: it commands what the device holds, so it moves nothing.
+    """
+
+    def __init__(
+        self, link: Link, controller: Controller, pace: Pace, requests: Requests, recorder: Recorder | None
+    ) -> None:
+        self.requests = requests
+        self.statistics = CycleStatistics()
+        self.link = link
+        self.recorder = recorder
+        self._controller = controller
+        self._pace = pace
+        self.snapshot = self._decide()
+
+    def run(self, stop: Event) -> None:
+        """Cycle until told to stop."""
+        self._pace.prepare()
+        while not stop.is_set():
+            missed = self._pace.wait()
+            started_s = time.monotonic()
+            self.once()
+            self.statistics.enter(started_s, time.monotonic() - started_s, missed)
+
+    def once(self) -> None:
+        """Run one cycle."""
+        before, self.snapshot = self.snapshot, self._decide()
+        if _told(before.decision) != _told(self.snapshot.decision):
+            _tell(self.snapshot.decision)
+
+    def _decide(self) -> Snapshot:
+        sent_pa = self._controller.command_pa
+        sample = self.link.exchange(sent_pa)
+        decision = self._controller.step(sample, self.requests)
+        if self.recorder is not None and sample.quality is Quality.GOOD:
+            in_force_pa = self._pace.in_force_pa(sent_pa, decision.command_pa)
+            self.recorder.offer(_row(sample, decision, in_force_pa, self.link.counts.lost_samples))
+        return Snapshot(sample, decision)
+
+
+def _told(decision: Decision) -> tuple[object, ...]:
+    return decision.state, decision.mode, decision.fault, decision.why, decision.adoption
+
+
+def _tell(decision: Decision) -> None:
+    say(
+        log,
+        logging.WARNING if decision.fault else logging.INFO,
+        "decision",
+        state=decision.state.name,
+        mode=decision.mode.name,
+        fault=decision.fault.name,
+        why=decision.why.name,
+        command_pa=decision.command_pa,
+        identifications=decision.adoption.applied.accepted,
+        refusal=decision.adoption.refusal.name,
+    )
+
+
+def _row(sample: Sample, decision: Decision, in_force_pa: float, lost_samples: int) -> Row:
+    return (
+        sample.time_s,
+        in_force_pa,
+        sample.position_m,
+        sample.pressure_pa,
+        decision.reference_m,
+        int(decision.state),
+        lost_samples,
+    )

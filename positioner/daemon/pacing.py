@@ -1,0 +1,132 @@
+"""When the next cycle begins: on absolute deadlines in real time, or at once with a device in lockstep.
+
+asyncio's timers have a grain of 1 ms and miss a third of the periods of a 1 kHz loop; a thread that sleeps to
+absolute deadlines misses about 0.2 %. Under SCHED_FIFO the last part of the wait is spun, which takes the wake-up
+out of the jitter; without it spinning only makes the scheduler push the thread aside.
+"""
+
+import ctypes
+import gc
+import logging
+import os
+import sys
+import time
+from typing import Protocol
+
+from positioner.daemon.logs import say
+
+log = logging.getLogger(__name__)
+
+FIFO_PRIORITY = 40
+MOST_SPIN_S = 200e-6
+SPIN_SHARE = 0.2
+"""Of a period at the most: the kernel stalls a FIFO thread that takes 95 % of a core."""
+
+PR_SET_TIMERSLACK = 29
+MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
+
+
+class Pace(Protocol):
+    """Says when a cycle begins and what time it is."""
+
+    def prepare(self) -> None:
+        """Make the calling thread, which is the cycle's, as punctual as can be. Called once, before it cycles."""
+        ...
+
+    def wait(self) -> int:
+        """Return when the next cycle is due; how many periods were missed since the last."""
+        ...
+
+    def now_s(self, device_time_s: float | None) -> float:
+        """Return the time of this cycle; `device_time_s` is that of its measurement, None without one."""
+        ...
+
+    def in_force_pa(self, sent_pa: float, decided_pa: float) -> float:
+        """Return which command acts from a sample on: the one sent with it, or the one decided on it."""
+        ...
+
+
+class RealTime:
+    """Absolute deadlines on the gateway's monotonic clock."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._spin_s = 0.0
+        self._due_s: float | None = None
+
+    def prepare(self) -> None:
+        """Ask the system for priority; spin only with it."""
+        if raise_priority():
+            self._spin_s = min(MOST_SPIN_S, SPIN_SHARE * self._period_s)
+
+    def wait(self) -> int:
+        """Sleep, then spin, until the next deadline. A missed one is not made up for."""
+        now_s = time.monotonic()
+        if self._due_s is None:
+            self._due_s = now_s
+        due_s = self._due_s + self._period_s
+        missed = 0
+        if now_s > due_s:
+            missed = int((now_s - due_s) / self._period_s)
+            due_s += missed * self._period_s
+        self._due_s = due_s
+        rest_s = due_s - self._spin_s - now_s
+        if rest_s > 0:
+            time.sleep(rest_s)
+        while time.monotonic() < due_s:
+            pass
+        return missed
+
+    def now_s(self, device_time_s: float | None) -> float:  # noqa: ARG002 - the gateway's clock judges ages
+        """Return the gateway's monotonic time."""
+        return time.monotonic()
+
+    def in_force_pa(self, sent_pa: float, decided_pa: float) -> float:  # noqa: ARG002 - it leaves with the next exchange
+        """Return the command that travelled with the sample: it acts until the next exchange."""
+        return sent_pa
+
+
+class DevicePace:
+    """As fast as a device in lockstep answers; its clock is the time."""
+
+    def __init__(self) -> None:
+        self._now_s = 0.0
+
+    def prepare(self) -> None:
+        """Need nothing."""
+
+    def wait(self) -> int:
+        """Return at once."""
+        return 0
+
+    def now_s(self, device_time_s: float | None) -> float:
+        """Return the device's time; it stands still while the device does not answer."""
+        if device_time_s is not None:
+            self._now_s = device_time_s
+        return self._now_s
+
+    def in_force_pa(self, sent_pa: float, decided_pa: float) -> float:  # noqa: ARG002 - its period is over
+        """Return the decided command: the device stands still until it gets it."""
+        return decided_pa
+
+
+def raise_priority() -> bool:
+    """Make the calling thread as punctual as the system permits; return whether it got SCHED_FIFO."""
+    gc.collect()
+    gc.freeze()
+    # Another thread may keep the interpreter for this long before it is asked to let the cycle run.
+    sys.setswitchinterval(100e-6)
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    locked = libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0
+    fifo = _take_fifo()
+    say(log, logging.INFO, "cycle thread", fifo=fifo, memory_locked=locked)
+    return fifo
+
+
+def _take_fifo() -> bool:
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,251 @@
+"""Identification of a sticking valve, sample by sample: motion, identifier, friction and judgement put together.
+
+A record of the last N samples, one derivative window, goes ahead of the identifier: a sample is used when it leaves
+the record at its old end. So when motion is seen, its beginning is still to come and time zero is put exactly there;
+when the stem is found to have stopped, the samples of the standstill that were taken for motion are dropped unused.
+The estimates are one derivative window old for that, and say so by `time_s`.
+"""
+
+from dataclasses import dataclass, replace
+from math import isfinite, nan
+
+from positioner.estimation.derivatives import Derivatives
+from positioner.estimation.estimate import Estimate, Estimates, Reason, no_estimates, none
+from positioner.estimation.friction import RunningMeans
+from positioner.estimation.identifier import Identifier, Solution
+from positioner.estimation.judgement import Judge
+from positioner.estimation.motion import Motion, beginning
+from positioner.estimation.noise import PositionNoise
+from positioner.estimation.record import Record
+
+READINGS = 40
+"""Times per window at which (13) is solved."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationSettings:
+    """How the identification is done.
+
+    Attributes:
+        stroke_m: full travel, the unit of position.
+        pressure_pa: span of the actuator pressure, the unit of pressure.
+        noise_std_m: standard deviation of the position's white noise, resolution / sqrt(12) included; None: measured.
+        pressure_noise_std_pa: the same of the pressure. 1 Pa does what A / k_s = 1.2 um would do (the seed's valve).
+        pressure_held: see `Identifier`.
+        window_s: length of motion after which the identification is complete.
+        minimum_window_s: length of motion before which nothing is estimated.
+        derivative_window_s: length of the derivative filters.
+        moving_threshold_m_per_s: velocity below which the stem counts as stopped; above the model's dead zone.
+        largest_relative_std: standard deviation up to which an estimate is valid, as a share of its value.
+    """
+
+    stroke_m: float
+    pressure_pa: float
+    noise_std_m: float | None = None
+    pressure_noise_std_pa: float = 0.0
+    pressure_held: bool = True
+    window_s: float = 0.8
+    minimum_window_s: float = 0.4
+    derivative_window_s: float = 0.05
+    moving_threshold_m_per_s: float = 1e-3
+    largest_relative_std: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name in ("stroke_m", "pressure_pa", "derivative_window_s", "moving_threshold_m_per_s"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, it is {getattr(self, name)!r}")
+        if not 0 < self.minimum_window_s <= self.window_s:
+            raise ValueError(
+                f"minimum_window_s must be positive and at most window_s ({self.window_s!r} s), "
+                f"it is {self.minimum_window_s!r}"
+            )
+
+
+class Identification:
+    """The estimates of one valve from its samples.
+
+    Attributes:
+        estimates: what is known by now.
+        velocity_m_per_s, acceleration_m_per_s2: (19), (21) at the latest sample; NaN until the filters are full.
+        direction: of the motion seen, +1 up, -1 down, 0 none.
+    """
+
+    def __init__(self, settings: IdentificationSettings) -> None:
+        self._settings = settings
+        self._identifier = Identifier(
+            settings.window_s, settings.stroke_m, settings.pressure_pa, pressure_held=settings.pressure_held
+        )
+        self._record = Record(settings.derivative_window_s)
+        self._noise = PositionNoise()
+        self._derivatives = Derivatives()
+        self._motion = Motion(settings.moving_threshold_m_per_s)
+        self._means = RunningMeans()
+        self._solution: Solution | None = None  # the last whose b/c was valid
+        self._asked = (False, False)
+        self._age = 0  # of the oldest sample in the record, in samples since the motion began
+        self._clear_record()
+        self._restart_window()
+        self.estimates = no_estimates(Reason.NOT_STARTED)
+
+    @property
+    def direction(self) -> int:
+        """Direction of the motion seen."""
+        return self._motion.direction
+
+    def restart(self) -> None:
+        """Begin a new identification: all is forgotten, but for (a, b, c) to find friction with."""
+        self._clear_record()
+        self._noise.restart()
+        self._restart_window()
+        self.estimates = no_estimates(Reason.WAITING_FOR_MOTION)
+
+    def update(
+        self, time_s: float, position_m: float, pressure_pa: float, *, parameters: bool, friction: bool
+    ) -> Estimates:
+        """Take a fresh sample.
+
+        A step of more than five mean periods, or a clock that does not advance, breaks the record, which then begins
+        anew. A sample with a value that is not a finite number counts as missing.
+
+        Args:
+            time_s: the device's time stamp.
+            position_m: stem position.
+            pressure_pa: actuator pressure.
+            parameters: whether to identify a, b, c.
+            friction: whether to estimate k, from a, b, c of this identification or of the last one.
+        """
+        if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
+            return self.estimates
+        if (parameters, friction) != self._asked:
+            self._ask(parameters, friction)
+        self._take(time_s, position_m, pressure_pa)
+        if self._record.full:
+            self._watch()
+            if self._motion.direction and self._age >= 0 and any(self._asked) and not self._complete:
+                self._collect()
+        return self.estimates
+
+    @property
+    def _noise_std_m(self) -> float:
+        known = self._settings.noise_std_m
+        return self._noise.std_m if known is None else known
+
+    def _ask(self, parameters: bool, friction: bool) -> None:
+        self._asked = (parameters, friction)
+        self._restart_window()
+        if any(self._asked) and not self.estimates.acceptable:
+            self.estimates = no_estimates(Reason.WAITING_FOR_MOTION)
+
+    def _restart_window(self) -> None:
+        self._collecting = self._complete = False
+        self._elapsed_s = 0.0
+
+    def _take(self, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Append a sample to the record, or begin a new one with it."""
+        record = self._record
+        if record.breaks(time_s):
+            self._clear_record()
+            self._interrupt(Reason.RECORD_BROKEN)
+        record.append(time_s, position_m, pressure_pa)
+
+    def _clear_record(self) -> None:
+        self._record.clear()
+        self._motion.stop()
+        self._until_block = 0
+        self.velocity_m_per_s = self.acceleration_m_per_s2 = nan
+
+    def _watch(self) -> None:
+        """Take the derivatives at the latest sample and see whether, and since when, the stem moves."""
+        record = self._record
+        time_s, position_m = record.time_s, record.position_m
+        velocity, acceleration, slope = self._derivatives.estimate(time_s, position_m)
+        record.set_derivatives(velocity, acceleration)
+        self.velocity_m_per_s, self.acceleration_m_per_s2 = velocity, acceleration
+
+        if not self._until_block:
+            self._noise.add(position_m)
+            self._until_block = record.length
+        self._until_block -= 1
+        noise_m = self._noise_std_m
+        before = self._motion.direction
+        direction = self._motion.update(slope, self._derivatives.slope_gain * noise_m)
+        self._age += 1
+        if direction == before:
+            return
+        if before:
+            self._interrupt(Reason.MOTION_ENDED)
+        if direction:
+            self._age = -beginning(position_m, direction, noise_m)
+
+    def _collect(self) -> None:
+        """Use the oldest sample of the record, on its way out."""
+        time_s, position_m, pressure_pa, velocity, acceleration = self._record.oldest()
+        if not self._collecting:
+            self._collecting = True
+            self._identifier.restart()
+            self._means.restart()
+            self._zero_s, self._next_reading_s = time_s, 0.0
+        parameters, friction = self._asked
+        if parameters:
+            self._identifier.update(time_s, position_m, pressure_pa)
+        settings = self._settings
+        self._elapsed_s = time_s - self._zero_s
+        # The jerk with which motion begins is no polynomial: the filters' window has to be clear of it.
+        settled = self._age >= self._record.length - 1 and self._elapsed_s >= settings.minimum_window_s / 2
+        if friction and settled:
+            if settings.pressure_held:  # the step at this instant counts half before it, half after it
+                pressure_pa = float(self._record.pressure_pa[:2].sum()) / 2
+            self._means.add(acceleration, velocity, position_m, pressure_pa)
+        self._complete = self._elapsed_s >= settings.window_s
+        if self._elapsed_s >= self._next_reading_s or self._complete:
+            self._next_reading_s += settings.window_s / READINGS
+            self._publish(self._read(time_s))
+
+    def _read(self, time_s: float) -> Estimates:
+        """Return what the window says so far."""
+        progress = min(1.0, self._elapsed_s / self._settings.window_s)
+        if self._elapsed_s < self._settings.minimum_window_s:
+            return replace(no_estimates(Reason.WINDOW_TOO_SHORT), progress=progress)
+        a, b, c, b_over_c = self._read_parameters()
+        k, k_over_c = self._read_friction()
+        return Estimates(a, b, c, k, b_over_c, k_over_c, progress=progress, time_s=time_s)
+
+    def _read_parameters(self) -> tuple[Estimate, Estimate, Estimate, Estimate]:
+        if not self._asked[0]:
+            return (none(Reason.NOT_ASKED),) * 4
+        solution = self._identifier.solve(self._noise_std_m, self._settings.pressure_noise_std_pa)
+        if solution is None:
+            return (none(Reason.ILL_CONDITIONED),) * 4
+        a, b, c, b_over_c = self._judge().parameters(solution)
+        if b_over_c.valid:
+            self._solution = solution
+        return a, b, c, b_over_c
+
+    def _read_friction(self) -> tuple[Estimate, Estimate]:
+        if not self._asked[1]:
+            return (none(Reason.NOT_ASKED),) * 2
+        if self._solution is None:
+            return (none(Reason.PARAMETERS_MISSING),) * 2
+        means = self._means.means(self._derivatives.weights)
+        if means is None:
+            return (none(Reason.WINDOW_TOO_SHORT),) * 2
+        return self._judge().friction(self._solution, means, self._motion.direction)
+
+    def _judge(self) -> Judge:
+        settings = self._settings
+        return Judge(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
+
+    def _publish(self, fresh: Estimates) -> None:
+        """Take fresh estimates, unless they are worse than what an earlier stretch of motion has given."""
+        if fresh.acceptable or not self.estimates.acceptable:
+            self.estimates = fresh
+        else:
+            self.estimates = replace(self.estimates, progress=fresh.progress)
+
+    def _interrupt(self, reason: Reason) -> None:
+        """Close the window; say why if it was too short to have given anything."""
+        if self._complete or not any(self._asked):
+            return
+        if self._elapsed_s < self._settings.minimum_window_s and not self.estimates.acceptable:
+            self.estimates = no_estimates(reason)
+        self._restart_window()

@@ -1,0 +1,95 @@
+"""The last N samples of the record, with the derivatives found at each, side by side in memory, oldest first."""
+
+import numpy as np
+
+from positioner.estimation.derivatives import SHORTEST
+from positioner.estimation.identifier import Array
+
+COLUMNS = 5
+LONGEST_GAP = 5.0
+"""A step longer than this many mean periods breaks the record; a shorter one is a missing sample."""
+
+_TURNS = 8
+"""The record is moved back to the front of its memory once in this many times its length."""
+
+
+class Record:
+    """A ring of samples that is always one contiguous stretch.
+
+    Args:
+        window_s: the time it holds; N follows from the median period of its first samples.
+    """
+
+    def __init__(self, window_s: float) -> None:
+        self._window_s = window_s
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget every sample, and the period."""
+        self.length = SHORTEST
+        self._sized = False
+        self._data = np.zeros((COLUMNS, _TURNS * SHORTEST))
+        self._end = self._count = 0
+
+    def _size(self) -> None:
+        period_s = float(np.median(np.diff(self.time_s)))
+        self.length = max(SHORTEST, round(self._window_s / period_s) + 1)
+        data = np.zeros((COLUMNS, _TURNS * self.length))
+        data[:, : self._count] = self._data[:, : self._count]
+        self._data, self._sized = data, True
+
+    def append(self, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Take a sample; beyond N the oldest is forgotten."""
+        if self._end == self._data.shape[1]:
+            kept = self.length - 1
+            self._data[:, :kept] = self._data[:, -kept:]
+            self._end = kept
+        self._data[:, self._end] = (time_s, position_m, pressure_pa, np.nan, np.nan)
+        self._end += 1
+        self._count = min(self._count + 1, self.length)
+        if self._count == SHORTEST and not self._sized:
+            self._size()
+
+    def set_derivatives(self, velocity_m_per_s: float, acceleration_m_per_s2: float) -> None:
+        """Note the derivatives at the latest sample."""
+        self._data[3:, self._end - 1] = (velocity_m_per_s, acceleration_m_per_s2)
+
+    def breaks(self, time_s: float) -> bool:
+        """Whether a sample of this time stamp cannot follow: the clock did not advance, or there is a gap."""
+        if not self._count:
+            return False
+        times = self.time_s
+        step = time_s - float(times[-1])
+        if step <= 0 or self._count == 1:
+            return step <= 0
+        return step > LONGEST_GAP * float(times[-1] - times[0]) / (self._count - 1)
+
+    @property
+    def full(self) -> bool:
+        """Whether N samples are there."""
+        return self._count == self.length
+
+    @property
+    def count(self) -> int:
+        """Number of samples held."""
+        return self._count
+
+    @property
+    def time_s(self) -> Array:
+        """Time stamps, oldest first."""
+        return self._data[0, self._end - self._count : self._end]
+
+    @property
+    def position_m(self) -> Array:
+        """Positions, oldest first."""
+        return self._data[1, self._end - self._count : self._end]
+
+    @property
+    def pressure_pa(self) -> Array:
+        """Pressures, oldest first."""
+        return self._data[2, self._end - self._count : self._end]
+
+    def oldest(self) -> tuple[float, float, float, float, float]:
+        """Return time, position, pressure, velocity and acceleration of the oldest sample, SI units."""
+        t, x, u, v, a = self._data[:, self._end - self._count].tolist()
+        return t, x, u, v, a

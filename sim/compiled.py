@@ -1,0 +1,156 @@
+"""Compiles the bare valve with a set of effects in their places into one kernel, cached across processes.
+
+The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which the
+effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of
+the effects' texts and of this file, and the numba version. numba keeps the machine code beside it. A change in any of them is
+another name, so that an old kernel is never taken for a new one; and what is compiled is the very text that was hashed.
+No fast-math: the order of operations is the text's.
+
+numba is untyped: its types stop here.
+"""
+
+import atexit
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any, Protocol, cast
+
+import numba
+from numba.core.errors import NumbaError
+
+from config.errors import InputError
+from sim import karnopp
+from sim.effect import Effect, execute
+from sim.karnopp import MEMORY, Vector
+from sim.wiring import wiring
+
+BASE = Path(karnopp.__file__)
+OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
+"""numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
+VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
+ENTRIES: Mapping[str, tuple[str, ...]] = {
+    "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
+    "advance": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
+    "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
+}
+
+
+class _Rest(Protocol):
+    def __call__(self, theta: Vector, state: Vector, time: float, position: float, command: float, /) -> None: ...
+
+
+class _Advance(Protocol):
+    def __call__(
+        self, theta: Vector, state: Vector, command: float, duration: float, longest_step: float, /
+    ) -> None: ...
+
+
+class _Respond(Protocol):
+    def __call__(
+        self,
+        theta: Vector,
+        state: Vector,
+        commands: Vector,
+        periods: Vector,
+        longest_step: float,
+        path: Vector,
+        /,
+    ) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """`rest`, `advance` and `respond` of `karnopp.py`, compiled with the effects in their places."""
+
+    digest: str
+    state_size: int
+    rest: _Rest
+    advance: _Advance
+    respond: _Respond
+
+
+def kernel(effects: Sequence[Effect]) -> Kernel:
+    """Return the kernel of the bare valve with these effects, compiled or from the cache.
+
+    Raises:
+        InputError: an effect's function is not what numba can compile; names its file.
+    """
+    sources = tuple((each.path, each.source) for each in effects)
+    return _compiled(_text(effects), sources, MEMORY + sum(each.memory for each in effects))
+
+
+@cache
+def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int) -> Kernel:
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    module = _module(f"valve_kernel_{digest}")
+    exec(compile(text, _written(digest, text), "exec", dont_inherit=True), module.__dict__)
+    for i, (path, source) in enumerate(sources):
+        part = _module(f"{module.__name__}_{i}")
+        execute(source, path, part.__dict__)
+        _inlined(part.__dict__)
+        module.__dict__.update({f"{name}_{i}": value for name, value in part.__dict__.items() if name[0] != "_"})
+    entries = {name: getattr(module, name) for name in ENTRIES}
+    _inlined(module.__dict__)
+    try:
+        compiled = {
+            name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, **OPTIONS)(entry)
+            for name, entry in entries.items()
+        }
+    except NumbaError as error:
+        where = ", ".join(str(path) for path, _ in sources)
+        raise InputError(where, f"cannot be compiled: {' '.join(str(error).split())}") from None
+    return Kernel(digest, state_size, **{name: cast(Any, each) for name, each in compiled.items()})
+
+
+def _module(name: str) -> ModuleType:
+    """Return a new module where numba finds it when it reads a cached function."""
+    sys.modules[name] = ModuleType(name)
+    return sys.modules[name]
+
+
+def _inlined(namespace: dict[str, Any]) -> None:
+    """Make the functions of a namespace compiled ones; inlining all of them triples the speed."""
+    for name, value in list(namespace.items()):
+        if isinstance(value, FunctionType) and value.__globals__ is namespace:
+            namespace[name] = numba.njit(forceinline=True, **OPTIONS)(value)
+
+
+def _written(digest: str, text: str) -> Path:
+    """Return the file that holds the text, in the cache folder or, where that cannot be written, a temporary one."""
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    try:
+        return _write(Path(home) / "positioner" / "kernels" / f"{digest}.py", text)
+    except OSError:
+        return _write(_temporary_folder() / f"{digest}.py", text)
+
+
+def _write(path: Path, text: str) -> Path:
+    (path.parent / "__pycache__").mkdir(parents=True, exist_ok=True)
+    if not os.access(path.parent / "__pycache__", os.W_OK):
+        raise PermissionError
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
+            file.write(text)
+        Path(file.name).replace(path)
+    return path
+
+
+@cache
+def _temporary_folder() -> Path:
+    folder = tempfile.TemporaryDirectory(prefix="positioner-")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
+
+
+def _text(effects: Sequence[Effect]) -> str:
+    """Return the kernel's text."""
+    digests = {each.name: hashlib.sha256(each.source.encode()).hexdigest() for each in effects}
+    compiler = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    head = f"# numba {numba.__version__}, compiled.py {compiler}, effects {digests}"
+    return "\n".join([head, BASE.read_text(encoding="utf-8"), wiring(effects) if effects else "", ""])

@@ -1,0 +1,95 @@
+"""A valve file made ready to run: its effects, its parameter vector, its kernel.
+
+The parameter vector theta holds the base model's parameters in the order of BASE, then each effect's in the order of the
+file; an effect's parameter is named `effect.parameter`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
+
+from config.errors import InputError
+from config.loading import validated
+from config.valve import EffectTable, ValveFile, ValveParameters
+from sim.compiled import Kernel, kernel
+from sim.effect import Effect, shipped_effect
+from sim.karnopp import Vector
+
+BASE = (
+    "mass_kg",
+    "diaphragm_area_m2",
+    "spring_n_per_m",
+    "viscous_ns_per_m",
+    "coulomb_n",
+    "static_n",
+    "stribeck_velocity_m_per_s",
+    "deadzone_ratio",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Composition:
+    """The bare valve with its effects in their places."""
+
+    valve: ValveParameters
+    effects: tuple[Effect, ...]
+    theta: Vector = field(repr=False)
+    kernel: Kernel = field(repr=False)
+    source: str
+    """What errors name: the valve file."""
+
+    @classmethod
+    def from_file(cls, file: ValveFile, source: str = "valve file") -> Self:
+        """Compose a valve file with the effects that come with the package.
+
+        Raises:
+            InputError: an unknown effect, one that stands twice, a parameter unknown, missing or out of its range.
+        """
+        return cls.of(file, [shipped_effect(each.name, source) for each in file.effect], source)
+
+    @classmethod
+    def of(cls, file: ValveFile, effects: Sequence[Effect], source: str = "valve file") -> Self:
+        """Compose a valve file, `effects` being what its `[[effect]]` tables name, in their order.
+
+        Raises:
+            InputError: an effect that stands twice or does not compile, a parameter unknown, missing or out of range.
+        """
+        names = [each.name for each in effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(source, f"effect {name} stands {names.count(name)} times; once is allowed")
+        theta = [float(getattr(file.valve, name)) for name in BASE]
+        for effect, table in zip(effects, file.effect, strict=True):
+            theta += effect.values(table.parameters, f"{source}: effect {table.name}")
+        vector = np.array(theta)
+        vector.flags.writeable = False
+        return cls(file.valve, tuple(effects), vector, kernel(effects), source)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name the entries of theta."""
+        return BASE + tuple(f"{each.name}.{key}" for each in self.effects for key in each.parameters)
+
+    def changed(self, theta: Vector, parameters: Mapping[str, float]) -> Vector:
+        """Return theta with some parameters, by name, replaced.
+
+        Raises:
+            InputError: an unknown name, or a value that is not physical (ranges, static_n >= coulomb_n).
+        """
+        for name in parameters:
+            if name not in self.names:
+                raise InputError(self.source, f"{name}: unknown parameter; there are: {', '.join(self.names)}")
+        values: dict[str, Any] = {**dict(zip(self.names, theta.tolist(), strict=True)), **parameters}
+        base = {"name": self.valve.name, "stroke_m": self.valve.stroke_m} | {name: values[name] for name in BASE}
+        validated(ValveParameters, base, self.source)
+        for effect in self.effects:
+            written = {key: values[f"{effect.name}.{key}"] for key in effect.parameters}
+            effect.values(written, f"{self.source}: effect {effect.name}")
+        return np.array([float(values[name]) for name in self.names])
+
+
+def with_effects(file: ValveFile, *tables: Mapping[str, Any]) -> ValveFile:
+    """Return the valve file with further `[[effect]]` tables."""
+    return file.model_copy(update={"effect": (*file.effect, *(EffectTable(**table) for table in tables))})

@@ -1,0 +1,191 @@
+"""An effect: one file that puts a piece of physics into its place on the path from command to indication.
+
+    command -> pressure -> force -> friction -> motion -> sensor
+
+The file is plain Python; its name is the effect's name, the first line of its docstring says what the effect is.
+It defines
+
+    class Parameters(NamedTuple)    each field an Annotated[float, Parameter(text, least, most)], unit in its name
+    MEMORY = n                      number of its state variables, if it has any
+
+and a function for its place. The places and what each returns:
+
+    pressure   the pressure that leaves it, Pa, from the pressure u that enters it
+    force      an extra force on the stem, N, positive in the opening direction
+    friction   the levels (F_c, F_s), N, from those that enter it; direction is the sign of (impending) motion
+    motion     the stem's (x, v) at the end of a step; F_e is the external force, N, stiffness its -dF_e/dx, N/m
+    sensor     the position that leaves it, m, from the position y that enters it
+
+An effect sits in the pressure path, or in the sensor, or at the stem (force, friction and motion in any mixture).
+With a memory it also defines
+
+    start      sets the memory for a valve long at rest, signal being what enters it (at the stem: x)
+    advance    carries the memory over a step h, s, during which the signal goes from before to after
+
+A function names among its arguments only what it needs of: t (s), x (m), v (m/s), p (actuator pressure, Pa), q (the
+parameters), z (the memory, an array), and what its place adds. It may use what numba compiles: floats, math, numpy and
+functions of its own file.
+"""
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import numpy as np
+import numpy.typing as npt
+
+from config.errors import InputError
+
+Memory = npt.NDArray[np.float64]
+
+EVERYWHERE = ("t", "x", "v", "p", "q", "z")
+PLACES: Mapping[str, tuple[str, ...]] = {
+    "pressure": ("u", *EVERYWHERE),
+    "force": EVERYWHERE,
+    "friction": ("F_c", "F_s", "direction", *EVERYWHERE),
+    "motion": ("F_e", "stiffness", *EVERYWHERE),
+    "sensor": ("y", *EVERYWHERE),
+}
+"""The places on the path and the arguments a function there may name."""
+UPKEEP: Mapping[str, tuple[str, ...]] = {
+    "start": ("signal", *EVERYWHERE),
+    "advance": ("before", "after", "h", *EVERYWHERE),
+}
+"""What keeps a memory, and the arguments it may name."""
+SHIPPED = Path(__file__).parent / "effects"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """What a parameter means, and the range, both ends included, in which it is physical."""
+
+    text: str
+    least: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """An effect's file, read: what it declares, and its text for the compiler."""
+
+    name: str
+    text: str
+    parameters: Mapping[str, Parameter]
+    memory: int
+    functions: Mapping[str, tuple[str, ...]]
+    """Its functions on the path and the arguments each names."""
+    path: Path
+    source: str
+
+    def values(self, written: Mapping[str, Any], source: str) -> tuple[float, ...]:
+        """Hold the parameters of an `[[effect]]` table against the declaration; return them in its order.
+
+        Raises:
+            InputError: unknown, missing, not a number, or out of its range.
+        """
+        for key in written:
+            if key not in self.parameters:
+                allowed = ", ".join(self.parameters) or "none"
+                raise InputError(source, f"{key}: unknown parameter of {self.name}; allowed: {allowed}")
+        return tuple(self._value(key, written, source) for key in self.parameters)
+
+    def _value(self, key: str, written: Mapping[str, Any], source: str) -> float:
+        parameter = self.parameters[key]
+        allowed = f"a number from {parameter.least:g} to {parameter.most:g} ({parameter.text})"
+        if key not in written:
+            raise InputError(source, f"{key}: is required by {self.name} and missing; it is {allowed}")
+        value = written[key]
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not parameter.least <= value <= parameter.most:
+            raise InputError(source, f"{key}: must be {allowed}, got {value!r}")
+        return float(value)
+
+
+def shipped_effects() -> list[str]:
+    """Return the names of the effects that come with the package."""
+    return sorted(path.stem for path in SHIPPED.glob("[!_]*.py"))
+
+
+def shipped_effect(name: str, source: str) -> Effect:
+    """Return an effect that comes with the package.
+
+    Raises:
+        InputError: there is none of that name; names those there are.
+    """
+    if name not in shipped_effects():
+        raise InputError(source, f"no effect named {name!r}; there are: {', '.join(shipped_effects())}")
+    return read_effect(SHIPPED / f"{name}.py")
+
+
+def read_effect(path: Path) -> Effect:
+    """Read an effect's file.
+
+    Raises:
+        InputError: it cannot be read, is not Python, or does not keep to what stands at the head of this module.
+    """
+    try:
+        source = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+    return _declared(path, source)
+
+
+@cache
+def _declared(path: Path, source: str) -> Effect:
+    namespace: dict[str, Any] = {"__name__": path.stem}
+    execute(source, path, namespace)
+    allowed = {**PLACES, **UPKEEP}
+    functions = {
+        name: tuple(inspect.signature(namespace[name]).parameters) for name in allowed if name in namespace
+    }
+    text = (namespace.get("__doc__") or "").partition("\n")[0]
+    memory = namespace.get("MEMORY", 0)
+    effect = Effect(path.stem, text, _parameters(path, namespace), memory, functions, path, source)
+    for name, arguments in functions.items():
+        for argument in arguments:
+            if argument not in allowed[name]:
+                raise InputError(
+                    str(path), f"{name}: unknown argument {argument}; allowed: {', '.join(allowed[name])}"
+                )
+    _check_places(effect)
+    return effect
+
+
+def execute(source: str, path: Path, namespace: dict[str, Any]) -> None:
+    """Run an effect's text in a namespace.
+
+    Raises:
+        InputError: it is not Python, or fails on the way.
+    """
+    try:
+        exec(compile(source, path, "exec", dont_inherit=True), namespace)
+    except SyntaxError as error:
+        raise InputError(str(path), f"line {error.lineno}: {error.msg}") from None
+    except Exception as error:
+        raise InputError(str(path), f"{type(error).__name__}: {error}") from None
+
+
+def _parameters(path: Path, namespace: Mapping[str, Any]) -> dict[str, Parameter]:
+    if "Parameters" not in namespace:
+        return {}
+    declared = {}
+    for name, hint in get_type_hints(namespace["Parameters"], namespace, include_extras=True).items():
+        parameter = get_args(hint)[-1] if get_origin(hint) is Annotated else None
+        if not isinstance(parameter, Parameter):
+            raise InputError(str(path), f"Parameters.{name}: must be Annotated[float, Parameter(...)]")
+        declared[name] = parameter
+    return declared
+
+
+def _check_places(effect: Effect) -> None:
+    places = [name for name in PLACES if name in effect.functions]
+    alone = {"pressure", "sensor"}.intersection(places)
+    if not places:
+        raise InputError(str(effect.path), f"defines none of the places {', '.join(PLACES)}")
+    if alone and len(places) > 1:
+        raise InputError(str(effect.path), f"{alone.pop()} must be an effect's only place, got {', '.join(places)}")
+    if any((name in effect.functions) != (effect.memory > 0) for name in UPKEEP):
+        raise InputError(str(effect.path), "start and advance belong with MEMORY = 1 or more: all three or none")

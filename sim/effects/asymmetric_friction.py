@@ -1,0 +1,22 @@
+"""Friction that differs between opening and closing.
+
+    F_c -> F_c (1 + e sigma),  F_s -> F_s (1 + e sigma)
+
+e asymmetry, dimensionless; sigma = +1 opening, -1 closing: the mean of both directions stays the valve file's.
+"""
+
+from typing import Annotated, NamedTuple
+
+from sim.effect import Parameter
+
+
+class Parameters(NamedTuple):
+    """e."""
+
+    asymmetry: Annotated[float, Parameter("half the difference over the mean, > 0: opening is harder", -0.9, 0.9)]
+
+
+def friction(F_c: float, F_s: float, direction: float, q: Parameters) -> tuple[float, float]:
+    """Scale both levels."""
+    scale = 1.0 + q.asymmetry * direction
+    return F_c * scale, F_s * scale

@@ -1,0 +1,33 @@
+"""Backlash of the feedback linkage between stem and position sensor.
+
+    y follows the stem only once the play is taken up: x - w/2 <= y <= x + w/2, else y stays
+
+w width of the play, m; x position that enters, y position that leaves.
+"""
+
+from typing import Annotated, NamedTuple
+
+from sim.effect import Memory, Parameter
+
+MEMORY = 1
+
+
+class Parameters(NamedTuple):
+    """w."""
+
+    width_m: Annotated[float, Parameter("width of the play", 0.0, 0.1)]
+
+
+def start(signal: float, z: Memory) -> None:
+    """In the middle of the play."""
+    z[0] = signal
+
+
+def sensor(z: Memory) -> float:
+    """Return y."""
+    return float(z[0])
+
+
+def advance(after: float, q: Parameters, z: Memory) -> None:
+    """Take the linkage along."""
+    z[0] = min(max(z[0], after - 0.5 * q.width_m), after + 0.5 * q.width_m)

@@ -1,0 +1,413 @@
+"""Karnopp's valve with Stribeck friction as a hybrid automaton, and its integration over one step.
+
+    F_e = A p - k_s x + (extra forces)                                        external force, N
+    F_f(v) = F_c + (F_s - F_c) exp(-(v / v_s)^2)                              friction while it slides, N
+    dz = deadzone_ratio v_s                                                   Karnopp's band, m/s
+
+    STUCK     v = 0                                  until |F_e| > F_s                  -> BREAKING
+    BREAKING  m v' = F_e - F_s sigma,  x' = v        until sigma v = dz                 -> SLIP
+              (sigma = sign F_e: on the eve of       until sigma F_e <= F_s             -> STUCK, v := 0
+              motion, inside the band)
+    SLIP      m v' = F_e - F_v v - F_f(v) sigma,     until sigma v = dz, and then
+              x' = v  (sigma = sign v)               |F_e| <= F_s                       -> STUCK, v := 0
+                                                     sigma F_e < -F_s                   -> BREAKING the other way
+                                                     sigma F_e > F_s: viscous friction outweighs the Stribeck
+                                                     drop, both laws point at the border -> it creeps at v = sigma dz
+
+x stem position, m; v velocity, m/s; p actuator pressure, Pa; t time, s; the command u, Pa, is held over a period.
+A period is cut into equal steps h. Over a step the pressure goes straight from its start to its end value; inside it
+every change of mode is bisected to h / 2^30, and the motion is integrated by Bogacki and Shampine's pair of orders
+3 and 2, the sub-step halved until the pair agrees on v to TOLERANCE (|v| + v_s). The Stribeck slope near v_s grows
+deviations at about (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the sub-steps are some 0.1 us; away from it
+one sub-step is one step.
+
+The file is plain Python and runs as it stands: the bare valve. `sim.compiled` compiles this text after putting the
+effects of a valve file into the places at its end, which stand empty here. All that is compiled must stand in
+this file or in an effect's own: a kernel is cached under the digest of these texts.
+"""
+
+# ruff: noqa: ARG001 -- an empty place takes what a full one needs.
+from math import ceil, exp
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Vector = npt.NDArray[np.float64]
+
+STUCK = 0
+BREAKING = 1
+SLIP = 2
+
+TOLERANCE = 1e-6
+"""Of one sub-step on the velocity, relative to |v| + v_s."""
+SHORTEST = 2.0**-20
+"""Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
+BISECTIONS = 30
+NINTH = 1.0 / 9.0
+NEGLIGIBLE = 40.0
+"""(v / v_s)^2 beyond which exp(-(v / v_s)^2) < 5e-18 is lost in the rounding of F_c."""
+DIFFERENCE_M = 1e-7
+"""Half-width of the central difference that gives the stiffness -dF_e/dx."""
+
+MEMORY = 7
+"""Where the effects' memories begin in the state vector, after the Condition."""
+BASE_PARAMETERS = 8
+"""Entries of the parameter vector that are the base model's; the effects' follow."""
+
+
+class Karnopp(NamedTuple):
+    """The base model's constants."""
+
+    per_m: float
+    A: float
+    k_s: float
+    F_v: float
+    F_c: float
+    F_s: float
+    v_s: float
+    dz: float
+
+
+class Stem(NamedTuple):
+    """Time, stem position and velocity, actuator pressure."""
+
+    t: float
+    x: float
+    v: float
+    p: float
+
+
+class Drive(NamedTuple):
+    """The pressure over one step: p + slope tau at t + tau."""
+
+    t: float
+    p: float
+    slope: float
+
+
+class Condition(NamedTuple):
+    """The valve's state without the effects' memories: time, stem, pressure, mode, indicated position."""
+
+    t: float
+    x: float
+    v: float
+    p: float
+    mode: int
+    sigma: float
+    indicated: float
+
+
+def karnopp(theta: Vector) -> Karnopp:
+    """Read the base model from the parameter vector: m, A, k_s, F_v, F_c, F_s, v_s, deadzone_ratio first."""
+    return Karnopp(
+        1.0 / theta[0], theta[1], theta[2], theta[3], theta[4], theta[5], theta[6], theta[7] * theta[6]
+    )
+
+
+def stem_at(drive: Drive, tau: float, x: float, v: float) -> Stem:
+    """Return the stem at (x, v), tau into the step."""
+    return Stem(drive.t + tau, x, v, drive.p + drive.slope * tau)
+
+
+def external_force(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
+    """F_e, N."""
+    return valve.A * stem.p - valve.k_s * stem.x + force(stem, q, z)
+
+
+def excess(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
+    """|F_e| - F_s, N: positive when the stuck stem breaks away."""
+    F_e = external_force(valve, stem, q, z)
+    direction = 1.0 if F_e > 0.0 else -1.0
+    _, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
+    return direction * F_e - F_s
+
+
+def acceleration(valve: Karnopp, mode: int, sigma: float, stem: Stem, q: Any, z: Any) -> float:
+    """v', m/s^2, by the law of the mode."""
+    F_e = external_force(valve, stem, q, z)
+    F_c, F_s = friction(valve.F_c, valve.F_s, sigma, stem, q, z)
+    if mode == BREAKING:
+        return (F_e - F_s * sigma) * valve.per_m
+    w = stem.v / valve.v_s
+    F_f = F_c
+    if w * w < NEGLIGIBLE:
+        F_f = F_c + (F_s - F_c) * exp(-w * w)
+    return (F_e - F_f * sigma - valve.F_v * stem.v) * valve.per_m
+
+
+def margin(valve: Karnopp, mode: int, sigma: float, stem: Stem, q: Any, z: Any) -> float:
+    """How far the moving mode is from its end; negative when it is over."""
+    if mode == SLIP:
+        return sigma * stem.v - valve.dz
+    F_e = external_force(valve, stem, q, z)
+    _, F_s = friction(valve.F_c, valve.F_s, sigma, stem, q, z)
+    return min(valve.dz - sigma * stem.v, sigma * F_e - F_s)
+
+
+def bogacki_shampine(
+    valve: Karnopp,
+    mode: int,
+    sigma: float,
+    drive: Drive,
+    tau: float,
+    s: float,
+    x: float,
+    v: float,
+    a: float,
+    q: Any,
+    z: Any,
+) -> tuple[float, float, float, float]:
+    """Take one sub-step s from (x, v) with v' = a; return x, v, v' at its end and the pair's difference in v."""
+    v2 = v + 0.5 * s * a
+    a2 = acceleration(valve, mode, sigma, stem_at(drive, tau + 0.5 * s, x + 0.5 * s * v, v2), q, z)
+    v3 = v + 0.75 * s * a2
+    a3 = acceleration(valve, mode, sigma, stem_at(drive, tau + 0.75 * s, x + 0.75 * s * v2, v3), q, z)
+    x1 = x + s * NINTH * (2.0 * v + 3.0 * v2 + 4.0 * v3)
+    v1 = v + s * NINTH * (2.0 * a + 3.0 * a2 + 4.0 * a3)
+    a1 = acceleration(valve, mode, sigma, stem_at(drive, tau + s, x1, v1), q, z)
+    return x1, v1, a1, s * 0.125 * NINTH * abs(5.0 * a - 6.0 * a2 - 8.0 * a3 + 9.0 * a1)
+
+
+def wait(
+    valve: Karnopp, drive: Drive, tau: float, h: float, x: float, q: Any, z: Any
+) -> tuple[float, int, float]:
+    """Hold the stuck stem until it breaks away or the step ends; return tau, mode, sigma."""
+    if excess(valve, stem_at(drive, h, x, 0.0), q, z) <= 0.0:
+        return h, STUCK, 0.0
+    late = h
+    if excess(valve, stem_at(drive, tau, x, 0.0), q, z) > 0.0:
+        late = tau
+    else:
+        early = tau
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (early + late)
+            if excess(valve, stem_at(drive, middle, x, 0.0), q, z) > 0.0:
+                late = middle
+            else:
+                early = middle
+    sigma = 1.0 if external_force(valve, stem_at(drive, late, x, 0.0), q, z) > 0.0 else -1.0
+    return late, BREAKING, sigma
+
+
+def move(
+    valve: Karnopp,
+    mode: int,
+    sigma: float,
+    drive: Drive,
+    tau: float,
+    h: float,
+    x: float,
+    v: float,
+    q: Any,
+    z: Any,
+) -> tuple[float, float, float, bool]:
+    """Integrate until the moving mode is over or the step ends; return tau, x, v and whether the mode is over."""
+    a = acceleration(valve, mode, sigma, stem_at(drive, tau, x, v), q, z)
+    s = h - tau
+    while tau < h:
+        x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
+        tolerance = TOLERANCE * (abs(v1) + valve.v_s)
+        if error > tolerance and s > SHORTEST * h:
+            s *= 0.5
+            continue
+        if margin(valve, mode, sigma, stem_at(drive, tau + s, x1, v1), q, z) < 0.0:
+            s, x1, v1 = end_of_mode(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
+            return min(tau + s, h), x1, v1, True
+        tau = h if s >= h - tau else tau + s
+        x, v, a = x1, v1, a1
+        if error < 0.1 * tolerance:
+            s *= 2.0
+        s = min(s, h - tau)
+    return h, x, v, False
+
+
+def end_of_mode(
+    valve: Karnopp,
+    mode: int,
+    sigma: float,
+    drive: Drive,
+    tau: float,
+    s: float,
+    x: float,
+    v: float,
+    a: float,
+    q: Any,
+    z: Any,
+) -> tuple[float, float, float]:
+    """Bisect the sub-step after which the mode is just over; return it with x and v there."""
+    early, late = 0.0, s
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (early + late)
+        x1, v1, _, _ = bogacki_shampine(valve, mode, sigma, drive, tau, middle, x, v, a, q, z)
+        if margin(valve, mode, sigma, stem_at(drive, tau + middle, x1, v1), q, z) < 0.0:
+            late = middle
+        else:
+            early = middle
+    x1, v1, _, _ = bogacki_shampine(valve, mode, sigma, drive, tau, late, x, v, a, q, z)
+    return late, x1, v1
+
+
+def after_slip(valve: Karnopp, sigma: float, stem: Stem, q: Any, z: Any) -> tuple[int, float, float]:
+    """Return mode, sigma and v of a sliding stem that has slowed down to the band."""
+    if excess(valve, stem, q, z) <= 0.0:
+        return STUCK, 0.0, 0.0
+    if sigma * external_force(valve, stem, q, z) < 0.0:
+        return BREAKING, -sigma, stem.v
+    return SLIP, sigma, sigma * valve.dz
+
+
+def step(
+    valve: Karnopp,
+    drive: Drive,
+    h: float,
+    x: float,
+    v: float,
+    mode: int,
+    sigma: float,
+    q: Any,
+    z: Any,
+) -> tuple[float, float, int, float]:
+    """Carry the stem over one step; return x, v, mode, sigma at its end."""
+    tau = 0.0
+    while tau < h:
+        if mode == STUCK:
+            tau, mode, sigma = wait(valve, drive, tau, h, x, q, z)
+            continue
+        tau, x, v, over = move(valve, mode, sigma, drive, tau, h, x, v, q, z)
+        if over and mode == SLIP:
+            mode, sigma, v = after_slip(valve, sigma, stem_at(drive, tau, x, v), q, z)
+            if mode == SLIP:
+                x += v * (h - tau)
+                tau = h
+        elif over and sigma * v >= valve.dz:
+            mode = SLIP
+        elif over:
+            mode, sigma, v = STUCK, 0.0, 0.0
+    return x, v, mode, sigma
+
+
+def settle(valve: Karnopp, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Let the motion place have its say at the end of a step; return x, v."""
+    ahead = external_force(valve, Stem(stem.t, stem.x + DIFFERENCE_M, stem.v, stem.p), q, z)
+    behind = external_force(valve, Stem(stem.t, stem.x - DIFFERENCE_M, stem.v, stem.p), q, z)
+    stiffness = (behind - ahead) / (2.0 * DIFFERENCE_M)
+    return motion(external_force(valve, stem, q, z), stiffness, stem, q, z)
+
+
+def rest(theta: Vector, state: Vector, time: float, position: float, command: float) -> None:
+    """Set the state: at rest at a position, the command held for so long that the pressure path has settled."""
+    q = parameters(theta)
+    z = memories(state)
+    p = start_pressure(command, Stem(time, position, 0.0, command), q, z)
+    indicated = start_stem(Stem(time, position, 0.0, p), q, z)
+    write(state, Condition(time, position, 0.0, p, STUCK, 0.0, indicated))
+
+
+def carry(
+    valve: Karnopp, now: Condition, command: float, duration: float, longest_step: float, q: Any, z: Any
+) -> Condition:
+    """Carry the valve over a duration (s) with the command (Pa) held, in equal steps of at most longest_step (s)."""
+    t, x, v, p, mode, sigma, indicated = now
+    n = 1 if duration <= longest_step else ceil(duration / longest_step - 1e-6)
+    h = duration / n
+    for i in range(n):
+        t0, x0 = t + i * h, x
+        p0, p = pressure(command, h, Stem(t0, x, v, p), q, z)
+        x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / h), h, x, v, mode, sigma, q, z)
+        x, v = settle(valve, Stem(t0 + h, x, v, p), q, z)
+        if v == 0.0:
+            mode = STUCK
+        stem = Stem(t0 + h, x, v, p)
+        remember(x0, h, stem, q, z)
+        indicated = sensor(x0, h, stem, q, z)
+    return Condition(t + duration, x, v, p, mode, sigma, indicated)
+
+
+def advance(theta: Vector, state: Vector, command: float, duration: float, longest_step: float) -> None:
+    """Carry the state over one period."""
+    now = carry(
+        karnopp(theta), read(state), command, duration, longest_step, parameters(theta), memories(state)
+    )
+    write(state, now)
+
+
+def respond(
+    theta: Vector, state: Vector, commands: Vector, periods: Vector, longest_step: float, path: Vector
+) -> None:
+    """Hold each command for its period in turn; write t, p, x, v, indicated into the rows of path, the start first."""
+    valve, now, q, z = karnopp(theta), read(state), parameters(theta), memories(state)
+    for i in range(len(commands) + 1):
+        if i > 0:
+            now = carry(valve, now, commands[i - 1], periods[i - 1], longest_step, q, z)
+        path[0, i] = now.t
+        path[1, i] = now.p
+        path[2, i] = now.x
+        path[3, i] = now.v
+        path[4, i] = now.indicated
+    write(state, now)
+
+
+def read(state: Vector) -> Condition:
+    """Read the state vector."""
+    return Condition(state[0], state[1], state[2], state[3], int(state[4]), state[5], state[6])
+
+
+def write(state: Vector, now: Condition) -> None:
+    """Write the state vector; the memories are in it already."""
+    state[0], state[1], state[2], state[3], state[4], state[5], state[6] = now
+
+
+# The places, empty. q holds the parameters, z the memories of the effects, one entry each.
+
+
+def parameters(theta: Vector) -> Any:
+    """Read the effects' parameters from the parameter vector."""
+    return ()
+
+
+def memories(state: Vector) -> Any:
+    """Return the effects' memories, views into the state vector."""
+    return ()
+
+
+def start_pressure(u: float, stem: Stem, q: Any, z: Any) -> float:
+    """Set the memories of the pressure path for a long held command; return the actuator pressure."""
+    return u
+
+
+def start_stem(stem: Stem, q: Any, z: Any) -> float:
+    """Set the memories at the stem and of the sensor for a stem at rest; return the indicated position."""
+    return stem.x
+
+
+def pressure(u: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Return the actuator pressure at the start and at the end of a step with the command held."""
+    return u, u
+
+
+def force(stem: Stem, q: Any, z: Any) -> float:
+    """Extra force on the stem, N."""
+    return 0.0
+
+
+def friction(
+    F_c: float, F_s: float, direction: float, stem: Stem, q: Any, z: Any
+) -> tuple[float, float]:
+    """Return the Coulomb and static levels, N, that hold here and in this direction of (impending) motion."""
+    return F_c, F_s
+
+
+def motion(F_e: float, stiffness: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Return where the stem is, and how fast, at the end of a step."""
+    return stem.x, stem.v
+
+
+def remember(x0: float, h: float, stem: Stem, q: Any, z: Any) -> None:
+    """Carry the memories of force, friction and motion over a step from x0 to the stem's position."""
+    return
+
+
+def sensor(x0: float, h: float, stem: Stem, q: Any, z: Any) -> float:
+    """Return the indicated position at the end of a step from x0 to the stem's position."""
+    return stem.x

@@ -1,0 +1,109 @@
+"""The response of a valve to a series of commands, each held over its period: one compiled call.
+
+Row 0 is the start; row i > 0 is the END of the i-th period. `command_pa` of a row is the command held FROM that time on
+(sampled, then commanded), so the last row repeats the last command; `pressure_pa` is the actuator pressure that has been
+acting up to that time, before the new command.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.composition import Composition
+from sim.karnopp import Vector
+
+STEP_S = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """Arrays of n + 1 rows for n periods; see the head of this module."""
+
+    time_s: Vector
+    command_pa: Vector
+    pressure_pa: Vector
+    position_m: Vector
+    velocity_m_per_s: Vector
+    indicated_m: Vector
+
+
+def respond(
+    composition: Composition,
+    theta: npt.ArrayLike,
+    command_pa: npt.ArrayLike,
+    period_s: npt.ArrayLike,
+    *,
+    position_m: float = 0.0,
+    pressure_pa: float = 0.0,
+    step_s: float = STEP_S,
+) -> Response:
+    """Simulate from rest at a position with a pressure long held; the way to try many parameter vectors.
+
+    Args:
+        composition: the valve.
+        theta: its parameter vector, `composition.names`; not checked for physics.
+        command_pa: n commands, Pa.
+        period_s: one period for all, or n periods, s.
+        position_m: where it starts at rest.
+        pressure_pa: the command held before.
+        step_s: longest step of the integration.
+
+    Raises:
+        ValueError: a series of another length, or a number that is not finite or not allowed.
+    """
+    vector = np.array(theta, dtype=np.float64)
+    if vector.shape != composition.theta.shape:
+        raise ValueError(f"theta must have the {composition.theta.size} entries {', '.join(composition.names)}")
+    state = at_rest(composition, vector, 0.0, position_m, pressure_pa)
+    return follow(composition, vector, state, command_pa, period_s, step_s)
+
+
+def at_rest(composition: Composition, theta: Vector, time_s: float, position_m: float, pressure_pa: float) -> Vector:
+    """Return the state at rest at a position, the command pressure_pa long held.
+
+    Raises:
+        ValueError: a number that is not finite.
+    """
+    if not np.isfinite([time_s, position_m, pressure_pa]).all():
+        raise ValueError(f"position and pressure must be finite, got {position_m} m and {pressure_pa} Pa")
+    state = np.zeros(composition.kernel.state_size)
+    composition.kernel.rest(theta, state, time_s, position_m, pressure_pa)
+    return state
+
+
+def follow(
+    composition: Composition,
+    theta: Vector,
+    state: Vector,
+    command_pa: npt.ArrayLike,
+    period_s: npt.ArrayLike,
+    step_s: float,
+) -> Response:
+    """Carry the state, in place, through the commands.
+
+    Raises:
+        ValueError: as `respond`.
+    """
+    commands = np.array(command_pa, dtype=np.float64, ndmin=1)
+    if commands.ndim != 1 or commands.size == 0 or not np.isfinite(commands).all():
+        raise ValueError("command_pa must be a series of at least one finite number")
+    periods = np.array(np.broadcast_to(np.asarray(period_s, dtype=np.float64), commands.shape))
+    if not (np.isfinite(periods).all() and (periods > 0.0).all()):
+        raise ValueError("period_s must be finite and greater than 0")
+    path = np.empty((5, commands.size + 1))
+    composition.kernel.respond(theta, state, commands, periods, checked_step(step_s), path)
+    held = np.append(commands, commands[-1])
+    time, pressure, position, velocity, indicated = path
+    return Response(time, held, pressure, position, velocity, indicated)
+
+
+def checked_step(step_s: float) -> float:
+    """Return a step of the integration.
+
+    Raises:
+        ValueError: it is not a positive number.
+    """
+    if not (np.isfinite(step_s) and step_s > 0.0):
+        raise ValueError(f"step_s must be finite and greater than 0, got {step_s}")
+    return float(step_s)

@@ -1,0 +1,95 @@
+"""A control valve in virtual time: hold a command for a period, read where the stem is."""
+
+from math import isfinite
+from typing import Self
+
+import numpy.typing as npt
+
+from config.valve import ValveFile
+from sim.composition import Composition
+from sim.karnopp import read
+from sim.open_loop import STEP_S, Response, at_rest, checked_step, follow
+
+
+class Valve:
+    """A valve file's valve and its state. It starts at time 0 at rest at position 0 with no pressure."""
+
+    def __init__(self, composition: Composition, *, step_s: float = STEP_S) -> None:
+        self._composition = composition
+        self._theta = composition.theta.copy()
+        self._step_s = checked_step(step_s)
+        self._advance = composition.kernel.advance
+        self._state = at_rest(composition, self._theta, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_file(cls, file: ValveFile, *, step_s: float = STEP_S, source: str = "valve file") -> Self:
+        """Make the valve of a valve file; `source` is what errors call it, its path if it has one.
+
+        Raises:
+            InputError: an unknown effect, or a parameter unknown, missing or out of its range.
+        """
+        return cls(Composition.from_file(file, source), step_s=step_s)
+
+    def rest_at(self, position_m: float, pressure_pa: float | None = None) -> None:
+        """Put the stem to rest at a position, a pressure long held; by default the one that balances the spring.
+
+        Raises:
+            ValueError: a number that is not finite.
+        """
+        valve = self._composition.valve
+        balance = valve.spring_n_per_m * position_m / valve.diaphragm_area_m2
+        held = balance if pressure_pa is None else pressure_pa
+        self._state = at_rest(self._composition, self._theta, self.time_s, position_m, held)
+
+    def advance(self, command_pa: float, duration_s: float) -> None:
+        """Hold a command (Pa) for a duration (s), cut into equal steps of at most step_s.
+
+        Raises:
+            ValueError: a command that is not finite, a duration that is not positive.
+        """
+        if not (isfinite(command_pa) and isfinite(duration_s) and duration_s > 0.0):
+            raise ValueError(f"cannot hold {command_pa} Pa for {duration_s} s")
+        self._advance(self._theta, self._state, command_pa, duration_s, self._step_s)
+
+    def run(self, command_pa: npt.ArrayLike, period_s: npt.ArrayLike) -> Response:
+        """Hold n commands (Pa) in turn, each for its period (s, one for all or n); as n calls of `advance`.
+
+        Returns arrays of n + 1 rows: row 0 is the present, the others the end of each period (see `sim.open_loop`).
+
+        Raises:
+            ValueError: a series of another length, or a number that is not finite or not allowed.
+        """
+        return follow(self._composition, self._theta, self._state, command_pa, period_s, self._step_s)
+
+    def change(self, **parameters: float) -> None:
+        """Change parameters while it runs, by the names of the valve file; an effect's as `effect.parameter`.
+
+        Raises:
+            InputError: an unknown name or a value that is not physical; nothing is changed then.
+        """
+        self._theta = self._composition.changed(self._theta, parameters)
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start."""
+        return float(read(self._state).t)
+
+    @property
+    def position_m(self) -> float:
+        """True stem position."""
+        return float(read(self._state).x)
+
+    @property
+    def velocity_m_per_s(self) -> float:
+        """True stem velocity."""
+        return float(read(self._state).v)
+
+    @property
+    def pressure_pa(self) -> float:
+        """Actuator pressure, behind the pressure path."""
+        return float(read(self._state).p)
+
+    @property
+    def indicated_m(self) -> float:
+        """Position as the sensor indicates it, without noise."""
+        return float(read(self._state).indicated)

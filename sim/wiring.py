@@ -1,0 +1,99 @@
+"""Writes the functions that fill the empty places of `karnopp.py` with the effects of a valve file.
+
+Effect i's functions stand in the kernel as `force_i`, `advance_i`, ...; q[i] is its parameters, z[i] its memory.
+A signal that passes through an element is known at the start and at the end of a step: the element shows its output
+for the old memory, carries its memory over the step, and shows its output for the new one.
+"""
+
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+
+from sim.effect import PLACES, Effect
+from sim.karnopp import BASE_PARAMETERS, MEMORY
+
+STEM = {name: f"stem.{name}" for name in ("t", "x", "v", "p")}
+LEVELS = {name: name for name in ("F_c", "F_s", "direction")}
+MOVED = {name: name for name in ("F_e", "stiffness", "x", "v")}
+
+
+def wiring(effects: Sequence[Effect]) -> str:
+    """Return the text of the places, filled."""
+    at = {place: [i for i, each in enumerate(effects) if place in each.functions] for place in PLACES}
+    remembering = {i for i, each in enumerate(effects) if each.memory}
+    at_stem = sorted({*at["force"], *at["friction"], *at["motion"]} & remembering)
+
+    def call(function: str, i: int, **given: str) -> str:
+        known = {**STEM, "q": f"q[{i}]", "z": f"z[{i}]", **given}
+        return f"{function}_{i}({', '.join(known[name] for name in effects[i].functions[function])})"
+
+    def started(place: str, signal: str) -> list[str]:
+        lines = []
+        for i in at[place]:
+            lines += [call("start", i, signal=signal)] if i in remembering else []
+            lines += [f"{signal} = {call(place, i, **{signal: signal})}"]
+        return lines
+
+    def passed(place: str, signal: str) -> list[str]:
+        lines = []
+        for i in at[place]:
+            lines += [f"shown = {call(place, i, **{signal: 'start'})}"]
+            lines += [call("advance", i, before="start", after="end", h="h")] if i in remembering else []
+            lines += [f"end = {call(place, i, **{signal: 'end', 't': 'stem.t + h'})}", "start = shown"]
+        return lines
+
+    return "\n".join(
+        [
+            _function("parameters(theta)", [], f"({_parameters(effects)})"),
+            _function("memories(state)", [], f"({_memories(effects)})"),
+            _function("start_pressure(u, stem, q, z)", started("pressure", "u"), "u"),
+            _function(
+                "start_stem(stem, q, z)",
+                ["y = stem.x", *(call("start", i, signal="y") for i in at_stem), *started("sensor", "y")],
+                "y",
+            ),
+            _function(
+                "pressure(u, h, stem, q, z)", ["start, end = u, u", *passed("pressure", "u")], "start, end"
+            ),
+            _function("force(stem, q, z)", [], " + ".join(["0.0", *(call("force", i) for i in at["force"])])),
+            _function(
+                "friction(F_c, F_s, direction, stem, q, z)",
+                (f"F_c, F_s = {call('friction', i, **LEVELS)}" for i in at["friction"]),
+                "F_c, F_s",
+            ),
+            _function(
+                "motion(F_e, stiffness, stem, q, z)",
+                ["x, v = stem.x, stem.v", *(f"x, v = {call('motion', i, **MOVED)}" for i in at["motion"])],
+                "x, v",
+            ),
+            _function(
+                "remember(x0, h, stem, q, z)",
+                (call("advance", i, before="x0", after="stem.x", h="h") for i in at_stem),
+                "None",
+            ),
+            _function("sensor(x0, h, stem, q, z)", ["start, end = x0, stem.x", *passed("sensor", "y")], "end"),
+        ]
+    )
+
+
+def _function(head: str, body: Iterable[str], result: str) -> str:
+    return "\n    ".join([f"\ndef {head}:", *body, f"return {result}"])
+
+
+def _parameters(effects: Sequence[Effect]) -> str:
+    """Return a tuple of each effect's parameters, read from the vector in turn."""
+    ends = accumulate((len(each.parameters) for each in effects), initial=BASE_PARAMETERS)
+    tuples = [
+        f"Parameters_{i}({', '.join(f'theta[{k}]' for k in range(first, first + len(each.parameters)))})"
+        if each.parameters
+        else "()"
+        for i, (each, first) in enumerate(zip(effects, ends, strict=False))
+    ]
+    return "".join(f"{each}, " for each in tuples)
+
+
+def _memories(effects: Sequence[Effect]) -> str:
+    """Return a tuple of each effect's memory, a view into the state vector."""
+    ends = accumulate((each.memory for each in effects), initial=MEMORY)
+    return "".join(
+        f"state[{first}:{first + each.memory}], " for each, first in zip(effects, ends, strict=False)
+    )

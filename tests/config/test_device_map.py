@@ -1,0 +1,89 @@
+"""The map of a device: where the simulated one keeps its quantities, and which maps of real ones are refused."""
+
+from typing import Any
+
+import pytest
+
+from config.device import QUANTITIES, SIMULATED_MAP, WRITABLE, ModbusMap, ModbusTcpDevice, Place
+from config.errors import InputError
+from config.loading import validated
+
+
+def refusal(tables: dict[str, Any]) -> str:
+    with pytest.raises(InputError) as caught:
+        validated(ModbusTcpDevice, tables, "daemon.toml")
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_the_simulated_map_holds_every_quantity_one_after_another() -> None:
+    places = SIMULATED_MAP.places
+    assert list(places) == [quantity.name for quantity in QUANTITIES]
+    address = 0
+    for quantity in QUANTITIES:
+        assert (places[quantity.name].address, places[quantity.name].type) == (address, quantity.type)
+        address = places[quantity.name].end
+    assert not set(SIMULATED_MAP.sampled) & WRITABLE
+
+
+@pytest.mark.parametrize(
+    ("place", "raw", "value"),
+    [
+        (Place(address=0, type="int16", scale=1e-5), 1234, 0.01234),
+        (Place(address=0, type="uint16", scale=10.0, offset=-500.0), 60, 100.0),
+        (Place(address=0), 0.25, 0.25),
+    ],
+)
+def test_value_is_scale_times_raw_plus_offset(place: Place, raw: float, value: float) -> None:
+    assert place.value(raw) == pytest.approx(value)
+    assert place.raw(value) == raw
+
+
+def test_raw_numbers_are_rounded_to_nearest_and_finite() -> None:
+    assert Place(address=0, type="int16", scale=0.1).raw(0.26) == 3
+    with pytest.raises(ValueError, match="finite"):
+        Place(address=0).raw(float("nan"))
+
+
+FLOAT = {"address": 0}
+
+
+@pytest.mark.parametrize(
+    ("registers", "said"),
+    [
+        ({"position_m": FLOAT}, "map.command_pa: is required"),
+        ({"position_m": FLOAT, "command_pa": {"address": 1}}, "position_m and command_pa share register 1"),
+        ({"position_m": {"address": 65535}, "command_pa": {"address": 4}}, "past register 65535"),
+        ({"position_m": FLOAT, "command_pa": {"address": 4, "table": "input"}}, "command_pa is written"),
+        (
+            {"position_m": FLOAT, "command_pa": {"address": 4}, "pressure_pa": {"address": 4, "table": "input"}},
+            "must lie in one table",
+        ),
+        (
+            {"position_m": FLOAT, "command_pa": {"address": 4}, "pressure_pa": {"address": 124}},
+            "within 125 registers, it spans 126",
+        ),
+        ({"position_m": {"address": 0, "scale": 0}, "command_pa": {"address": 4}}, "scale must not be 0"),
+    ],
+)
+def test_a_map_that_cannot_work_is_refused(registers: dict[str, Any], said: str) -> None:
+    assert said in refusal({"map": registers})
+
+
+def test_a_timeout_that_the_registers_would_round_to_never_is_refused() -> None:
+    registers = {
+        "position_m": FLOAT,
+        "command_pa": {"address": 2},
+        "communication_timeout_s": {"address": 4, "type": "uint16"},
+    }
+    assert "0.4 s becomes 0 s" in refusal({"map": registers, "communication_timeout_s": 0.4})
+    assert ModbusTcpDevice.model_validate({"map": registers, "communication_timeout_s": 1.0})
+
+
+def test_a_host_that_is_none_is_refused() -> None:
+    assert "host" in refusal({"host": "not a host"})
+
+
+def test_a_map_without_the_rest_is_enough() -> None:
+    small = ModbusMap(position_m=Place(address=10, table="input"), command_pa=Place(address=10))
+    assert list(small.sampled) == ["position_m"]

@@ -1,0 +1,95 @@
+"""Files that people write: each fault is one line that names file, key, value and what is allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from config.daemon import load_daemon
+from config.errors import InputError
+from config.valve import load_valve, shipped_valve
+
+SEED = """[valve]
+name = "v"
+mass_kg = 1.0
+diaphragm_area_m2 = 0.06
+spring_n_per_m = 5e4
+viscous_ns_per_m = 600.0
+coulomb_n = 1400.0
+static_n = 1700.0
+stribeck_velocity_m_per_s = 2.5e-4
+deadzone_ratio = 0.6
+stroke_m = 0.1
+"""
+
+
+def problem(path: Path, text: str) -> str:
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_valve(path)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(str(path))
+    return line.removeprefix(f"{path}: ")
+
+
+def test_the_seed_valve_has_the_corrected_static_friction() -> None:
+    valve = load_valve(shipped_valve("seed")).valve
+    assert valve.static_n == pytest.approx(384 * 4.448222, rel=1e-4)
+    assert valve.deadzone_m_per_s == pytest.approx(0.6 * 2.54e-4)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "said"),
+    [
+        ("mass_lb = 3.0", "mass_kg = 1.0", "valve.mass_lb: unknown key; allowed here: coulomb_n, deadzone_ratio,"),
+        ("mass_kg = -1.0", "mass_kg = 1.0", "valve.mass_kg: Input should be greater than 0, got -1.0"),
+        ('mass_kg = "heavy"', "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number"),
+        ("mass_kg = nan", "mass_kg = 1.0", "valve.mass_kg: Input should be a finite number, got nan"),
+        ("", "mass_kg = 1.0", "valve.mass_kg: is required and missing"),
+        ("static_n = 1000.0", "static_n = 1700.0", "valve: static_n must be at least coulomb_n (1400 N), it is 1000 N"),
+    ],
+)
+def test_a_wrong_key_or_value_is_named(tmp_path: Path, wrong: str, right: str, said: str) -> None:
+    assert problem(tmp_path / "valve.toml", SEED.replace(right, wrong)).startswith(said)
+
+
+def test_what_is_no_toml_names_the_line(tmp_path: Path) -> None:
+    assert "is not valid TOML" in problem(tmp_path / "valve.toml", SEED.replace("= 1.0", "1.0"))
+    assert "line 3" in problem(tmp_path / "valve.toml", SEED.replace("= 1.0", "1.0"))
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.toml: cannot be read: No such file"):
+        load_valve(tmp_path / "none.toml")
+
+
+def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> None:
+    path = tmp_path / "valve.toml"
+    path.write_text(SEED + '\n[[effect]]\nname = "ip_lag"\ntime_constant_s = 0.05\n')
+    (effect,) = load_valve(path).effect
+    assert (effect.name, effect.parameters) == ("ip_lag", {"time_constant_s": 0.05})
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[valve]\nstroke_mm = 100\n", "valve.stroke_mm: unknown key; allowed here: breakaway_pa, name, stroke_m"),
+        ("[valve]\nstroke_m = 0.1\n[cycle]\nperiod_s = 1\npace = 'fast'\n", "cycle.pace: Input should be 'real_time'"),
+        ("[valve]\nstroke_m = 0.1\n[pressure]\nminimum_pa = 5e5\n", "pressure: minimum_pa must be below maximum_pa"),
+        ("[valve]\nstroke_m = 0.1\n[device.map]\nposition_m = {address = 0}\n", "device.map.command_pa: is required"),
+        (
+            "[valve]\nstroke_m = 0.1\n[safety]\naction = 'open'\n",
+            "safety.action: Input should be 'hold', 'vent' or 'fill'",
+        ),
+        (
+            "[valve]\nstroke_m = 0.1\n[identification]\nwindow_s = 0.1\n",
+            "identification: minimum_window_s must be at most window_s (0.1 s)",
+        ),
+    ],
+)
+def test_the_daemon_file_is_held_to_its_schema(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "daemon.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_daemon(path)
+    assert str(caught.value).removeprefix(f"{path}: ").startswith(said)

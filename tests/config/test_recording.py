@@ -1,0 +1,56 @@
+"""The recording format: what is written comes back bit by bit, and faults are named by line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.recording import Recording, read_recording, write_recording
+
+HEADER = "time_s,command_pa,position_m\n"
+
+
+def problem(path: Path, text: str) -> str:
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_recording(path)
+    return str(caught.value).removeprefix(f"{path}: ")
+
+
+def test_every_bit_survives(tmp_path: Path) -> None:
+    random = np.random.default_rng(1)
+    columns = {name: random.normal(size=50) for name in ("command_pa", "position_m", "pressure_pa")}
+    written = Recording({"time_s": np.cumsum(random.uniform(0.1, 1, 50)), **columns}, {"valve": "v"})
+    write_recording(tmp_path / "r.csv", written)
+    read = read_recording(tmp_path / "r.csv")
+    assert read.metadata == {"valve": "v"}
+    for name, column in written.columns.items():
+        np.testing.assert_array_equal(read.columns[name], column)
+
+
+def test_an_empty_cell_is_not_a_number_and_stays(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(HEADER + "0,1,2\n1,,3\n")
+    np.testing.assert_array_equal(read_recording(tmp_path / "r.csv").command_pa, [1.0, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s,command_pa\n0,1\n", "column position_m is missing; line 1 names: time_s, command_pa"),
+        (HEADER, "holds no samples"),
+        (HEADER + "0,1,2\n1,1\n2,1,1\n", "line 3: 2 values, the header names 3"),
+        (HEADER + "0,1,2\n1,one,2\n", "line 3: 'one' is not a number"),
+        ("# valve: v\n" + HEADER + "0,1,2\n0,1,2\n", "time_s must increase strictly: sample 2 (about line 4)"),
+        (HEADER + "0,1,2\nnan,1,2\n", "time_s: sample 2 is not a number"),
+    ],
+)
+def test_faults_are_named(tmp_path: Path, text: str, said: str) -> None:
+    assert problem(tmp_path / "r.csv", text).startswith(said)
+
+
+def test_a_line_torn_by_a_crash_is_left_out_and_told(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text(HEADER + "0,1,2\n1,1,2\n2,1")
+    read = read_recording(tmp_path / "r.csv")
+    assert len(read) == 2
+    assert read.metadata["torn"] == "the last line, 4, is not whole and was left out"

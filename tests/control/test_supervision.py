@@ -1,0 +1,114 @@
+"""Faults: what raises them, that they latch, and what frees them."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from config.device import DeviceStatus
+from config.registers import Fault, Mode, Quality
+from positioner.control.requests import Requests
+from positioner.control.sample import Sample
+from positioner.control.supervision import Limits, Watch, supervise
+
+LIMITS = Limits(
+    stroke_m=0.1,
+    travel_margin=0.1,
+    lost_after_cycles=3,
+    stale_after_s=0.1,
+    heartbeat_timeout_s=1.0,
+    restart_tolerance_pa=400.0,
+    action="vent",
+    heartbeat_action="hold",
+)
+PERIOD_S = 0.01
+
+
+def good(now_s: float, position_m: float = 0.05) -> Sample:
+    return Sample(now_s, now_s, position_m, 50e3)
+
+
+def watched(samples: list[Sample], requests: Requests, watch: Watch | None = None) -> list[Watch]:
+    """Return the watch after each sample."""
+    watches = [watch or Watch()]
+    for sample in samples:
+        watches.append(supervise(watches[-1], sample, 50e3, requests, LIMITS))
+    return watches[1:]
+
+
+def faults(watches: list[Watch]) -> list[Fault]:
+    return [watch.fault for watch in watches]
+
+
+AUTOMATIC = Requests(mode=Mode.AUTOMATIC, mode_writes=1)
+
+
+def test_good_samples_raise_nothing_and_the_mode_is_taken_up() -> None:
+    watches = watched([good(0.0), good(0.01)], AUTOMATIC)
+    assert faults(watches) == [Fault.NONE] * 2
+    assert watches[-1].mode is Mode.AUTOMATIC
+
+
+def test_the_third_lost_reply_in_a_row_is_a_fault_and_the_mode_falls() -> None:
+    lost = [replace(good(0.01 * n), quality=Quality.LOST) for n in range(1, 4)]
+    watches = watched([good(0.0), *lost], AUTOMATIC)
+    assert faults(watches) == [Fault.NONE, Fault.NONE, Fault.NONE, Fault.NO_REPLY]
+    assert watches[-1].mode is Mode.HOLD
+
+
+def test_two_lost_replies_with_a_good_one_between_are_none() -> None:
+    lost = replace(good(0.01), quality=Quality.LOST)
+    assert faults(watched([good(0.0), lost, lost, good(0.03), lost, lost], AUTOMATIC)) == [Fault.NONE] * 6
+
+
+def test_repeated_samples_turn_stale() -> None:
+    repeated = [replace(good(0.0), now_s=0.03 * n, quality=Quality.REPEATED) for n in range(1, 5)]
+    assert faults(watched([good(0.0), *repeated], AUTOMATIC))[-2:] == [Fault.NONE, Fault.STALE]
+
+
+@pytest.mark.parametrize("position_m", [-0.011, 0.111, math.nan, math.inf, 3e38])
+def test_an_impossible_position_counts_as_no_measurement(position_m: float) -> None:
+    bad = [good(0.01 * n, position_m) for n in range(1, 4)]
+    assert faults(watched([good(0.0), *bad], AUTOMATIC))[-2:] == [Fault.NONE, Fault.IMPLAUSIBLE]
+
+
+@pytest.mark.parametrize("status", [DeviceStatus.SENSOR_FAULT, DeviceStatus.NOT_READY, DeviceStatus.COMMUNICATION_LOST])
+def test_an_unfit_device_is_a_fault_at_once(status: DeviceStatus) -> None:
+    assert faults(watched([replace(good(0.0), status=status)], AUTOMATIC)) == [Fault.DEVICE]
+
+
+@pytest.mark.parametrize(("held_pa", "fault"), [(50e3, Fault.NONE), (50.3e3, Fault.NONE), (0.0, Fault.RESTARTED)])
+def test_a_device_that_comes_back_with_another_command_was_restarted(held_pa: float, fault: Fault) -> None:
+    assert faults(watched([replace(good(0.0), held_pa=held_pa)], AUTOMATIC)) == [fault]
+
+
+def test_a_fault_stays_until_acknowledged_after_its_cause_is_gone() -> None:
+    unfit = replace(good(0.0), status=DeviceStatus.NOT_READY)
+    acknowledged = replace(AUTOMATIC, acknowledgements=1)
+    early = watched([unfit, replace(unfit, now_s=0.01)], acknowledged)
+    assert faults(early) == [Fault.DEVICE, Fault.DEVICE]
+    late = watched([good(0.02)], acknowledged, early[-1])
+    assert faults(late) == [Fault.DEVICE], "one acknowledgement is used up once"
+    again = watched([good(0.03)], replace(acknowledged, acknowledgements=2), late[-1])
+    assert faults(again) == [Fault.NONE]
+    assert again[-1].mode is Mode.HOLD, "the mode asked for before the fault does not come back"
+
+
+def test_a_mode_asked_for_during_a_fault_is_not_taken_up_later() -> None:
+    unfit = replace(good(0.0), status=DeviceStatus.NOT_READY)
+    watch = watched([unfit], AUTOMATIC)[-1]
+    watch = watched([good(0.01)], replace(AUTOMATIC, mode_writes=2), watch)[-1]
+    watch = watched([good(0.02)], replace(AUTOMATIC, mode_writes=2, acknowledgements=1), watch)[-1]
+    assert (watch.fault, watch.mode) == (Fault.NONE, Mode.HOLD)
+
+
+def test_a_silent_dcs_is_a_fault_only_while_something_other_than_hold_is_on() -> None:
+    quiet = [good(0.5 * n) for n in range(5)]
+    limits_kept = watched(quiet, Requests())
+    assert faults(limits_kept) == [Fault.NONE] * 5
+    assert faults(watched(quiet, AUTOMATIC)) == [Fault.NONE] * 3 + [Fault.DCS_SILENT] * 2
+
+
+def test_each_fault_has_its_action() -> None:
+    assert LIMITS.action_on(Fault.DCS_SILENT) == "hold"
+    assert LIMITS.action_on(Fault.NO_REPLY) == "vent"

@@ -1,0 +1,201 @@
+"""The simulated device as registers: what can be read, what can be written, and that the rest changes nothing."""
+
+import struct
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+
+from config.device import SIMULATED_MAP, ModbusMap, Place
+from config.modbus_server import RegisterServer
+from config.slave import SlaveFile
+from config.valve import shipped_valve
+from sim.slave.clocks import Lockstep
+from sim.slave.device import Device
+from sim.slave.modbus import device_of
+from sim.slave.registers import DeviceRegisters
+
+PLACES = SIMULATED_MAP.places
+COMMAND = PLACES["command_pa"].address
+TIMEOUT = PLACES["communication_timeout_s"].address
+ACTION = PLACES["communication_action"].address
+END = PLACES["communication_action"].end
+SAMPLE = PLACES["command_pa"].address
+NOTHING = {"command_pa": 0.0, "communication_timeout_s": 0.0, "communication_action": 0, "sample_counter": 0}
+
+
+class Bench:
+    def __init__(self, registers: ModbusMap = SIMULATED_MAP, **tables: Any) -> None:
+        self.device = device_of(SlaveFile.model_validate(tables), shipped_valve("seed"))
+        self.server = RegisterServer(DeviceRegisters(self.device, Lockstep(self.device), registers), "127.0.0.1", 0, 1)
+
+    def ask(self, pdu: bytes) -> bytes:
+        return self.server.answer(pdu, "test")
+
+    def write(self, address: int, data: bytes) -> bytes:
+        return self.ask(struct.pack(">BHHB", 16, address, len(data) // 2, len(data)) + data)
+
+    def read(self, name: str, table: int = 3) -> float:
+        place = PLACES[name]
+        reply = self.ask(struct.pack(">BHH", table, place.address, place.format.words))
+        return place.format.decode(struct.unpack(f">{place.format.words}H", reply[2:]))
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench(clock={"mode": "lockstep"})
+
+
+def f32(value: float) -> bytes:
+    return struct.pack(">f", value)
+
+
+@pytest.mark.parametrize("table", [3, 4])
+def test_a_command_passes_one_period_and_every_quantity_reads_back(bench: Bench, table: int) -> None:
+    assert bench.write(COMMAND, f32(60e3)) == struct.pack(">BHH", 16, COMMAND, 2)
+    device: Device = bench.device
+    for _ in range(29):
+        bench.write(COMMAND, f32(60e3))
+    assert bench.read("position_m", table) == pytest.approx(device.position_m, rel=1e-6)
+    assert bench.read("position_m", table) > 1e-3
+    assert bench.read("pressure_pa", table) == 60e3
+    assert bench.read("sample_counter", table) == 30
+    assert bench.read("device_time_us", table) == 30_000
+    assert bench.read("command_pa", table) == 60e3
+
+
+def test_timeout_action_and_command_are_written_at_once_or_each_alone(bench: Bench) -> None:
+    bench.write(COMMAND, f32(10e3) + f32(2.5) + b"\0\1")
+    assert [bench.read(name) for name in NOTHING] == [10e3, 2.5, 1, 1]
+    assert bench.ask(struct.pack(">BHH", 6, ACTION, 2)) == struct.pack(">BHH", 6, ACTION, 2)
+    bench.write(TIMEOUT, f32(0.5))
+    assert [bench.read(name) for name in NOTHING] == [10e3, 0.5, 2, 1], "no period passed"
+
+
+@pytest.mark.parametrize(
+    ("address", "data", "exception"),
+    [
+        (COMMAND, f32(float("nan")), 3),
+        (COMMAND, f32(float("inf")), 3),
+        (COMMAND, f32(-1.0), 3),
+        (COMMAND, f32(420_001.0), 3),
+        (TIMEOUT, f32(-1.0), 3),
+        (TIMEOUT, f32(float("nan")), 3),
+        (ACTION, b"\0\3", 3),
+        (COMMAND, f32(10e3) + f32(1.0) + b"\0\7", 3),
+        (COMMAND, f32(-1.0) + f32(1.0) + b"\0\1", 3),
+        (COMMAND, f32(10e3) + f32(-1.0) + b"\0\1", 3),
+        (0, f32(0.01), 2),
+        (PLACES["status"].address, b"\0\0", 2),
+        (COMMAND - 1, b"\0\0" + f32(10e3), 2),
+        (COMMAND, f32(10e3)[:2], 2),
+        (COMMAND + 1, f32(10e3)[2:], 2),
+        (COMMAND, f32(10e3) + f32(1.0)[:2], 2),
+        (ACTION, b"\0\1\0\0", 2),
+        (END, b"\0\0", 2),
+        (60_000, f32(1.0), 2),
+    ],
+)
+def test_a_bad_write_gets_its_exception_and_nothing_changes(
+    bench: Bench, address: int, data: bytes, exception: int
+) -> None:
+    assert bench.write(address, data) == bytes((0x90, exception))
+    assert {name: bench.read(name) for name in NOTHING} == NOTHING
+
+
+@pytest.mark.parametrize("address", [COMMAND, COMMAND + 1, TIMEOUT, TIMEOUT + 1, 0])
+def test_half_a_value_or_a_read_only_one_cannot_be_written_with_function_6(bench: Bench, address: int) -> None:
+    assert bench.ask(struct.pack(">BHH", 6, address, 0)) == b"\x86\2"
+    assert {name: bench.read(name) for name in NOTHING} == NOTHING
+
+
+def test_function_23_with_a_bad_read_range_obeys_nothing(bench: Bench) -> None:
+    for start, count in ((END - 1, 2), (END, 1), (60_000, 4)):
+        request = struct.pack(">BHHHHB", 23, start, count, COMMAND, 2, 4) + f32(10e3)
+        assert bench.ask(request) == b"\x97\2"
+    assert {name: bench.read(name) for name in NOTHING} == NOTHING
+
+
+def test_function_23_reads_what_the_command_led_to(bench: Bench) -> None:
+    request = struct.pack(">BHHHHB", 23, 0, SAMPLE, COMMAND, 2, 4) + f32(60e3)
+    reply = bench.ask(request)
+    position_m, pressure_pa, counter, time_us, status = struct.unpack(">ffIQH", reply[2:])
+    assert (pressure_pa, counter, time_us, status) == (60e3, 1, 1000, 0)
+    assert position_m == pytest.approx(bench.device.position_m, rel=1e-6)
+
+
+def test_registers_between_the_quantities_of_a_foreign_map_read_zero() -> None:
+    registers = ModbusMap(position_m=Place(address=100), command_pa=Place(address=110, type="uint16", scale=10.0))
+    bench = Bench(registers, clock={"mode": "lockstep"})
+    assert bench.ask(struct.pack(">BHH", 6, 110, 5000)) == struct.pack(">BHH", 6, 110, 5000)
+    assert bench.device.command_pa == 50e3
+    assert bench.ask(struct.pack(">BHH", 3, 102, 9)) == bytes((3, 18)) + 16 * b"\0" + struct.pack(">H", 5000)
+    assert bench.ask(struct.pack(">BHH", 3, 99, 2)) == b"\x83\2"
+
+
+@pytest.fixture
+def served() -> Iterator[Bench]:
+    bench = Bench(clock={"mode": "lockstep", "period_s": 1e-3}, supply={"maximum_pa": 400e3})
+    bench.server.start()
+    yield bench
+    bench.server.stop()
+
+
+# Two floats whose words, mixed, make two others: 0x47000080 and 0x47800000.
+TWO_PA = (32768.5, 65536.0)
+
+
+def test_a_float_is_never_torn_between_writers_and_readers(served: Bench) -> None:
+    """Two clients write two pressures in turn, one reads: it never sees a mixture, nor a sample of two moments."""
+    writing = threading.Event()
+    writing.set()
+
+    def write(pressure_pa: float) -> None:
+        words = PLACES["command_pa"].format.encode(pressure_pa)
+        with ModbusTcpClient("127.0.0.1", port=served.server.port) as client:
+            while writing.is_set():
+                assert not client.write_registers(COMMAND, words).isError()
+
+    writers = [threading.Thread(target=write, args=(each,)) for each in TWO_PA]
+    for writer in writers:
+        writer.start()
+    seen = set()
+    with ModbusTcpClient("127.0.0.1", port=served.server.port) as client:
+        for _ in range(1500):
+            words = client.read_holding_registers(0, count=COMMAND + 2).registers
+            _, pressure_pa, counter, time_us, _, command_pa = struct.unpack(
+                ">ffIQHf", struct.pack(f">{COMMAND + 2}H", *words)
+            )
+            assert command_pa in (0.0, *TWO_PA)
+            assert pressure_pa == command_pa, "pressure and command of one moment"
+            assert time_us == 1000 * counter
+            seen.add(command_pa)
+    writing.clear()
+    for writer in writers:
+        writer.join()
+    assert seen >= set(TWO_PA), "the test saw both"
+
+
+def run_over_tcp(commands_pa: list[float], seed: int) -> list[bytes]:
+    bench = Bench(clock={"mode": "lockstep"}, sensor={"noise_std_m": 1e-5, "seed": seed})
+    bench.server.start()
+    replies = []
+    with ModbusTcpClient("127.0.0.1", port=bench.server.port) as client:
+        for command_pa in commands_pa:
+            words = PLACES["command_pa"].format.encode(command_pa)
+            reply = client.readwrite_registers(
+                read_address=0, read_count=SAMPLE, write_address=COMMAND, values=words
+            ).registers
+            replies.append(struct.pack(f">{SAMPLE}H", *reply))
+    bench.server.stop()
+    return replies
+
+
+def test_two_runs_in_lockstep_are_alike_to_the_bit() -> None:
+    commands_pa = [30e3 + 400.0 * n for n in range(150)]
+    first = run_over_tcp(commands_pa, seed=3)
+    assert run_over_tcp(commands_pa, seed=3) == first
+    assert run_over_tcp(commands_pa, seed=4) != first
+    assert len(set(first)) == len(first)
