@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from config.device import ActionName, ModbusTcpDevice
-from config.loading import NonNegative, Port, Positive, Schema, load
+from config.loading import NonNegative, Positive, Schema, load
 
 
 class PositionedValve(Schema):
@@ -57,10 +57,10 @@ class Identification(Schema):
 
     window_s: Positive = 0.8
     minimum_window_s: Positive = 0.4
-    derivative_samples: Annotated[int, Field(ge=6, le=5000)] = 50
-    position_noise_m: Positive | None = None
-    """Standard deviation of the position sensor's noise; 1e-4 of the stroke where nobody has said."""
-    pressure_noise_pa: NonNegative = 0.0
+    derivative_window_s: Positive = 0.05
+    noise_std_m: Positive | None = None
+    """Standard deviation of the position sensor's noise; measured at rest where nobody has said."""
+    pressure_noise_std_pa: NonNegative = 0.0
 
     @model_validator(mode="after")
     def _windows_nest(self) -> Self:
@@ -86,10 +86,10 @@ class Law(Schema):
 
 
 class Supervisory(Schema):
-    """Table `[supervisory]`: where the DCS finds the registers."""
+    """Table `[supervisory]`: where the DCS finds the registers. Port 0 takes any free one; the daemon says which."""
 
     host: str = "127.0.0.1"
-    port: Port = 5502
+    port: Annotated[int, Field(ge=0, le=65535)] = 5502
     unit: Annotated[int, Field(ge=1, le=247)] = 1
 
 

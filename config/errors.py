@@ -1,8 +1,8 @@
-"""The one error for bad input: a single line that names file, key, value and what is allowed."""
+"""Errors for people: each is a single line."""
 
 
 class InputError(Exception):
-    """Bad input from a person: a file, a key in it, a command-line value.
+    """Bad input from a person: names file, key, value and what is allowed.
 
     Commands print it as one line on standard error and exit with status 2.
     """
@@ -11,3 +11,7 @@ class InputError(Exception):
         super().__init__(f"{source}: {problem}")
         self.source = source
         self.problem = problem
+
+
+class Unfulfilled(Exception):
+    """The thing asked about does not hold, or could not be done. Commands print it and exit with status 1."""

@@ -8,7 +8,8 @@ nobody); what a request means is answered here, as the Modbus Application Protoc
     6      write one                       2 an address outside the map, read-only, or half a value
     16     write several      1 to 123     3 a count or a value that is not allowed
     23     write, then read   1 to 121,    4 a fault of the server itself (logged)
-                              1 to 125     11 another unit (see below)
+                              1 to 125     6 a value that cannot be taken now
+                                           11 another unit (see below)
 
 One request at a time holds the lock: it is all or nothing, and what it reads is of one moment. A client may read
 any part of a value; only both words from one request belong together.
@@ -47,6 +48,7 @@ class ExceptionCode(IntEnum):
     ILLEGAL_ADDRESS = 2
     ILLEGAL_VALUE = 3
     DEVICE_FAILURE = 4
+    DEVICE_BUSY = 6
     NO_SUCH_UNIT = 11
 
 

@@ -57,6 +57,7 @@ class Why(IntEnum):
     EXCITATION_BEYOND_LIMITS = 5
     EXCITATION_TOO_LONG = 6
     AMPLITUDE_ZERO = 7
+    LAW_BEYOND_LIMITS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +132,8 @@ STATUS = (
         "uint16",
         "1",
         "why not as asked: 0 it is, 1 not automatic, 2 no estimates, 3 no move asked, 4 alpha below break-away, "
-        "5 excitation beyond pressure limits, 6 excitation too long, 7 amplitude is zero",
+        "5 excitation beyond pressure limits, 6 excitation too long, 7 amplitude is zero, "
+        "8 the law asks for a pressure beyond the limits",
     ),
     Register("position", 104, "float32", "p.u.", "stem position"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
@@ -178,7 +180,7 @@ ESTIMATES = (
     Register("k_over_c_applied", 246, "float32", "Pa", "k/c as the law uses it; NaN: none yet"),
     Register("identifications", 248, "uint16", "1", "how many identifications were applied, wraps"),
     Register("refusals", 249, "uint16", "1", "how many were refused, wraps"),
-    Register("refusal", 250, "uint16", "1", "why the last one was refused, as in *_reason; 0: it was not"),
+    Register("refusal", 250, "uint16", "1", "why the last one was refused, as in *_reason; 0: it was applied"),
 )
 
 STATISTICS = (

@@ -81,3 +81,13 @@ def shipped_valve(name: str) -> Path:
         there = ", ".join(sorted(each.stem for each in path.parent.glob("*.toml")))
         raise InputError(name, f"no shipped valve of that name; there are: {there}")
     return path
+
+
+def find_valve(text: str) -> Path:
+    """Return the valve file that a person named: a path, or the name of a shipped one.
+
+    Raises:
+        InputError: neither.
+    """
+    path = Path(text)
+    return path if path.suffix == ".toml" or path.exists() else shipped_valve(text)

@@ -3,18 +3,32 @@
 What `positioner get`, `set` and `identify` use, and what plays the DCS in `positioner demo`.
 """
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Self
 
 from pyModbusTCP.client import ModbusClient
 
 from config.device import MOST_REGISTERS
-from config.errors import InputError
-from config.registers import Register, register_named
+from config.errors import InputError, Unfulfilled
+from config.registers import Fault, Register, Why, register_named
+from positioner.control.states import State
+from positioner.estimation.estimate import Reason
+
+POLL_S = 0.05
+
+REFUSALS = (
+    Why.NOT_AUTOMATIC,
+    Why.ALPHA_BELOW_BREAKAWAY,
+    Why.EXCITATION_BEYOND_LIMITS,
+    Why.EXCITATION_TOO_LONG,
+    Why.AMPLITUDE_ZERO,
+)
+"""Why an excitation does not begin or has ended; the other reasons concern the law."""
 
 
-class DcsError(Exception):
+class DcsError(Unfulfilled):
     """The daemon did not do what was asked; one line says what and why."""
 
 
@@ -75,6 +89,47 @@ class Dcs:
         for name, value in values.items():
             self.set(name, value)
 
+    def identify(
+        self, swing: Mapping[str, float], timeout_s: float, show: Callable[[float], None] = lambda _: None
+    ) -> str | None:
+        """Have the valve identified; return why nothing was applied, or None.
+
+        However it ends, eta is 1 again afterwards: S3 gives back the law.
+
+        Args:
+            swing: alpha, beta, omega as far as they are to differ from what the daemon has.
+            timeout_s: give up after this long.
+            show: called with the progress, 0 to 1.
+        """
+        self.set_all(swing)
+        applied_before = self.get("identifications")
+        try:
+            self.set_all({"eta_1": 0, "eta_2": 0, "eta_3": 0})
+            problem = self._wait_for_estimates(timeout_s, show)
+        finally:
+            self.set_all({"eta_1": 1, "eta_2": 1, "eta_3": 1})
+        time.sleep(POLL_S)
+        if self.get("identifications") != applied_before:
+            return None
+        return problem or Reason(int(self.get("refusal"))).text
+
+    def _wait_for_estimates(self, timeout_s: float, show: Callable[[float], None]) -> str | None:
+        """Wait until the estimates the law needs are there; return what went wrong, or None."""
+        due_s = time.monotonic() + timeout_s
+        begun = False
+        while time.monotonic() < due_s:
+            now = self.get_all("state", "fault", "why", "progress", "b_over_c_valid", "k_over_c_valid")
+            begun = begun or now["state"] == State.S3_IDENTIFY
+            show(now["progress"])
+            if now["fault"]:
+                return f"fault: {_plain(Fault(int(now['fault'])))}"
+            if now["why"] in REFUSALS:
+                return _plain(Why(int(now["why"])))
+            if begun and now["progress"] >= 1 and now["b_over_c_valid"] and now["k_over_c_valid"]:
+                return None
+            time.sleep(POLL_S)
+        return f"no valid estimates within {timeout_s:g} s"
+
     def _read(self, start: int, end: int) -> list[int]:
         words = self._client.read_holding_registers(start, end - start)
         if words is None:
@@ -89,3 +144,7 @@ class Dcs:
         if self._client.last_except:
             return f"exception {self._client.last_except}, {self._client.last_except_as_txt.lower()} (see its log)"
         return str(self._client.last_error_as_txt)
+
+
+def _plain(code: Fault | Why) -> str:
+    return code.name.lower().replace("_", " ")

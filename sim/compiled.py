@@ -1,10 +1,10 @@
 """Compiles the bare valve with a set of effects in their places into one kernel, cached across processes.
 
-The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which the
-effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of
-the effects' texts and of this file, and the numba version. numba keeps the machine code beside it. A change in any of them is
-another name, so that an old kernel is never taken for a new one; and what is compiled is the very text that was hashed.
-No fast-math: the order of operations is the text's.
+The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which
+the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
+effects' texts and of this file, and the numba version. numba keeps the machine code beside it. A change in any of them
+is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
+(numba's own cache does not see a change in a callee's file.) No fast-math: the order of operations is the text's.
 
 numba is untyped: its types stop here.
 """
@@ -12,6 +12,7 @@ numba is untyped: its types stop here.
 import atexit
 import hashlib
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,6 @@ from types import FunctionType, ModuleType
 from typing import Any, Protocol, cast
 
 import numba
-from numba.core.errors import NumbaError
 
 from config.errors import InputError
 from sim import karnopp
@@ -33,22 +33,16 @@ from sim.wiring import wiring
 BASE = Path(karnopp.__file__)
 OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
 """numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
+NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
 ENTRIES: Mapping[str, tuple[str, ...]] = {
     "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
-    "advance": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
 }
 
 
 class _Rest(Protocol):
     def __call__(self, theta: Vector, state: Vector, time: float, position: float, command: float, /) -> None: ...
-
-
-class _Advance(Protocol):
-    def __call__(
-        self, theta: Vector, state: Vector, command: float, duration: float, longest_step: float, /
-    ) -> None: ...
 
 
 class _Respond(Protocol):
@@ -66,12 +60,11 @@ class _Respond(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """`rest`, `advance` and `respond` of `karnopp.py`, compiled with the effects in their places."""
+    """`rest` and `respond` of `karnopp.py`, compiled with the effects in their places."""
 
     digest: str
     state_size: int
     rest: _Rest
-    advance: _Advance
     respond: _Respond
 
 
@@ -89,7 +82,7 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
 def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int) -> Kernel:
     digest = hashlib.sha256(text.encode()).hexdigest()
     module = _module(f"valve_kernel_{digest}")
-    exec(compile(text, _written(digest, text), "exec", dont_inherit=True), module.__dict__)
+    exec(compile(text, written(digest, text), "exec", dont_inherit=True), module.__dict__)
     for i, (path, source) in enumerate(sources):
         part = _module(f"{module.__name__}_{i}")
         execute(source, path, part.__dict__)
@@ -102,10 +95,17 @@ def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int)
             name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, **OPTIONS)(entry)
             for name, entry in entries.items()
         }
-    except NumbaError as error:
+    except Exception as error:
+        if not sources:
+            raise
         where = ", ".join(str(path) for path, _ in sources)
-        raise InputError(where, f"cannot be compiled: {' '.join(str(error).split())}") from None
+        raise InputError(where, f"cannot be compiled: {_reason(error)}") from None
     return Kernel(digest, state_size, **{name: cast(Any, each) for name, each in compiled.items()})
+
+
+def _reason(error: Exception) -> str:
+    """Return what numba says first: the cause and its line, without the callers that follow."""
+    return " ".join(NESTED.sub("", str(error).partition("During: ")[0]).split())
 
 
 def _module(name: str) -> ModuleType:
@@ -121,7 +121,7 @@ def _inlined(namespace: dict[str, Any]) -> None:
             namespace[name] = numba.njit(forceinline=True, **OPTIONS)(value)
 
 
-def _written(digest: str, text: str) -> Path:
+def written(digest: str, text: str) -> Path:
     """Return the file that holds the text, in the cache folder or, where that cannot be written, a temporary one."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     try:

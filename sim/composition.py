@@ -1,7 +1,7 @@
 """A valve file made ready to run: its effects, its parameter vector, its kernel.
 
-The parameter vector theta holds the base model's parameters in the order of BASE, then each effect's in the order of the
-file; an effect's parameter is named `effect.parameter`.
+The parameter vector theta holds the base model's parameters in the order of BASE, then each effect's in the order of
+the file; an effect's parameter is named `effect.parameter`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.loading import validated
-from config.valve import EffectTable, ValveFile, ValveParameters
+from config.valve import ValveFile, ValveParameters
 from sim.compiled import Kernel, kernel
 from sim.effect import Effect, shipped_effect
 from sim.karnopp import Vector
@@ -88,8 +88,3 @@ class Composition:
             written = {key: values[f"{effect.name}.{key}"] for key in effect.parameters}
             effect.values(written, f"{self.source}: effect {effect.name}")
         return np.array([float(values[name]) for name in self.names])
-
-
-def with_effects(file: ValveFile, *tables: Mapping[str, Any]) -> ValveFile:
-    """Return the valve file with further `[[effect]]` tables."""
-    return file.model_copy(update={"effect": (*file.effect, *(EffectTable(**table) for table in tables))})

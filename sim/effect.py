@@ -19,7 +19,7 @@ and a function for its place. The places and what each returns:
 An effect sits in the pressure path, or in the sensor, or at the stem (force, friction and motion in any mixture).
 With a memory it also defines
 
-    start      sets the memory for a valve long at rest, signal being what enters it (at the stem: x)
+    start      sets the memory for a valve long at rest, signal being what enters it (at the stem: x, and F_e, N, too)
     advance    carries the memory over a step h, s, during which the signal goes from before to after
 
 A function names among its arguments only what it needs of: t (s), x (m), v (m/s), p (actuator pressure, Pa), q (the
@@ -55,6 +55,7 @@ UPKEEP: Mapping[str, tuple[str, ...]] = {
     "advance": ("before", "after", "h", *EVERYWHERE),
 }
 """What keeps a memory, and the arguments it may name."""
+AT_STEM = ("force", "friction", "motion")
 SHIPPED = Path(__file__).parent / "effects"
 
 
@@ -138,18 +139,16 @@ def _declared(path: Path, source: str) -> Effect:
     namespace: dict[str, Any] = {"__name__": path.stem}
     execute(source, path, namespace)
     allowed = {**PLACES, **UPKEEP}
-    functions = {
-        name: tuple(inspect.signature(namespace[name]).parameters) for name in allowed if name in namespace
-    }
+    if any(place in namespace for place in AT_STEM):
+        allowed["start"] = ("F_e", *UPKEEP["start"])
+    functions = {name: tuple(inspect.signature(namespace[name]).parameters) for name in allowed if name in namespace}
     text = (namespace.get("__doc__") or "").partition("\n")[0]
     memory = namespace.get("MEMORY", 0)
     effect = Effect(path.stem, text, _parameters(path, namespace), memory, functions, path, source)
     for name, arguments in functions.items():
         for argument in arguments:
             if argument not in allowed[name]:
-                raise InputError(
-                    str(path), f"{name}: unknown argument {argument}; allowed: {', '.join(allowed[name])}"
-                )
+                raise InputError(str(path), f"{name}: unknown argument {argument}; allowed: {', '.join(allowed[name])}")
     _check_places(effect)
     return effect
 
@@ -168,7 +167,7 @@ def execute(source: str, path: Path, namespace: dict[str, Any]) -> None:
         raise InputError(str(path), f"{type(error).__name__}: {error}") from None
 
 
-def _parameters(path: Path, namespace: Mapping[str, Any]) -> dict[str, Parameter]:
+def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:
     if "Parameters" not in namespace:
         return {}
     declared = {}

@@ -18,8 +18,8 @@ x stem position, m; v velocity, m/s; p actuator pressure, Pa; t time, s; the com
 A period is cut into equal steps h. Over a step the pressure goes straight from its start to its end value; inside it
 every change of mode is bisected to h / 2^30, and the motion is integrated by Bogacki and Shampine's pair of orders
 3 and 2, the sub-step halved until the pair agrees on v to TOLERANCE (|v| + v_s). The Stribeck slope near v_s grows
-deviations at about (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the sub-steps are some 0.1 us; away from it
-one sub-step is one step.
+deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the sub-steps are some 0.1 us; away
+from it one sub-step is one step.
 
 The file is plain Python and runs as it stands: the bare valve. `sim.compiled` compiles this text after putting the
 effects of a valve file into the places at its end, which stand empty here. All that is compiled must stand in
@@ -100,9 +100,7 @@ class Condition(NamedTuple):
 
 def karnopp(theta: Vector) -> Karnopp:
     """Read the base model from the parameter vector: m, A, k_s, F_v, F_c, F_s, v_s, deadzone_ratio first."""
-    return Karnopp(
-        1.0 / theta[0], theta[1], theta[2], theta[3], theta[4], theta[5], theta[6], theta[7] * theta[6]
-    )
+    return Karnopp(1.0 / theta[0], theta[1], theta[2], theta[3], theta[4], theta[5], theta[6], theta[7] * theta[6])
 
 
 def stem_at(drive: Drive, tau: float, x: float, v: float) -> Stem:
@@ -169,9 +167,7 @@ def bogacki_shampine(
     return x1, v1, a1, s * 0.125 * NINTH * abs(5.0 * a - 6.0 * a2 - 8.0 * a3 + 9.0 * a1)
 
 
-def wait(
-    valve: Karnopp, drive: Drive, tau: float, h: float, x: float, q: Any, z: Any
-) -> tuple[float, int, float]:
+def wait(valve: Karnopp, drive: Drive, tau: float, h: float, x: float, q: Any, z: Any) -> tuple[float, int, float]:
     """Hold the stuck stem until it breaks away or the step ends; return tau, mode, sigma."""
     if excess(valve, stem_at(drive, h, x, 0.0), q, z) <= 0.0:
         return h, STUCK, 0.0
@@ -300,7 +296,8 @@ def rest(theta: Vector, state: Vector, time: float, position: float, command: fl
     q = parameters(theta)
     z = memories(state)
     p = start_pressure(command, Stem(time, position, 0.0, command), q, z)
-    indicated = start_stem(Stem(time, position, 0.0, p), q, z)
+    stem = Stem(time, position, 0.0, p)
+    indicated = start_stem(external_force(karnopp(theta), stem, q, z), stem, q, z)
     write(state, Condition(time, position, 0.0, p, STUCK, 0.0, indicated))
 
 
@@ -324,17 +321,7 @@ def carry(
     return Condition(t + duration, x, v, p, mode, sigma, indicated)
 
 
-def advance(theta: Vector, state: Vector, command: float, duration: float, longest_step: float) -> None:
-    """Carry the state over one period."""
-    now = carry(
-        karnopp(theta), read(state), command, duration, longest_step, parameters(theta), memories(state)
-    )
-    write(state, now)
-
-
-def respond(
-    theta: Vector, state: Vector, commands: Vector, periods: Vector, longest_step: float, path: Vector
-) -> None:
+def respond(theta: Vector, state: Vector, commands: Vector, periods: Vector, longest_step: float, path: Vector) -> None:
     """Hold each command for its period in turn; write t, p, x, v, indicated into the rows of path, the start first."""
     valve, now, q, z = karnopp(theta), read(state), parameters(theta), memories(state)
     for i in range(len(commands) + 1):
@@ -376,7 +363,7 @@ def start_pressure(u: float, stem: Stem, q: Any, z: Any) -> float:
     return u
 
 
-def start_stem(stem: Stem, q: Any, z: Any) -> float:
+def start_stem(F_e: float, stem: Stem, q: Any, z: Any) -> float:
     """Set the memories at the stem and of the sensor for a stem at rest; return the indicated position."""
     return stem.x
 
@@ -391,9 +378,7 @@ def force(stem: Stem, q: Any, z: Any) -> float:
     return 0.0
 
 
-def friction(
-    F_c: float, F_s: float, direction: float, stem: Stem, q: Any, z: Any
-) -> tuple[float, float]:
+def friction(F_c: float, F_s: float, direction: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
     """Return the Coulomb and static levels, N, that hold here and in this direction of (impending) motion."""
     return F_c, F_s
 

@@ -1,8 +1,8 @@
 """The response of a valve to a series of commands, each held over its period: one compiled call.
 
-Row 0 is the start; row i > 0 is the END of the i-th period. `command_pa` of a row is the command held FROM that time on
-(sampled, then commanded), so the last row repeats the last command; `pressure_pa` is the actuator pressure that has been
-acting up to that time, before the new command.
+Row 0 is the start; row i > 0 is the END of the i-th period. `command_pa` of a row is the command held FROM that time
+on (sampled, then commanded), so the last row repeats the last command; `pressure_pa` is the actuator pressure that has
+been acting up to that time, before the new command.
 """
 
 from dataclasses import dataclass

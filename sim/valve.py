@@ -3,11 +3,12 @@
 from math import isfinite
 from typing import Self
 
+import numpy as np
 import numpy.typing as npt
 
 from config.valve import ValveFile
 from sim.composition import Composition
-from sim.karnopp import read
+from sim.karnopp import karnopp, read
 from sim.open_loop import STEP_S, Response, at_rest, checked_step, follow
 
 
@@ -18,7 +19,8 @@ class Valve:
         self._composition = composition
         self._theta = composition.theta.copy()
         self._step_s = checked_step(step_s)
-        self._advance = composition.kernel.advance
+        self._respond = composition.kernel.respond
+        self._command, self._period, self._path = np.zeros(1), np.zeros(1), np.zeros((5, 2))
         self._state = at_rest(composition, self._theta, 0.0, 0.0, 0.0)
 
     @classmethod
@@ -36,9 +38,8 @@ class Valve:
         Raises:
             ValueError: a number that is not finite.
         """
-        valve = self._composition.valve
-        balance = valve.spring_n_per_m * position_m / valve.diaphragm_area_m2
-        held = balance if pressure_pa is None else pressure_pa
+        valve = karnopp(self._theta)
+        held = valve.k_s * position_m / valve.A if pressure_pa is None else pressure_pa
         self._state = at_rest(self._composition, self._theta, self.time_s, position_m, held)
 
     def advance(self, command_pa: float, duration_s: float) -> None:
@@ -49,7 +50,9 @@ class Valve:
         """
         if not (isfinite(command_pa) and isfinite(duration_s) and duration_s > 0.0):
             raise ValueError(f"cannot hold {command_pa} Pa for {duration_s} s")
-        self._advance(self._theta, self._state, command_pa, duration_s, self._step_s)
+        self._command[0] = command_pa
+        self._period[0] = duration_s
+        self._respond(self._theta, self._state, self._command, self._period, self._step_s, self._path)
 
     def run(self, command_pa: npt.ArrayLike, period_s: npt.ArrayLike) -> Response:
         """Hold n commands (Pa) in turn, each for its period (s, one for all or n); as n calls of `advance`.

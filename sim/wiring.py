@@ -47,13 +47,11 @@ def wiring(effects: Sequence[Effect]) -> str:
             _function("memories(state)", [], f"({_memories(effects)})"),
             _function("start_pressure(u, stem, q, z)", started("pressure", "u"), "u"),
             _function(
-                "start_stem(stem, q, z)",
-                ["y = stem.x", *(call("start", i, signal="y") for i in at_stem), *started("sensor", "y")],
+                "start_stem(F_e, stem, q, z)",
+                ["y = stem.x", *(call("start", i, signal="y", F_e="F_e") for i in at_stem), *started("sensor", "y")],
                 "y",
             ),
-            _function(
-                "pressure(u, h, stem, q, z)", ["start, end = u, u", *passed("pressure", "u")], "start, end"
-            ),
+            _function("pressure(u, h, stem, q, z)", ["start, end = u, u", *passed("pressure", "u")], "start, end"),
             _function("force(stem, q, z)", [], " + ".join(["0.0", *(call("force", i) for i in at["force"])])),
             _function(
                 "friction(F_c, F_s, direction, stem, q, z)",
@@ -94,6 +92,4 @@ def _parameters(effects: Sequence[Effect]) -> str:
 def _memories(effects: Sequence[Effect]) -> str:
     """Return a tuple of each effect's memory, a view into the state vector."""
     ends = accumulate((each.memory for each in effects), initial=MEMORY)
-    return "".join(
-        f"state[{first}:{first + each.memory}], " for each, first in zip(effects, ends, strict=False)
-    )
+    return "".join(f"state[{first}:{first + each.memory}], " for each, first in zip(effects, ends, strict=False))

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 HELP = "identify the valve (moves it: state S3); the mode must be automatic"
 EXAMPLE = "positioner identify --alpha-pa 44126 --beta-pa 13238"
 
-POLL_S = 0.05
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
@@ -25,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, print what was found, and whether the law uses it now."""
+    from config.errors import Unfulfilled
     from config.registers import Mode
-    from positioner.dcs import DcsError
 
     asked = {
         "alpha": arguments.alpha_pa,
@@ -35,58 +33,27 @@ def run(arguments: argparse.Namespace) -> int:
     }
     with connected(arguments) as dcs:
         if dcs.get("mode") != Mode.AUTOMATIC:
-            raise DcsError("the mode is not automatic, so nothing may move the valve: positioner set mode automatic")
-        dcs.set_all({name: value for name, value in asked.items() if value is not None})
-        before = dcs.get("identifications")
-        try:
-            dcs.set_all({"eta_1": 0, "eta_2": 0, "eta_3": 0})
-            problem = wait(dcs, arguments.timeout_s)
-        finally:
-            dcs.set_all({"eta_1": 1, "eta_2": 1, "eta_3": 1})
-        return _report(dcs, before, problem)
+            raise Unfulfilled("the mode is not automatic, so nothing may move the valve: positioner set mode automatic")
+        swing = {name: value for name, value in asked.items() if value is not None}
+        return _report(dcs, dcs.identify(swing, arguments.timeout_s))
 
 
-def wait(dcs: "Dcs", timeout_s: float) -> str | None:
-    """Wait until the estimates the law needs are there; return what went wrong, or None."""
-    import time
-
-    from config.registers import Fault, Why
-
-    due_s = time.monotonic() + timeout_s
-    begun = False
-    while time.monotonic() < due_s:
-        now = dcs.get_all("state", "fault", "why", "progress", "b_over_c_valid", "k_over_c_valid")
-        begun = begun or now["state"] == 3
-        if now["fault"]:
-            return f"fault: {Fault(int(now['fault'])).name.lower().replace('_', ' ')}"
-        if now["why"]:
-            return Why(int(now["why"])).name.lower().replace("_", " ")
-        if begun and now["progress"] >= 1 and now["b_over_c_valid"] and now["k_over_c_valid"]:
-            return None
-        time.sleep(POLL_S)
-    return f"no valid estimates within {timeout_s:g} s"
-
-
-def _report(dcs: "Dcs", before: float, problem: str | None) -> int:
-    import time
-
+def _report(dcs: "Dcs", problem: str | None) -> int:
     from config.registers import BY_NAME, ESTIMATED
     from positioner.estimation.estimate import Reason
 
-    time.sleep(POLL_S)
     print(f"{'':9} {'estimate':>14} {'std':>12} unit")
     for name in ESTIMATED:
         now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
         reason = Reason(int(now[f"{name}_reason"]))
-        note = "" if reason is Reason.VALID else f"  refused: {reason.sentence}"
+        note = "" if reason is Reason.VALID else f"  refused: {reason.text}"
         unit = BY_NAME[f"{name}_e"].unit
         print(f"{name:9} {now[f'{name}_e']:14.6g} {now[f'{name}_std']:12.3g} {unit}{note}")
-    applied = dcs.get("identifications") != before
-    if applied:
-        law = dcs.get_all("b_over_c_applied", "k_over_c_applied")
-        print("\napplied; to keep it over a restart, write into the daemon's file:")
-        print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
-        print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")
-    else:
-        print(f"\nnot applied: {problem or 'refused'}; the law keeps what it had")
-    return 0 if applied else 1
+    if problem is not None:
+        print(f"\nnot applied: {problem}; the law keeps what it had")
+        return 1
+    law = dcs.get_all("b_over_c_applied", "k_over_c_applied")
+    print("\napplied; to keep it over a restart, write into the daemon's file:")
+    print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
+    print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")
+    return 0

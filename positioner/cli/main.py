@@ -8,21 +8,20 @@ import importlib
 import sys
 from collections.abc import Sequence
 
-COMMANDS = ("demo", "sim", "run", "probe", "doctor", "get", "set", "identify", "map", "simulate", "play", "reproduce")
+from config.errors import InputError, Unfulfilled
+
+COMMANDS = ("demo", "sim", "run", "probe", "doctor", "get", "set", "identify", "map", "simulate", "play")
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
-    from config.errors import InputError
-    from positioner.dcs import DcsError
-
     arguments = _parser().parse_args(words)
     try:
         return int(arguments.run(arguments))
     except InputError as error:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 2
-    except DcsError as error:
+    except Unfulfilled as error:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:

@@ -51,7 +51,7 @@ def _row(register: "Register") -> dict[str, object]:
 def _reasons() -> list[dict[str, object]]:
     from positioner.estimation.estimate import Reason
 
-    return [{"number": int(reason), "name": reason.name.lower(), "text": reason.sentence} for reason in Reason]
+    return [{"number": int(reason), "name": reason.name.lower(), "text": reason.text} for reason in Reason]
 
 
 def _markdown(rows: list[dict[str, object]]) -> None:

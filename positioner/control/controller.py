@@ -7,7 +7,6 @@ the running integrals of the identification. It reads no clock.
 from dataclasses import dataclass, replace
 
 from config.registers import Fault, Mode, Why
-from positioner.control.adoption import Adoption
 from positioner.control.excitation import Swing
 from positioner.control.law import balance_pa
 from positioner.control.reference import Reference
@@ -16,6 +15,7 @@ from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.states import Situation, State, state_in, why_not_the_law
 from positioner.control.supervision import Limits, Watch, supervise, usable
+from positioner.estimation.applied import Applied, accept
 from positioner.estimation.estimate import Estimates
 from positioner.estimation.identification import Identification
 
@@ -37,7 +37,7 @@ class Memory:
     """The last command given."""
     held_pa: float
     """What S0 holds, and what it gets back after S3."""
-    adoption: Adoption
+    applied: Applied
     watch: Watch
     reference: Reference
     state: State = State.S0_START
@@ -60,7 +60,7 @@ class Decision:
     delta_r_m: float
     sample_age_s: float
     estimates: Estimates
-    adoption: Adoption
+    applied: Applied
 
 
 class Controller:
@@ -72,7 +72,7 @@ class Controller:
         self._memory = Memory(
             command_pa=held_pa,
             held_pa=held_pa,
-            adoption=Adoption(settings.applied),
+            applied=settings.applied,
             watch=Watch(),
             reference=Reference(0.0),
         )
@@ -99,11 +99,11 @@ def step(
         memory = replace(memory, reference=memory.reference.follow(requests.reference_m))
 
     running, refusal = _excitation(memory, sample, requests, settings, automatic)
-    identifying, adoption, estimates = _identify(memory, running, sample, requests, settings, identification)
+    identifying, applied, estimates = _identify(memory, running, sample, requests, settings, identification)
     situation = Situation(
         automatic=automatic,
         exciting=running is not None and not running.ended,
-        law_ready=adoption.ratios is not None,
+        law_ready=applied.ratios is not None,
         delta_r_m=memory.reference.delta_m,
     )
     state = state_in(situation)
@@ -113,22 +113,26 @@ def step(
         watch=watch,
         running=running,
         identifying=identifying,
-        adoption=adoption,
+        applied=applied,
         state=state,
         held_pa=_adopted(held_pa, watch, sample),
     )
-    command_pa = _command_pa(memory, sample, requests, settings)
+    wanted_pa = _wanted_pa(memory, sample, requests, settings)
+    command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
+    why = refusal if refusal is not Why.NOTHING else why_not_the_law(situation)
+    if why is Why.NOTHING and command_pa != wanted_pa:
+        why = Why.LAW_BEYOND_LIMITS
     decision = Decision(
         command_pa=command_pa,
         state=state,
         mode=watch.mode,
         fault=watch.fault,
-        why=refusal if refusal is not Why.NOTHING else why_not_the_law(situation),
+        why=why,
         reference_m=memory.reference.value_m,
         delta_r_m=memory.reference.delta_m,
         sample_age_s=sample.now_s - watch.good_s,
         estimates=estimates,
-        adoption=adoption,
+        applied=applied,
     )
     return replace(memory, command_pa=command_pa), decision
 
@@ -178,7 +182,7 @@ def _excitation(
 
 def _educated_guess_pa(memory: Memory) -> float:
     """Return the constant pressure that keeps the stem near its reference (seed, 4.1)."""
-    ratios = memory.adoption.ratios
+    ratios = memory.applied.ratios
     if ratios is None:
         return memory.command_pa
     direction = -1 if memory.reference.delta_m < 0 else 1
@@ -192,7 +196,7 @@ def _identify(
     requests: Requests,
     settings: Settings,
     identification: Identification,
-) -> tuple[bool, Adoption, Estimates]:
+) -> tuple[bool, Applied, Estimates]:
     """Run the estimators while eta_2 or eta_3 asks for it; what they find is applied when they are switched off."""
     parameters, friction = requests.eta[1] == 0, requests.eta[2] == 0
     ended = running is not None and running.ended
@@ -204,19 +208,14 @@ def _identify(
         identification.update(
             sample.time_s, sample.position_m, sample.pressure_pa, parameters=parameters, friction=friction
         )
-    adoption = memory.adoption
+    applied = memory.applied
     if memory.identifying and not wanted:
-        adoption = adoption.consider(identification.estimates)
-    return wanted, adoption, identification.estimates
-
-
-def _command_pa(memory: Memory, sample: Sample, requests: Requests, settings: Settings) -> float:
-    """Return the pressure to command, within the limits."""
-    wanted = _wanted_pa(memory, sample, requests, settings)
-    return min(max(wanted, settings.minimum_pa), settings.maximum_pa)
+        applied = accept(applied, identification.estimates)
+    return wanted, applied, identification.estimates
 
 
 def _wanted_pa(memory: Memory, sample: Sample, requests: Requests, settings: Settings) -> float:
+    """Return the pressure that fault, mode or state asks for, Pa."""
     fault = memory.watch.fault
     if fault is not Fault.NONE:
         return settings.safe_pa(settings.limits.action_on(fault), memory.held_pa)
@@ -226,6 +225,6 @@ def _wanted_pa(memory: Memory, sample: Sample, requests: Requests, settings: Set
         return memory.held_pa
     if memory.state is State.S3_IDENTIFY and memory.running is not None:
         return memory.running.swing.pressure_pa(sample.now_s - memory.running.start_s)
-    ratios = memory.adoption.ratios
+    ratios = memory.applied.ratios
     assert ratios is not None  # S1 and S2 exist only with estimates
     return balance_pa(memory.reference.value_m, 1 if memory.state is State.S1_UP else -1, ratios)

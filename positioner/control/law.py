@@ -8,15 +8,7 @@ With b/c = -k_s/A < 0 and k/c = -F_c/A < 0 the stem meets no net force at x = r 
 stable valve (poles of s^2 - a s - b) brings it there by itself. Only the two ratios are needed.
 """
 
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True, slots=True)
-class Ratios:
-    """What the law needs of the valve: b/c in Pa/m and k/c in Pa, both negative."""
-
-    b_over_c: float
-    k_over_c: float
+from positioner.estimation.applied import Ratios
 
 
 def balance_pa(reference_m: float, direction: int, ratios: Ratios) -> float:

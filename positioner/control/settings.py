@@ -1,17 +1,12 @@
 """What the controller is told once, from the daemon's file."""
 
-from dataclasses import dataclass, replace
-from math import nan
+from dataclasses import dataclass
 
 from config.daemon import DaemonFile, Law
 from config.device import ActionName
 from positioner.control.supervision import Limits
-from positioner.estimation.bookkeeping import Applied, nothing_applied
-from positioner.estimation.estimate import Estimate, Reason
+from positioner.estimation.applied import Applied, Ratios
 from positioner.estimation.identification import IdentificationSettings
-
-USUAL_NOISE = 1e-4
-"""Of a position sensor whose noise nobody has said, as a share of the stroke."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +44,13 @@ class Settings:
             identification=IdentificationSettings(
                 stroke_m=file.valve.stroke_m,
                 pressure_pa=file.pressure.maximum_pa - file.pressure.minimum_pa,
-                position_noise_m=identification.position_noise_m or USUAL_NOISE * file.valve.stroke_m,
-                pressure_noise_pa=identification.pressure_noise_pa,
+                noise_std_m=identification.noise_std_m,
+                pressure_noise_std_pa=identification.pressure_noise_std_pa,
                 window_s=identification.window_s,
                 minimum_window_s=identification.minimum_window_s,
-                derivative_samples=identification.derivative_samples,
+                derivative_window_s=identification.derivative_window_s,
             ),
-            applied=_commissioned(file.law) if file.law else nothing_applied(),
+            applied=Applied(_ratios(file.law) if file.law else None),
         )
 
     def safe_pa(self, action: ActionName, held_pa: float) -> float:
@@ -63,10 +58,5 @@ class Settings:
         return {"hold": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa}[action]
 
 
-def _commissioned(law: Law) -> Applied:
-    """Return the ratios that a daemon file keeps from an earlier identification."""
-    return replace(
-        nothing_applied(),
-        b_over_c=Estimate(law.b_over_c_pa_per_m, nan, Reason.VALID),
-        k_over_c=Estimate(law.k_over_c_pa, nan, Reason.VALID),
-    )
+def _ratios(law: Law) -> Ratios:
+    return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa)

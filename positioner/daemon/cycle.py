@@ -69,7 +69,7 @@ class Cycle:
 
 
 def _told(decision: Decision) -> tuple[object, ...]:
-    return decision.state, decision.mode, decision.fault, decision.why, decision.adoption
+    return decision.state, decision.mode, decision.fault, decision.why, decision.applied
 
 
 def _tell(decision: Decision) -> None:
@@ -82,8 +82,8 @@ def _tell(decision: Decision) -> None:
         fault=decision.fault.name,
         why=decision.why.name,
         command_pa=decision.command_pa,
-        identifications=decision.adoption.applied.accepted,
-        refusal=decision.adoption.refusal.name,
+        identifications=decision.applied.count,
+        refusal=decision.applied.refused.name,
     )
 
 

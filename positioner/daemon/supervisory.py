@@ -232,11 +232,11 @@ def _estimate_getters() -> dict[str, Getter]:
     getters: dict[str, Getter] = {
         "progress": lambda s, _: s.decision.estimates.progress,
         "estimate_age": lambda s, _: s.sample.time_s - s.decision.estimates.time_s,
-        "b_over_c_applied": lambda s, _: s.decision.adoption.applied.b_over_c.value,
-        "k_over_c_applied": lambda s, _: s.decision.adoption.applied.k_over_c.value,
-        "identifications": lambda s, _: s.decision.adoption.applied.accepted & 0xFFFF,
-        "refusals": lambda s, _: s.decision.adoption.refusals & 0xFFFF,
-        "refusal": lambda s, _: s.decision.adoption.refusal,
+        "b_over_c_applied": lambda s, _: r.b_over_c if (r := s.decision.applied.ratios) else math.nan,
+        "k_over_c_applied": lambda s, _: r.k_over_c if (r := s.decision.applied.ratios) else math.nan,
+        "identifications": lambda s, _: s.decision.applied.count & 0xFFFF,
+        "refusals": lambda s, _: s.decision.applied.refusals & 0xFFFF,
+        "refusal": lambda s, _: s.decision.applied.refused,
     }
     for name in ESTIMATED:
         getters |= _estimate_getters_of(name)

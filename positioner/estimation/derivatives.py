@@ -28,7 +28,7 @@ import numpy as np
 from positioner.estimation.identifier import Array
 
 EVEN = 1e-5
-"""Steps that differ by less than this share of the step count as even."""
+"""Steps whose differences from their mean have a norm below this share of it count as even."""
 
 SHORTEST = 6
 """Least number of samples in a window: two more than the cubic has coefficients."""
@@ -48,21 +48,20 @@ def weights(time_s: Array) -> Array:
     s += 1.0  # -1 .. 1, now at 1
     np.multiply(s, s, out=powers[2])
     np.multiply(powers[2], s, out=powers[3])
-    moments = powers.dot(powers.T)[[0, 0, 0, 0, 1, 2, 3], [0, 1, 2, 3, 3, 3, 3]]
-    coefficients = np.array(_coefficients(moments.tolist()))
+    coefficients = np.array(_coefficients(powers.dot(powers.T).tolist()))
     coefficients /= half
     coefficients[1] /= half
     return np.asarray(coefficients.dot(powers))
 
 
-def _coefficients(moments: list[float]) -> list[list[float]]:
-    """Return the coefficients of the kernels in powers of s from the sums of s^0 .. s^6 over the grid.
+def _coefficients(moments: list[list[float]]) -> list[list[float]]:
+    """Return the coefficients of the kernels in powers of s from the sums M over the grid.
 
     The conditions are M c = e, M_ij = Σ s^(i + j) and e_i the derivative of s^i at s = 1. One factorisation
     M = L D L' of the cubic's M serves all: its leading blocks are the parabola's and the line's. Written out, for
     speed.
     """
-    s0, s1, s2, s3, s4, s5, s6 = moments
+    (s0, s1, s2, s3), (*_, s4), (*_, s5), (*_, s6) = moments
     l10, l20, l30 = s1 / s0, s2 / s0, s3 / s0
     d1 = s2 - l10 * s1
     l21, l31 = (s3 - l20 * s1) / d1, (s4 - l30 * s1) / d1
@@ -98,7 +97,8 @@ class Derivatives:
         steps = time_s[1:] - time_s[:-1]
         step = float(time_s[-1] - time_s[0]) / len(steps)
         tolerance = EVEN * step
-        even = steps.max() - steps.min() < tolerance
+        steps -= step
+        even = steps.dot(steps) < tolerance * tolerance
         if not (even and self._count == len(time_s) and abs(step - self._step) < tolerance):
             self._count, self._step = (len(time_s), step) if even else (0, 0.0)
             self.weights = weights(time_s)

@@ -2,8 +2,8 @@
 
     T p' = u - p
 
-T time constant, s; u entering pressure, p leaving pressure, Pa. Over a step h in which u goes straight from u_0 to u_1, with
-r = (u_1 - u_0) / h, exactly: p_1 = u_1 - r T + (p_0 - u_0 + r T) exp(-h / T).
+T time constant, s; u entering pressure, p leaving pressure, Pa. Over a step h in which u goes straight from u_0 to u_1,
+with r = (u_1 - u_0) / h, exactly: p_1 = u_1 - r T + (p_0 - u_0 + r T) exp(-h / T).
 """
 
 from math import exp

@@ -2,9 +2,10 @@
 
     stuck:  F_e(x) = F_h + k_p (x - x_h)        (x_h, F_h) where the stem was when it stuck
 
-k_p presliding stiffness, N/m; F_e external force, N. The balance is quasi-static: a change dp of the pressure moves the stuck stem by
-A dp / (k_s + k_p). Break-away is unchanged, |F_e| > F_s; a stem that sticks does not jump, since F_h is the force found there.
-The creep is not counted as velocity. Each step solves the balance by Newton's method from the last one.
+k_p presliding stiffness, N/m; F_e external force, N. The balance is quasi-static: a change dp of the pressure moves the
+stuck stem by A dp / (k_s + k_p). Break-away is unchanged, |F_e| > F_s; a stem that sticks does not jump, since F_h is
+the force found there. The creep is not counted as velocity. Each step solves the balance by Newton's method from the
+last one.
 """
 
 from typing import Annotated, NamedTuple
@@ -13,6 +14,7 @@ from sim.effect import Memory, Parameter
 
 MEMORY = 2
 HELD, BALANCED_N = 0, 1
+"""Whether the packing holds the stem, and the force it balances, F_h + k_p (x - x_h)."""
 
 
 class Parameters(NamedTuple):
@@ -21,15 +23,13 @@ class Parameters(NamedTuple):
     stiffness_n_per_m: Annotated[float, Parameter("presliding stiffness", 1e5, 1e10)]
 
 
-def start(z: Memory) -> None:
-    """Not yet held: the first step at rest finds the force."""
-    z[HELD] = 0.0
-    z[BALANCED_N] = 0.0
+def start(F_e: float, z: Memory) -> None:
+    """Held as it stands."""
+    z[HELD] = 1.0
+    z[BALANCED_N] = F_e
 
 
-def motion(
-    F_e: float, stiffness: float, x: float, v: float, q: Parameters, z: Memory
-) -> tuple[float, float]:
+def motion(F_e: float, stiffness: float, x: float, v: float, q: Parameters, z: Memory) -> tuple[float, float]:
     """Move the stuck stem to where its packing balances F_e."""
     if v != 0.0:
         z[HELD] = 0.0

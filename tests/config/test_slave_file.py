@@ -50,5 +50,5 @@ def test_a_valve_beside_the_file_or_a_shipped_one(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("")
     assert valve_path(SlaveFile(valve="mine.toml"), path) == tmp_path / "mine.toml"
     assert valve_path(SlaveFile(), path).name == "seed.toml"
-    with pytest.raises(InputError, match="no file 'other.toml' beside it"):
+    with pytest.raises(InputError, match=r"no file 'other.toml' beside it"):
         valve_path(SlaveFile(valve="other.toml"), path)

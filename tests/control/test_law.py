@@ -2,7 +2,8 @@
 
 import pytest
 
-from positioner.control.law import Ratios, balance_pa
+from positioner.control.law import balance_pa
+from positioner.estimation.applied import Ratios
 
 A, K_S, F_C = 0.0645, 52538.0, 1423.4
 SEED = Ratios(b_over_c=-K_S / A, k_over_c=-F_C / A)

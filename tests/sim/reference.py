@@ -31,7 +31,7 @@ class Reference:
     sigma: float = 0.0
     changes: list[tuple[float, str]] = field(default_factory=list)
 
-    def solve(self, times: Series) -> Series:
+    def solve(self, times: npt.NDArray[np.floating]) -> Series:
         """Return x at the times, from the first break to the last."""
         x = np.full(times.shape, np.nan)
         x[0] = self.x
@@ -40,7 +40,7 @@ class Reference:
             while t < end:
                 stretch = self._wait if self.mode == "stuck" else self._move
                 wanted = (times > t) & (times <= end)
-                t, at = stretch(pressure, t, end, times[wanted])
+                t, at = stretch(pressure, t, end, times[wanted].astype(np.float64))
                 x[np.flatnonzero(wanted)[: at.size]] = at
         return x
 
@@ -95,6 +95,8 @@ class Reference:
             rate, (t, end), [self.x, self.v], "DOP853", dense_output=True, events=events, rtol=1e-10, atol=1e-14
         )
         assert solution.success, solution.message
+        assert solution.sol is not None
+        assert solution.t_events is not None
         t_next = float(solution.t[-1]) if solution.status == 1 else end
         self.x, self.v = float(solution.y[0, -1]), float(solution.y[1, -1])
         inside = times[times <= t_next]

@@ -12,7 +12,7 @@ from config.device import SIMULATED_MAP, ModbusMap, Place
 from config.modbus_server import RegisterServer
 from config.slave import SlaveFile
 from config.valve import shipped_valve
-from sim.slave.clocks import Lockstep
+from sim.slave.clocks import Lockstep, RealTime
 from sim.slave.device import Device
 from sim.slave.modbus import device_of
 from sim.slave.registers import DeviceRegisters
@@ -133,6 +133,15 @@ def test_registers_between_the_quantities_of_a_foreign_map_read_zero() -> None:
     assert bench.device.command_pa == 50e3
     assert bench.ask(struct.pack(">BHH", 3, 102, 9)) == bytes((3, 18)) + 16 * b"\0" + struct.pack(">H", 5000)
     assert bench.ask(struct.pack(">BHH", 3, 99, 2)) == b"\x83\2"
+
+
+def test_in_real_time_a_read_is_brought_up_to_date() -> None:
+    now_ns = 0
+    device = device_of(SlaveFile(), shipped_valve("seed"))
+    server = RegisterServer(DeviceRegisters(device, RealTime(device, 1000, lambda: now_ns)), "127.0.0.1", 0, 1)
+    now_ns = 7_500_000
+    place = PLACES["sample_counter"]
+    assert server.answer(struct.pack(">BHH", 4, place.address, 2), "test") == struct.pack(">BBI", 4, 4, 7)
 
 
 @pytest.fixture

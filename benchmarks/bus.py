@@ -1,0 +1,122 @@
+"""One cycle over Modbus TCP: what the driver adds to the bare client, and one client to another.
+
+All talk to the same simulated slave, a process of its own in lockstep, on loopback. Machines are noisy and place
+threads as they like, so the ways take turns cycle by cycle and what counts is the ratio within one run; what the
+driver itself adds is timed inside its own cycles, as all that is not the client's call.
+"""
+
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from unittest import mock
+
+from pymodbus.client import ModbusTcpClient
+from pyModbusTCP.client import ModbusClient
+
+from config.device import SIMULATED_MAP, ModbusTcpDevice
+from drivers.modbus_tcp import ModbusTcpDriver
+
+CYCLES, WARM_UP = 4000, 200
+PUSH_PA = 60e3
+SLAVE = "[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n"
+START = "import sys; from positioner.cli.main import main; sys.exit(main())"
+COMMAND = SIMULATED_MAP.command_pa
+
+
+def report() -> list[str]:
+    """Return lines: median and 99 % of a cycle by each way, its ratio to the bare client, and what the driver adds."""
+    with slave() as port:
+        with ModbusTcpClient("127.0.0.1", port=port) as independent:
+            times = measured(ways(port, independent))
+        added = driver_alone(port)
+    bare = statistics.median(times["pyModbusTCP, function 23"])
+    lines = [f"{'one cycle, back to back':34}{'median us':>10}{'99 % us':>10}{'ratio':>8}"]
+    for name, taken in times.items():
+        middle, late = statistics.median(taken), statistics.quantiles(taken, n=100)[98]
+        lines.append(f"{name:34}{middle:10.1f}{late:10.1f}{middle / bare:8.2f}")
+    late = statistics.quantiles(added, n=100)[98]
+    return [*lines, f"{'added by the driver, exchange()':34}{statistics.median(added):10.1f}{late:10.1f}"]
+
+
+def ways(port: int, independent: ModbusTcpClient) -> dict[str, Callable[[], object]]:
+    """Return one cycle by each way."""
+    words = COMMAND.format.encode(PUSH_PA)
+    count = COMMAND.address
+    library = ModbusClient("127.0.0.1", port, 1, timeout=1.0)
+    driver = ModbusTcpDriver(ModbusTcpDevice(port=port, reply_timeout_s=1.0))
+    driver.open()
+    request = struct.pack(">BHHHHBf", 23, 0, count, COMMAND.address, 2, 4, PUSH_PA)
+
+    def two_transactions() -> object:
+        driver.write(PUSH_PA)
+        return driver.read()
+
+    return {
+        "pymodbus, function 23": lambda: independent.readwrite_registers(
+            read_address=0, read_count=count, write_address=COMMAND.address, values=words
+        ),
+        "pyModbusTCP, function 23": lambda: library.write_read_multiple_registers(COMMAND.address, words, 0, count),
+        "pyModbusTCP, ready-made request": lambda: library.custom_request(request),
+        "driver, exchange()": lambda: driver.exchange(PUSH_PA),
+        "driver, write() and read()": two_transactions,
+    }
+
+
+def measured(cycles: dict[str, Callable[[], object]]) -> dict[str, list[float]]:
+    """Return the times taken by each, in us, cycle by cycle in turn."""
+    times: dict[str, list[float]] = {name: [] for name in cycles}
+    for _ in range(WARM_UP + CYCLES):
+        for name, cycle in cycles.items():
+            start_ns = time.perf_counter_ns()
+            cycle()
+            times[name].append((time.perf_counter_ns() - start_ns) / 1e3)
+    return {name: taken[WARM_UP:] for name, taken in times.items()}
+
+
+def driver_alone(port: int) -> list[float]:
+    """Return the time of each exchange that is not the client's call, in us."""
+    inside_ns = 0
+    ask = ModbusClient.custom_request
+
+    def timed(client: ModbusClient, pdu: bytes) -> object:
+        nonlocal inside_ns
+        start_ns = time.perf_counter_ns()
+        reply = ask(client, pdu)
+        inside_ns = time.perf_counter_ns() - start_ns
+        return reply
+
+    with mock.patch.object(ModbusClient, "custom_request", timed):
+        driver = ModbusTcpDriver(ModbusTcpDevice(port=port, reply_timeout_s=1.0))
+        driver.open()
+        added = []
+        for _ in range(WARM_UP + CYCLES):
+            start_ns = time.perf_counter_ns()
+            driver.exchange(PUSH_PA)
+            added.append((time.perf_counter_ns() - start_ns - inside_ns) / 1e3)
+        driver.close()
+    return added[WARM_UP:]
+
+
+@contextmanager
+def slave() -> Iterator[int]:
+    """Run a simulated slave in lockstep; give its port."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "slave.toml")
+        file.write_text(SLAVE)
+        command = [sys.executable, "-c", START, "sim", str(file), "--port", "0"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            try:
+                assert process.stdout is not None
+                yield int(process.stdout.readline().rsplit(":", 1)[1])
+            finally:
+                process.terminate()
+
+
+if __name__ == "__main__":
+    print("\n".join(report()))

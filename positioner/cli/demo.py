@@ -1,0 +1,340 @@
+"""`positioner demo`: a sticking valve identified and controlled over a real bus, in under a minute.
+
+A simulated slave and the daemon run as processes of their own; this command plays the DCS over Modbus TCP: start,
+identification, steps up and down, ageing of the packing by 30 %, the same steps once more, identification anew, and
+the steps again. What the daemon identified is held against the truth here, where it is known; the daemon never
+sees it.
+"""
+
+import argparse
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from config.valve import ValveParameters
+    from positioner.dcs import Dcs
+
+HELP = "identify and control a simulated sticking valve over a real bus, as processes, in under a minute"
+EXAMPLE = "positioner demo --out demo-out"
+
+PSI = 6894.757
+ALPHA_PA, BETA_PA = 6.4 * PSI, 1.92 * PSI
+"""The seed's excitation."""
+AGED_ALPHA_PA = 11.5 * PSI
+"""Enough for the aged packing to break away from where the stem is then."""
+AGEING = 1.3
+AGES_AT_S = 14.0
+PERIOD_S = 1e-3
+NOISE_PU = 1e-4
+STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
+"""This valve's spring has no preload: without pressure it pulls the stem down only to F_c / k_s, 0.27 to 0.35 p.u."""
+STEP_S = 1.0
+SETTLED_S = 0.2
+"""The error of a step is the mean over this last part of it."""
+LARGEST_ERROR_PU = 0.01
+LARGEST_RATIO_ERROR = 0.01
+RATIOS = ("b_over_c", "k_over_c")
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of the reference and where the stem came to rest."""
+
+    phase: str
+    reference_pu: float
+    error_pu: float
+    counted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """One number of one identification, against the truth."""
+
+    phase: str
+    name: str
+    value: float
+    std: float
+    true: float
+    refusal: str
+
+    @property
+    def deviation(self) -> float | None:
+        """Relative deviation from the truth; None without a value."""
+        return self.value / self.true - 1 if math.isfinite(self.value) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What the demo saw."""
+
+    steps: list[Step]
+    identified: list[Identified]
+    cycle: dict[str, float]
+
+    @property
+    def problems(self) -> list[str]:
+        """What does not hold."""
+        return [
+            f"step to {step.reference_pu:g} p.u. ({step.phase}) ended {step.error_pu:+.4f} p.u. off"
+            for step in self.steps
+            if step.counted and not abs(step.error_pu) <= LARGEST_ERROR_PU
+        ] + [
+            f"{each.name} ({each.phase}): {_percent(each.deviation)} off the truth"
+            for each in self.identified
+            if each.name in RATIOS and (each.deviation is None or abs(each.deviation) > LARGEST_RATIO_ERROR)
+        ]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("--bus", choices=("modbus",), default="modbus", help="the fieldbus (modbus)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="keep picture, recording, configs and logs there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the outcome there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
+    import json
+
+    from config.valve import load_valve, shipped_valve
+    from positioner.cli.children import port_in, running
+
+    valve = load_valve(shipped_valve("seed")).valve
+    with _folder(arguments.out) as folder:
+        started_s = time.monotonic()
+        _say("starting a simulated valve and the daemon")
+        slave_path = _write(folder / "slave.toml", _slave_toml(valve))
+        with running("sim", slave_path, "--port", "0") as slave:
+            powered_s = time.monotonic()
+            daemon_path = _write(folder / "daemon.toml", _daemon_toml(valve, port_in(slave)))
+            with running("run", daemon_path) as daemon:
+                _say(f"slave {slave}; daemon {daemon}")
+                outcome = _play(port_in(daemon), valve, powered_s)
+        _report(outcome)
+        picture = _picture(folder, outcome)
+        if arguments.out:
+            _say(f"picture {picture}, recording {_recording(folder)}")
+        if arguments.json:
+            arguments.json.write_text(json.dumps(_jsonable(outcome, time.monotonic() - started_s), indent=1) + "\n")
+        for problem in outcome.problems:
+            print(f"DOES NOT HOLD: {problem}")
+        print(f"{'all holds' if not outcome.problems else 'failed'}, {time.monotonic() - started_s:.0f} s")
+    return 1 if outcome.problems else 0
+
+
+@contextmanager
+def _folder(asked: Path | None) -> Iterator[Path]:
+    """Give the folder to work in: the one asked for, or one that goes away."""
+    import tempfile
+
+    from config.errors import InputError
+
+    if asked is None:
+        with tempfile.TemporaryDirectory() as name:
+            yield Path(name)
+        return
+    try:
+        asked.mkdir(parents=True, exist_ok=True)
+        for old in (asked / "recordings").glob("*.csv"):
+            old.unlink()
+    except OSError as error:
+        raise InputError(f"--out {asked}", f"cannot be written: {error.strerror}") from None
+    yield asked
+
+
+def _slave_toml(valve: "ValveParameters") -> str:
+    return f"""# The simulated valve of the demo; its packing ages {AGES_AT_S:g} s after power-up.
+valve = "seed"
+[clock]
+period_s = {PERIOD_S}
+[sensor]
+noise_std_m = {NOISE_PU * valve.stroke_m}
+seed = 1
+[[change]]
+at_s = {AGES_AT_S}
+coulomb_n = {AGEING * valve.coulomb_n}
+static_n = {AGEING * valve.static_n}
+"""
+
+
+def _daemon_toml(valve: "ValveParameters", port: int) -> str:
+    return f"""# The daemon of the demo. It knows the stroke; all else it identifies.
+[valve]
+name = "demo"
+stroke_m = {valve.stroke_m}
+[device]
+port = {port}
+[cycle]
+period_s = {PERIOD_S}
+[supervisory]
+port = 0
+[recorder]
+folder = "recordings"
+"""
+
+
+def _write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def _play(port: int, valve: "ValveParameters", powered_s: float) -> Outcome:
+    """Be the DCS."""
+    from config.registers import STATISTICS
+    from positioner.dcs import Dcs
+
+    aged = valve.model_copy(update={"coulomb_n": AGEING * valve.coulomb_n, "static_n": AGEING * valve.static_n})
+    with Dcs("127.0.0.1", port) as dcs:
+        _watch(dcs, 0.5, "S0, nothing moves")
+        dcs.set("mode", 2)
+        identified = _identify(dcs, "new", ALPHA_PA, valve)
+        steps = _steps(dcs, "new", counted=True)
+        _watch(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
+        steps += _steps(dcs, "aged", counted=False)
+        identified += _identify(dcs, "aged", AGED_ALPHA_PA, aged)
+        steps += _steps(dcs, "identified anew", counted=True)
+        cycle = dcs.get_all(*(register.name for register in STATISTICS))
+    return Outcome(steps, identified, cycle)
+
+
+def _identify(dcs: "Dcs", phase: str, alpha_pa: float, truth: "ValveParameters") -> list[Identified]:
+    def show(progress: float) -> None:
+        _live(f"identifying ({phase}): {100 * progress:3.0f} %")
+
+    problem = dcs.identify({"alpha": alpha_pa, "beta": BETA_PA, "omega": 1.0}, 5.0, show)
+    _say(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
+    return [_held_against(dcs, phase, name, true) for name, true in _truth(truth).items()]
+
+
+def _truth(valve: "ValveParameters") -> dict[str, float]:
+    m, A = valve.mass_kg, valve.diaphragm_area_m2
+    return {
+        "a": -valve.viscous_ns_per_m / m,
+        "b": -valve.spring_n_per_m / m,
+        "c": A / m,
+        "k": -valve.coulomb_n / m,
+        "b_over_c": -valve.spring_n_per_m / A,
+        "k_over_c": -valve.coulomb_n / A,
+    }
+
+
+def _held_against(dcs: "Dcs", phase: str, name: str, true: float) -> Identified:
+    from positioner.estimation.estimate import Reason
+
+    now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
+    reason = Reason(int(now[f"{name}_reason"]))
+    refusal = "" if reason is Reason.VALID else reason.text
+    return Identified(phase, name, now[f"{name}_e"], now[f"{name}_std"], true, refusal)
+
+
+def _steps(dcs: "Dcs", phase: str, *, counted: bool) -> list[Step]:
+    steps = []
+    for reference_pu in STEPS:
+        dcs.set("reference", reference_pu)
+        label = f"{phase}: step to {reference_pu:g} p.u."
+        _watch(dcs, STEP_S - SETTLED_S, label)
+        settled_pu = _watch(dcs, SETTLED_S, label)
+        steps.append(Step(phase, reference_pu, settled_pu - reference_pu, counted))
+    _say(f"{phase}: {len(steps)} steps, worst {max(abs(step.error_pu) for step in steps):.4f} p.u.")
+    return steps
+
+
+def _watch(dcs: "Dcs", duration_s: float, label: str) -> float:
+    """Look on for a while; return the mean position, p.u."""
+    end_s = time.monotonic() + duration_s
+    positions = []
+    while True:
+        now = dcs.get_all("state", "position", "reference_in_force", "command")
+        positions.append(now["position"])
+        _live(f"{label:36} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa")
+        if time.monotonic() >= end_s:
+            return sum(positions) / len(positions)
+        time.sleep(0.02)
+
+
+def _bar(now: dict[str, float], width: int = 30) -> str:
+    """Draw stem (#) and reference (|) over the travel."""
+    stem = round(min(max(now["position"], 0.0), 1.0) * width)
+    cells = ["#"] * stem + ["."] * (width - stem)
+    cells[min(round(now["reference_in_force"] * width), width - 1)] = "|"
+    return f"[{''.join(cells)}] {now['position']:.3f}"
+
+
+def _live(text: str) -> None:
+    """Show a passing line on a terminal."""
+    import sys
+
+    if sys.stdout.isatty():
+        print(f"\r\033[K{text}", end="", flush=True)
+
+
+def _say(text: str) -> None:
+    """Print a line that stays."""
+    _live("")
+    print(text, flush=True)
+
+
+def _percent(share: float | None) -> str:
+    return "none" if share is None else f"{100 * share:+.2f} %"
+
+
+def _report(outcome: Outcome) -> None:
+    print(f"\n{'':17}{'':10}{'identified':>13}{'std':>11}{'true':>13}{'deviation':>12}")
+    for each in outcome.identified:
+        print(
+            f"{each.phase:17}{each.name:10}{each.value:13.6g}{each.std:11.2g}{each.true:13.6g}"
+            f"{_percent(each.deviation):>12}{'  refused' if each.refusal else ''}"
+        )
+    for refusal in dict.fromkeys(each.refusal for each in outcome.identified if each.refusal):
+        names = [each.name for each in outcome.identified if each.refusal == refusal]
+        print(f"  refused ({', '.join(dict.fromkeys(names))}): {refusal}")
+    print(f"\n{'':17}{'reference':>10}{'final error, p.u.':>20}")
+    for step in outcome.steps:
+        limit = f"  (limit {LARGEST_ERROR_PU:g})" if step.counted else "  (not counted: the packing has aged)"
+        print(f"{step.phase:17}{step.reference_pu:10.2f}{step.error_pu:+20.5f}{limit}")
+    cycle = outcome.cycle
+    print(
+        f"\ncycle: {cycle['cycles']:.0f} run, median period {1e3 * cycle['period']:.3f} ms, "
+        f"99 % within {1e6 * cycle['jitter_99']:.0f} us of it, {1e6 * cycle['cycle_time']:.0f} us each"
+    )
+    counts = ("missed_periods", "lost_samples", "lost_replies", "unrecorded")
+    print(", ".join(f"{name.replace('_', ' ')} {cycle[name]:.0f}" for name in counts))
+
+
+def _jsonable(outcome: Outcome, seconds: float) -> dict[str, object]:
+    return {
+        "steps": [asdict(step) for step in outcome.steps],
+        "identified": [_without_nan({**asdict(each), "deviation": each.deviation}) for each in outcome.identified],
+        "cycle": outcome.cycle,
+        "problems": outcome.problems,
+        "seconds": seconds,
+    }
+
+
+def _without_nan(values: dict[str, object]) -> dict[str, object]:
+    return {name: None if value != value else value for name, value in values.items()}  # noqa: PLR0124 - NaN is not itself
+
+
+def _recording(folder: Path) -> Path:
+    (recording,) = (folder / "recordings").glob("*.csv")
+    return recording
+
+
+def _picture(folder: Path, outcome: Outcome) -> Path:
+    from config.recording import read_recording
+    from config.valve import load_valve, shipped_valve
+    from positioner.cli.picture import draw_run
+
+    path = folder / "run.png"
+    stroke_m = load_valve(shipped_valve("seed")).valve.stroke_m
+    errors = ", ".join(
+        f"{phase} {max(abs(step.error_pu) for step in outcome.steps if step.phase == phase):.4f}"
+        for phase in dict.fromkeys(step.phase for step in outcome.steps)
+    )
+    draw_run(path, read_recording(_recording(folder)), stroke_m, f"worst final error, p.u. of stroke: {errors}")
+    return path

@@ -1,0 +1,144 @@
+"""`positioner play`: the closed loop in virtual time, as fast as it computes."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from config.daemon import DaemonFile
+    from config.recording import Column, Recording
+    from config.slave import SlaveFile
+    from config.valve import ValveParameters
+    from positioner.cli.virtual import Script
+    from positioner.control.requests import Requests
+    from positioner.daemon.snapshot import Snapshot
+
+HELP = "closed loop in virtual time: identify first, then follow a reference"
+EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.csv"
+
+IDENTIFY_S = 1.5
+"""Time given to the identification before the reference begins."""
+HAIR_S = 1e-9
+"""What a sum of periods may fall short of a time by rounding."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
+    parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
+    parser.add_argument("--law", choices=("seed",), default="seed", help="the control law (seed)")
+    parser.add_argument("--period-s", type=float, default=1e-3, help="period of the loop (1e-3)")
+    parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
+    parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Play and write the recording; its time is the reference's, identification lies before it."""
+    from config.errors import Unfulfilled
+    from config.recording import write_recording
+    from config.valve import find_valve, load_valve
+    from positioner.cli.series import read_series
+    from positioner.cli.virtual import played, virtual_cycle
+
+    path = find_valve(arguments.valve)
+    valve = load_valve(path).valve
+    time_s, reference_m = read_series(arguments.reference, "reference_m")
+    _require_travel(arguments.reference, reference_m, valve.stroke_m)
+    daemon, slave = _files(arguments, valve)
+    cycle = virtual_cycle(daemon, slave, path, _first_requests(valve))
+    script = _script(time_s, reference_m)
+    until_s = IDENTIFY_S + float(time_s[-1] - time_s[0])
+    snapshots = list(played(cycle, script, until_s))
+    write_recording(arguments.out, _recording(snapshots, float(time_s[0]) - IDENTIFY_S, valve.name))
+    last = snapshots[-1].decision
+    ratios = last.applied.ratios
+    if ratios is None:
+        raise Unfulfilled(f"{arguments.valve}: not identified, so not controlled: {last.applied.refused.text}")
+    print(f"identified b/c = {ratios.b_over_c:.6g} Pa/m, k/c = {ratios.k_over_c:.6g} Pa")
+    print(f"{arguments.out}: {len(snapshots)} samples")
+    return 0
+
+
+def _require_travel(path: Path, reference_m: "Column", stroke_m: float) -> None:
+    from config.errors import InputError
+
+    wrong = (reference_m < 0) | (reference_m > stroke_m)
+    if wrong.any():
+        value = reference_m[int(wrong.argmax())]
+        raise InputError(str(path), f"reference_m: {value:g} m is outside the travel, allowed is 0 to {stroke_m:g} m")
+
+
+def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["DaemonFile", "SlaveFile"]:
+    """Return the files that a daemon and a slave would be given for this loop."""
+    from config.daemon import DaemonFile
+    from config.loading import validated
+    from config.slave import SlaveFile
+
+    most_pa = max(420e3, 1.5 * (valve.static_n + valve.spring_n_per_m * valve.stroke_m) / valve.diaphragm_area_m2)
+    daemon = {
+        "valve": {"name": valve.name, "stroke_m": valve.stroke_m},
+        "cycle": {"pace": "device", "period_s": arguments.period_s},
+        "pressure": {"maximum_pa": most_pa},
+    }
+    slave = {
+        "clock": {"mode": "lockstep", "period_s": arguments.period_s},
+        "sensor": {"noise_std_m": arguments.noise_m, "seed": arguments.seed},
+        "supply": {"maximum_pa": most_pa},
+    }
+    return (
+        validated(DaemonFile, daemon, "--period-s"),
+        validated(SlaveFile, slave, "--period-s, --noise-m, --seed"),
+    )
+
+
+def _first_requests(valve: "ValveParameters") -> "Requests":
+    """Return what an engineer who knows the valve's data sheet asks for: an excitation of a third of the travel."""
+    from config.registers import Mode
+    from positioner.control.requests import Requests
+
+    travel_pa = valve.spring_n_per_m * valve.stroke_m / valve.diaphragm_area_m2
+    return Requests(
+        mode=Mode.AUTOMATIC,
+        mode_writes=1,
+        alpha_pa=valve.static_n / valve.diaphragm_area_m2 + 0.2 * travel_pa,
+        beta_pa=0.15 * travel_pa,
+    )
+
+
+def _script(time_s: "Column", reference_m: "Column") -> "Script":
+    """Return a DCS that has the valve identified and then writes the reference."""
+    import numpy as np
+
+    from positioner.control.requests import QUIET
+
+    def ask(snapshot: "Snapshot", requests: "Requests") -> "Requests":
+        elapsed_s = snapshot.sample.time_s - IDENTIFY_S + HAIR_S
+        if elapsed_s < 0:
+            identified = snapshot.decision.estimates.progress >= 1
+            return replace(requests, eta=QUIET if identified else (0, 0, 0))
+        wanted_m = float(reference_m[int(np.searchsorted(time_s, time_s[0] + elapsed_s, side="right")) - 1])
+        new = wanted_m != requests.reference_m or not requests.reference_writes
+        return replace(requests, eta=QUIET, reference_m=wanted_m, reference_writes=requests.reference_writes + int(new))
+
+    return ask
+
+
+def _recording(snapshots: list["Snapshot"], start_s: float, name: str) -> "Recording":
+    import numpy as np
+
+    from config.recording import Recording
+
+    columns = {
+        "time_s": [start_s + each.sample.time_s for each in snapshots],
+        "command_pa": [each.decision.command_pa for each in snapshots],
+        "position_m": [each.sample.position_m for each in snapshots],
+        "pressure_pa": [each.sample.pressure_pa for each in snapshots],
+        "reference_m": [each.decision.reference_m for each in snapshots],
+        "state": [each.decision.state for each in snapshots],
+    }
+    return Recording(
+        {column: np.array(values, dtype=np.float64) for column, values in columns.items()},
+        {"valve": name, "source": "positioner play"},
+    )

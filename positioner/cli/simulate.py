@@ -1,0 +1,54 @@
+"""`positioner simulate`: an open-loop recording from the model, no bus."""
+
+import argparse
+from pathlib import Path
+
+HELP = "record the model's answer to a series of pressures, open loop, without a bus"
+EXAMPLE = "positioner simulate seed.toml --input pressure.csv --noise-m 1e-5 -o answer.csv"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
+    parser.add_argument(
+        "--input",
+        type=Path,
+        required=True,
+        metavar="PRESSURE.csv",
+        help="time_s, command_pa: each pressure holds until the next time",
+    )
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
+    parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
+    parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate from rest at position 0 without pressure, and write the recording."""
+    import numpy as np
+
+    from config.loading import validated
+    from config.recording import Recording, write_recording
+    from config.slave import Sensor
+    from config.valve import find_valve, load_valve
+    from positioner.cli.series import read_series
+    from sim.sensor import Transmitter
+    from sim.valve import Valve
+
+    path = find_valve(arguments.valve)
+    file = load_valve(path)
+    sensor = validated(Sensor, {"noise_std_m": arguments.noise_m, "seed": arguments.seed}, "--noise-m, --seed")
+    time_s, command_pa = read_series(arguments.input, "command_pa")
+    response = Valve.from_file(file, source=str(path)).run(command_pa[:-1], np.diff(time_s))
+    transmitter = Transmitter(sensor)
+    recording = Recording(
+        {
+            "time_s": time_s,
+            "command_pa": command_pa,
+            "position_m": np.array([transmitter.measure(position_m) for position_m in response.indicated_m]),
+            "pressure_pa": response.pressure_pa,
+        },
+        {"valve": file.valve.name, "source": "positioner simulate"},
+    )
+    write_recording(arguments.out, recording)
+    print(f"{arguments.out}: {len(recording)} samples, {time_s[-1] - time_s[0]:g} s")
+    return 0

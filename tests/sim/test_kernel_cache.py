@@ -1,0 +1,88 @@
+"""A kernel is compiled once for all processes, and never taken for another."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from sim import compiled
+from sim.composition import Composition
+from sim.effect import SHIPPED, read_effect
+from sim.valve import Valve
+
+SEED = load_valve(shipped_valve("seed"))
+ASYMMETRIC = ValveFile(
+    valve=SEED.valve,
+    effect=(EffectTable.model_validate({"name": "asymmetric_friction", "asymmetry": 0.2}),),
+)
+PROBE = """
+from config.valve import load_valve, shipped_valve
+from sim.composition import Composition
+from sim.valve import Valve
+
+composition = Composition.from_file(load_valve(shipped_valve("seed")))
+valve = Valve(composition)
+valve.advance(60e3, 0.02)
+stats = composition.kernel.respond.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), valve.position_m.hex())
+"""
+
+
+def probe(cache_home: Path) -> list[str]:
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache_home)}
+    return subprocess.run(
+        [sys.executable, "-c", PROBE], env=environment, check=True, capture_output=True, text=True
+    ).stdout.split()
+
+
+def test_a_second_process_takes_the_first_one_s_kernel(tmp_path: Path) -> None:
+    hits, misses, position = probe(tmp_path)
+    assert (hits, misses) == ("0", "1")
+    assert probe(tmp_path) == ["1", "0", position]
+
+
+def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:
+    path = tmp_path / "asymmetric_friction.py"
+    text = (SHIPPED / path.name).read_text()
+
+    def moves() -> bool:
+        composition = Composition.of(ASYMMETRIC, [read_effect(path)])
+        digests.append(composition.kernel.digest)
+        valve = Valve(composition)
+        valve.advance(SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
+        return valve.position_m > 0.0
+
+    digests: list[str] = []
+    path.write_text(text)
+    assert not moves(), "opening is the harder direction"
+    path.write_text(text.replace("1.0 + q.asymmetry", "1.0 - q.asymmetry"))
+    assert moves(), "opening is the easier direction now"
+    assert digests[0] != digests[1]
+    assert digests[0] == Composition.from_file(ASYMMETRIC).kernel.digest, "the same text is the same kernel"
+
+
+def test_edited_physics_is_another_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = Composition.from_file(SEED).kernel.digest
+    edited = tmp_path / "karnopp.py"
+    edited.write_text(compiled.BASE.read_text().replace("direction * F_e - F_s", "direction * F_e - 2.0 * F_s"))
+    monkeypatch.setattr(compiled, "BASE", edited)
+    composition = Composition.from_file(SEED)
+    valve = Valve(composition)
+    valve.advance(1.9 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
+    assert composition.kernel.digest != before
+    assert valve.position_m == 0.0
+
+
+def test_without_a_writable_cache_the_text_lies_in_a_private_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "home"
+    home.write_text("no folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home))
+    path = compiled.written("digest", "text")
+    assert path.read_text() == "text"
+    assert not path.is_relative_to(tmp_path)
+    assert path.parent.stat().st_mode & 0o077 == 0
