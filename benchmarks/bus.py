@@ -25,7 +25,6 @@ from drivers.modbus_tcp import ModbusTcpDriver
 CYCLES, WARM_UP = 4000, 200
 PUSH_PA = 60e3
 SLAVE = "[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n"
-START = "import sys; from positioner.cli.main import main; sys.exit(main())"
 COMMAND = SIMULATED_MAP.command_pa
 
 
@@ -109,7 +108,7 @@ def slave() -> Iterator[int]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "slave.toml")
         file.write_text(SLAVE)
-        command = [sys.executable, "-c", START, "sim", str(file), "--port", "0"]
+        command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--port", "0"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             try:
                 assert process.stdout is not None

@@ -161,10 +161,10 @@ def test_covariance_is_that_of_the_scatter(noise_m: float, noise_pa: float) -> N
     assert np.std(ratios) == pytest.approx(np.sqrt(gradient @ solution.covariance @ gradient), rel=0.3)
 
 
-def test_covariance_where_viscous_friction_leads_on_an_uneven_grid_of_half_a_window() -> None:
-    a, b, c = -4.0, -3.0, 5.0
+def test_covariance_where_viscous_friction_leads_on_an_uneven_grid_of_a_quarter_window() -> None:
+    a, b, c = -60.0, -30.0, 50.0
     rng = np.random.default_rng(9)
-    t = np.sort(rng.uniform(0, 1.0, 400))
+    t = np.sort(rng.uniform(0, 1.0, 1500))
     u = rng.normal(size=21)[np.minimum((t * 20).astype(int), 20)]
     x, v, positions = 0.0, 0.0, [0.0]
     for h, force in zip(np.diff(t).tolist(), u[1:].tolist(), strict=True):
@@ -172,17 +172,18 @@ def test_covariance_where_viscous_friction_leads_on_an_uneven_grid_of_half_a_win
         x, v = (step[:2] @ (x, v, 1.0)).tolist()
         positions.append(x)
     noise = 1e-6
-    thetas = []
-    for _ in range(200):
-        identifier = Identifier(2.0, 1.0, 1.0)
+    thetas, stds = [], []
+    for _ in range(100):
+        identifier = Identifier(4.0, 1.0, 1.0)
         noisy = np.array(positions) + rng.normal(0, noise, len(t))
         for sample in zip(t.tolist(), noisy.tolist(), u.tolist(), strict=True):
             identifier.update(*sample)
         solution = identifier.solve(noise)
         assert solution is not None
         thetas.append(solution.theta)
-    np.testing.assert_allclose(np.mean(thetas, axis=0), [a, b, c], rtol=1e-2)
-    np.testing.assert_allclose(np.std(thetas, axis=0), np.sqrt(np.diag(solution.covariance)), rtol=0.2)
+        stds.append(np.sqrt(np.diag(solution.covariance)))
+    np.testing.assert_allclose(np.mean(thetas, axis=0), [a, b, c], rtol=0.05)  # x is not linear over the longest gaps
+    np.testing.assert_allclose(np.std(thetas, axis=0), np.mean(stds, axis=0), rtol=0.2)
 
 
 def test_bias_is_that_of_the_mean() -> None:

@@ -21,10 +21,8 @@ ENDED_WELL = (0, "", "")
 
 
 def start(config: Path, *options: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", "import sys; from positioner.cli.main import main; sys.exit(main())"]
-    return subprocess.Popen(
-        [*command, "sim", str(config), *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-m", "positioner.cli", "sim", str(config), *options]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 @contextmanager

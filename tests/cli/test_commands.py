@@ -1,0 +1,171 @@
+"""The commands as a person meets them: help, bad input as one line, exit status."""
+
+import csv
+import io
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import read_recording
+from config.registers import REGISTERS
+from positioner.cli.main import COMMANDS, main
+
+Capture = pytest.CaptureFixture[str]
+DAEMON = "[valve]\nstroke_m = 0.1016\n[device]\nport = {port}\n[supervisory]\nport = 0\n"
+
+
+@pytest.fixture
+def free_port() -> Iterator[int]:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        yield listener.getsockname()[1]
+
+
+def one_line(capture: Capture) -> str:
+    out, err = capture.readouterr()
+    assert not out
+    assert err.count("\n") == 1, err
+    return err.strip()
+
+
+def test_help_names_every_command_and_each_has_an_example() -> None:
+    everything = subprocess.run(
+        [sys.executable, "-m", "positioner.cli", "--help"], capture_output=True, text=True, check=True
+    ).stdout
+    assert all(f"\n  {name}" in everything for name in COMMANDS) or all(name in everything for name in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_each_command_ends_with_an_example(command: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([command, "--help"])
+    assert caught.value.code == 0
+    assert f"example: positioner {command}" in " ".join(capsys.readouterr().out.split())
+
+
+def test_help_needs_nothing_but_the_standard_library() -> None:
+    """Instant help, and a gateway without the model side still has it."""
+    loaded = subprocess.run(
+        [sys.executable, "-c", "import sys; from positioner.cli.main import _parser; _parser(); print(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    assert not {"numpy", "numba", "pydantic", "pyModbusTCP", "scipy", "sim", "matplotlib"} & set(loaded)
+
+
+def test_a_gateway_without_the_model_side_is_told_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "numba.py").write_text("raise ModuleNotFoundError(\"No module named 'numba'\", name='numba')\n")
+    (tmp_path / "pressure.csv").write_text("time_s,command_pa\n0,0\n1,0\n")
+    words = ["simulate", "seed", "--input", str(tmp_path / "pressure.csv"), "-o", str(tmp_path / "out.csv")]
+    done = subprocess.run(
+        [sys.executable, "-m", "positioner.cli", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
+    assert done.returncode == 2
+    assert "needs numba, which is not installed: pip install 'positioner[sim,plot]'" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "[valve]\nstroke_m = 0.1\nstrok = 1\n",
+            "valve.strok: unknown key; allowed here: breakaway_pa, name, stroke_m",
+        ),
+        ("[valve]\nstroke_m = 0\n", "valve.stroke_m: Input should be greater than 0, got 0"),
+        ("[valve]\n", "valve.stroke_m: is required and missing"),
+        ("[valve\n", "is not valid TOML"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "probe", "doctor"])
+def test_a_wrong_daemon_file_is_one_line(tmp_path: Path, command: str, text: str, said: str, capsys: Capture) -> None:
+    path = tmp_path / "daemon.toml"
+    path.write_text(text)
+    assert main([command, str(path)]) == 2
+    line = one_line(capsys)
+    assert line.startswith(f"positioner {command}: {path}: ")
+    assert said in line
+
+
+def test_a_slave_that_is_not_there_is_one_line(tmp_path: Path, free_port: int, capsys: Capture) -> None:
+    path = tmp_path / "daemon.toml"
+    path.write_text(DAEMON.format(port=free_port))
+    assert main(["run", str(path)]) == 2
+    line = one_line(capsys)
+    assert f"127.0.0.1:{free_port}" in line
+    assert str(path) in line
+
+
+def test_no_daemon_to_talk_to_is_one_line_and_exit_status_1(free_port: int, capsys: Capture) -> None:
+    assert main(["get", "position", "--port", str(free_port)]) == 1
+    assert "no daemon answers there" in one_line(capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["get", "positio"], "positio: no register of that name; allowed: position"),
+        (["set", "reference", "half"], "reference: 'half' is not a number"),
+        (
+            ["simulate", "none", "--input", "x.csv", "-o", "y.csv"],
+            "none: no shipped valve of that name; there are: seed",
+        ),
+    ],
+)
+def test_bad_words_are_one_line_and_exit_status_2(words: list[str], said: str, capsys: Capture) -> None:
+    assert main(words) == 2
+    assert said in one_line(capsys)
+
+
+def test_the_map_is_complete_in_every_format(capsys: Capture) -> None:
+    main(["map", "--format", "json"])
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["name"] for row in rows] == [register.name for register in REGISTERS]
+    assert all(row["address_from_1"] == row["address"] + 1 for row in rows)
+    main(["map", "--format", "csv"])
+    assert len(list(csv.DictReader(io.StringIO(capsys.readouterr().out)))) == len(rows)
+    main(["map"])
+    assert len(capsys.readouterr().out.splitlines()) == len(rows) + 2
+
+
+def test_simulate_holds_each_pressure_until_the_next_time(tmp_path: Path) -> None:
+    """Far above break-away the stem settles where spring and Coulomb friction balance the pressure."""
+    pressure = tmp_path / "pressure.csv"
+    pressure.write_text("time_s,command_pa\n0,50000\n0.5,0\n1,0\n")
+    assert main(["simulate", "seed", "--input", str(pressure), "-o", str(tmp_path / "out.csv")]) == 0
+    recording = read_recording(tmp_path / "out.csv")
+    np.testing.assert_array_equal(recording.time_s, [0, 0.5, 1])
+    up, down = (0.0645 * 50e3 - 1423.4) / 52538, 1423.4 / 52538
+    np.testing.assert_allclose(recording.position_m, [0, up, down], atol=2e-5)
+
+
+def test_play_identifies_and_then_follows(tmp_path: Path, capsys: Capture) -> None:
+    reference = tmp_path / "reference.csv"
+    reference.write_text("time_s,reference_m\n0,0.05\n0.6,0.035\n1.2,0.07\n1.8,0.07\n")
+    words = ["play", "seed", "--reference", str(reference), "--noise-m", "1e-5", "-o", str(tmp_path / "run.csv")]
+    assert main(words) == 0
+    assert "identified b/c = -81" in capsys.readouterr().out
+    recording = read_recording(tmp_path / "run.csv")
+    for end_s, wanted_m in ((0.59, 0.05), (1.19, 0.035), (1.79, 0.07)):
+        at = int(np.searchsorted(recording.time_s, end_s))
+        assert recording.columns["reference_m"][at] == wanted_m
+        assert recording.position_m[at] == pytest.approx(wanted_m, abs=2e-4)
+
+
+def test_play_refuses_a_reference_outside_the_travel(tmp_path: Path, capsys: Capture) -> None:
+    reference = tmp_path / "reference.csv"
+    reference.write_text("time_s,reference_m\n0,0.05\n1,0.2\n")
+    assert main(["play", "seed", "--reference", str(reference), "-o", str(tmp_path / "run.csv")]) == 2
+    assert "reference_m: 0.2 m is outside the travel, allowed is 0 to 0.1016 m" in one_line(capsys)

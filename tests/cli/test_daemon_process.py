@@ -1,0 +1,192 @@
+"""The daemon as a process against a slave as a process: registers on the wire, faults, safe states, recovery."""
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+
+from config.device import ModbusTcpDevice
+from config.recording import read_recording
+from config.registers import BY_NAME, Fault, Mode
+from drivers import driver_for
+from positioner.cli.children import port_in, running
+from positioner.dcs import Dcs
+
+WITHIN_S = 20.0
+LAW = "[law]\nb_over_c_pa_per_m = -814542.6\nk_over_c_pa = -22068.2\n"
+
+
+def until(holds: Callable[[], bool], what: str) -> None:
+    """Wait for something that must come; its not coming is the failure."""
+    end_s = time.monotonic() + WITHIN_S
+    while not holds():
+        assert time.monotonic() < end_s, f"{what} did not come within {WITHIN_S:g} s"
+        time.sleep(0.01)
+
+
+def slave_file(folder: Path, port: int = 5020) -> Path:
+    path = folder / "slave.toml"
+    path.write_text(
+        f"[bus]\nport = {port}\n[sensor]\nnoise_std_m = 1e-5\n[initial]\nposition_m = 0.03\npressure_pa = 24000.0\n"
+    )
+    return path
+
+
+def daemon_file(folder: Path, device_port: int, more: str = "") -> Path:
+    path = folder / "daemon.toml"
+    path.write_text(
+        "[valve]\nname = 'FV-101'\nstroke_m = 0.1016\n"
+        f"[device]\nport = {device_port}\n[cycle]\nperiod_s = 2e-3\n[supervisory]\nport = 0\n{LAW}{more}"
+    )
+    return path
+
+
+@dataclass
+class Site:
+    """A slave and a daemon that run."""
+
+    device_port: int
+    port: int
+    folder: Path
+
+
+@contextmanager
+def site(folder: Path, more: str = "") -> Iterator[Site]:
+    with running("sim", slave_file(folder), "--port", "0") as slave:
+        device_port = port_in(slave)
+        with running("run", daemon_file(folder, device_port, more)) as daemon:
+            yield Site(device_port, port_in(daemon), folder)
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    with site(tmp_path_factory.mktemp("site"), '[recorder]\nfolder = "recordings"\n') as here:
+        yield here
+
+
+def test_an_independent_client_reads_and_writes_the_registers_as_the_map_says(shared: Site) -> None:
+    client = ModbusTcpClient("127.0.0.1", port=shared.port)
+    assert client.connect()
+    try:
+        float_test, long_test = BY_NAME["float_test"], BY_NAME["long_test"]
+        words = client.read_input_registers(float_test.address, count=2).registers
+        assert client.convert_from_registers(words, client.DATATYPE.FLOAT32) == 1234.5
+        words = client.read_holding_registers(long_test.address, count=2).registers
+        assert client.convert_from_registers(words, client.DATATYPE.UINT32) == 0x12345678
+        words = client.convert_to_registers(0.25, client.DATATYPE.FLOAT32)
+        assert not client.write_registers(BY_NAME["reference"].address, words).isError()
+        assert client.read_holding_registers(0, count=3).registers == [*words, 2500]
+        for bad in (float("nan"), 1.5, -0.1):
+            refused = client.write_registers(0, client.convert_to_registers(bad, client.DATATYPE.FLOAT32))
+            assert (refused.isError(), refused.exception_code) == (True, 3)
+        assert client.read_holding_registers(0, count=2).registers == words, "nothing changed"
+    finally:
+        client.close()
+
+
+def test_it_holds_the_pressure_it_found_and_moves_only_when_told(shared: Site) -> None:
+    with Dcs("127.0.0.1", shared.port) as dcs:
+        before = dcs.get_all("command", "position", "mode", "cycles")
+        assert before["command"] == pytest.approx(24000.0)
+        assert before["mode"] == Mode.HOLD
+        dcs.set("reference", 0.6)
+        until(lambda: dcs.get("cycles") > before["cycles"] + 100, "cycles")
+        assert dcs.get("position") == pytest.approx(before["position"], abs=1e-3)
+        dcs.set("mode", Mode.AUTOMATIC)
+        until(lambda: abs(dcs.get("position") - 0.6) < 0.005, "the stem at the reference")
+        dcs.set("mode", Mode.HOLD)
+
+
+def test_what_it_did_is_on_record(shared: Site) -> None:
+    with Dcs("127.0.0.1", shared.port) as dcs:
+        cycles = dcs.get("cycles")
+        (path,) = (shared.folder / "recordings").glob("FV-101-*.csv")
+        until(lambda: len(path.read_text().splitlines()) > 0.5 * cycles, "the recording")
+    recording = read_recording(path)
+    assert recording.columns["pressure_pa"][0] == pytest.approx(24000.0)
+    assert (recording.columns["unrecorded"] == 0).all()
+
+
+def test_a_port_in_use_is_one_line(shared: Site, tmp_path: Path) -> None:
+    path = daemon_file(tmp_path, shared.device_port)
+    path.write_text(path.read_text().replace("[supervisory]\nport = 0", f"[supervisory]\nport = {shared.port}"))
+    done = subprocess.run(
+        [sys.executable, "-m", "positioner.cli", "run", str(path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr == f"positioner run: 127.0.0.1:{shared.port}: cannot listen there: Address already in use\n"
+
+
+def test_a_wrong_map_is_one_line(shared: Site, tmp_path: Path) -> None:
+    """The sample counter taken for a position: its words are no float that a stem could be at."""
+    path = daemon_file(
+        tmp_path,
+        shared.device_port,
+        "[device.map]\nposition_m = {address = 0, type = 'uint16'}\ncommand_pa = {address = 11}\n",
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "positioner.cli", "run", str(path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "device.map.position_m: the device says" in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(("action", "left_pa"), [("hold", 24000.0), ("vent", 0.0), ("fill", 420e3)])
+def test_the_end_leaves_the_valve_in_the_safe_state(
+    tmp_path: Path, number: signal.Signals, action: str, left_pa: float
+) -> None:
+    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+        device_port = port_in(slave)
+        path = daemon_file(tmp_path, device_port, f'[safety]\naction = "{action}"\n')
+        daemon = subprocess.Popen(
+            [sys.executable, "-m", "positioner.cli", "run", str(path)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert daemon.stdout is not None
+        daemon.stdout.readline()
+        daemon.send_signal(number)
+        _, log = daemon.communicate(timeout=WITHIN_S)
+        assert daemon.returncode == 0, log
+        assert "Traceback" not in log
+        assert held_pa(device_port) == pytest.approx(left_pa)
+
+
+def held_pa(device_port: int) -> float:
+    """Ask the device itself what it was commanded last."""
+    device = ModbusTcpDevice(port=device_port)
+    watcher = driver_for(device.model_copy(update={"map": device.map.model_copy(update=UNTOUCHED)}))
+    try:
+        return watcher.open()
+    finally:
+        watcher.close()
+
+
+UNTOUCHED = {"communication_timeout_s": None, "communication_action": None}
+
+
+def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(tmp_path: Path) -> None:
+    with ExitStack() as daemon:
+        with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+            device_port = port_in(slave)
+            port = port_in(daemon.enter_context(running("run", daemon_file(tmp_path, device_port))))
+        dcs = daemon.enter_context(Dcs("127.0.0.1", port))
+        until(lambda: dcs.get("fault") == Fault.NO_REPLY, "the fault")
+        assert dcs.get_all("mode", "quality") == {"mode": Mode.HOLD, "quality": 2}
+        with running("sim", slave_file(tmp_path, device_port)):
+            until(lambda: dcs.get("quality") == 0, "good measurements")
+            assert dcs.get("fault") != Fault.NONE, "latched"
+            dcs.set("acknowledge", 1)
+            until(lambda: dcs.get("fault") == Fault.NONE, "the acknowledgement")
+            assert dcs.get("command") == pytest.approx(24000.0)
+            assert dcs.get("position_m") == pytest.approx(0.03, abs=1e-4)
