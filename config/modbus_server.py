@@ -191,7 +191,7 @@ class _Listener(ThreadingTCPServer):
 
     allow_reuse_address = True
     daemon_threads = True
-    request_queue_size = MOST_CLIENTS
+    request_queue_size = 128
 
     def __init__(self, address: tuple[str, int], engine: Callable[[Any], None]) -> None:
         self.engine = engine

@@ -27,6 +27,9 @@ from positioner.daemon.supervisory import SupervisoryRegisters
 
 log = logging.getLogger(__name__)
 
+LOOK_EVERY_S = 0.05
+"""How often the main thread looks whether a signal came."""
+
 
 def serve(file: DaemonFile, source: Path) -> int:
     """Run the daemon until it is told to stop; return the exit status.
@@ -34,9 +37,9 @@ def serve(file: DaemonFile, source: Path) -> int:
     Raises:
         InputError: the device is not there or not as described, a port is taken, recordings cannot be written.
     """
-    stop = Event()
+    ended: list[int] = []  # not an Event: a handler that sets one may deadlock with the wait it interrupts
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+        signal.signal(number, lambda number, _frame: ended.append(number))
     settings = Settings.of(file)
     with ExitStack() as on_exit:
         pace = _pace(file)
@@ -55,15 +58,15 @@ def serve(file: DaemonFile, source: Path) -> int:
         on_exit.callback(start_logging(file.log.level).stop)
         say(log, logging.INFO, "serving", valve=file.valve.name, host=file.supervisory.host, port=server.port)
         print(f"serving {file.valve.name} on {file.supervisory.host}:{server.port}", flush=True)
-        status = _run(cycle, stop)
+        status = _run(cycle, ended)
         link.leave(settings.safe_pa(file.safety.action, controller.command_pa))
         say(log, logging.INFO, "stopped", safe_action=file.safety.action, status=status)
     return status
 
 
-def _run(cycle: Cycle, stop: Event) -> int:
-    """Run the cycle in its own thread until told to stop, or until it fails; return the exit status."""
-    failures: list[Exception] = []
+def _run(cycle: Cycle, ended: list[int]) -> int:
+    """Run the cycle in its own thread until a signal ends it, or until it fails; return the exit status."""
+    stop, failures = Event(), []
 
     def work() -> None:
         try:
@@ -71,11 +74,12 @@ def _run(cycle: Cycle, stop: Event) -> int:
         except Exception as error:
             log.exception("the cycle failed")
             failures.append(error)
-            stop.set()
 
     thread = Thread(target=work, name="cycle")
     thread.start()
-    stop.wait()
+    while thread.is_alive() and not ended:
+        thread.join(LOOK_EVERY_S)
+    stop.set()
     thread.join()
     return 1 if failures else 0
 

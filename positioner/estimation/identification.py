@@ -104,8 +104,8 @@ class Identification:
     ) -> Estimates:
         """Take a fresh sample.
 
-        A step of more than five mean periods, or a clock that does not advance, breaks the record, which then begins
-        anew. A sample with a value that is not a finite number counts as missing.
+        A gap as long as the record, or a clock that does not advance, breaks the record, which then begins anew. A
+        sample with a value that is not a finite number counts as missing.
 
         Args:
             time_s: the device's time stamp.

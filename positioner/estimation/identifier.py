@@ -99,6 +99,8 @@ _KERNELS = np.array([[kernel(feeds, n, _NODES, 1.0) for n in ROWS] for feeds in 
 _SIZES = np.sqrt(_KERNELS**2 @ _NODE_WEIGHTS)
 """What a row of a column is for a signal of one unit: the kernel's length."""
 
+GAP = 4.0
+"""A step longer than this many mean steps has missed commands."""
 LARGEST_CONDITION = 1e10
 """Beyond this (13) is singular to rounding: the pressure, or the stem, did not move."""
 
@@ -174,7 +176,9 @@ class Identifier:
         k = self._t / h
         k2, k3 = k * k, k * k * k
         x0, dx = self._x, x - self._x
-        u0, du = (u, 0.0) if self._pressure_held else (self._u, u - self._u)
+        # Over a gap the commands in between are not known: a line through them is nearer than the last of them.
+        gap = h * self._t > GAP * self._squared_steps > 0
+        u0, du = (u, 0.0) if self._pressure_held and not gap else (self._u, u - self._u)
         z[STATES:] = (
             x0, k * x0, k2 * x0, k3 * x0, dx, k * dx, k2 * dx, k3 * dx,
             u0, k * u0, k2 * u0, k3 * u0, du, k * du, k2 * du, k3 * du,

@@ -6,9 +6,6 @@ from positioner.estimation.derivatives import SHORTEST
 from positioner.estimation.identifier import Array
 
 COLUMNS = 5
-LONGEST_GAP = 5.0
-"""A step longer than this many mean periods breaks the record; a shorter one is a missing sample."""
-
 _TURNS = 8
 """The record is moved back to the front of its memory once in this many times its length."""
 
@@ -55,14 +52,14 @@ class Record:
         self._data[3:, self._end - 1] = (velocity_m_per_s, acceleration_m_per_s2)
 
     def breaks(self, time_s: float) -> bool:
-        """Whether a sample of this time stamp cannot follow: the clock did not advance, or there is a gap."""
+        """Whether a sample cannot follow: its clock did not advance, or a whole record of samples is missing."""
         if not self._count:
             return False
         times = self.time_s
         step = time_s - float(times[-1])
         if step <= 0 or self._count == 1:
             return step <= 0
-        return step > LONGEST_GAP * float(times[-1] - times[0]) / (self._count - 1)
+        return step > self.length * float(times[-1] - times[0]) / (self._count - 1)
 
     @property
     def full(self) -> bool:

@@ -73,7 +73,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 def test_an_independent_client_reads_and_writes_the_registers_as_the_map_says(shared: Site) -> None:
     client = ModbusTcpClient("127.0.0.1", port=shared.port)
-    assert client.connect()
+    assert client.connect()  # type: ignore[no-untyped-call]
     try:
         float_test, long_test = BY_NAME["float_test"], BY_NAME["long_test"]
         words = client.read_input_registers(float_test.address, count=2).registers
@@ -88,7 +88,7 @@ def test_an_independent_client_reads_and_writes_the_registers_as_the_map_says(sh
             assert (refused.isError(), refused.exception_code) == (True, 3)
         assert client.read_holding_registers(0, count=2).registers == words, "nothing changed"
     finally:
-        client.close()
+        client.close()  # type: ignore[no-untyped-call]
 
 
 def test_it_holds_the_pressure_it_found_and_moves_only_when_told(shared: Site) -> None:

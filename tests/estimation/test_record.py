@@ -28,8 +28,8 @@ def test_a_missing_sample_is_no_gap_and_a_gap_is() -> None:
     assert not record.breaks(0.0)
     for i in range(30):
         record.append(i * 1e-3, 0.0, 0.0)
-    assert not record.breaks(0.029 + 0.0049)
-    assert record.breaks(0.029 + 0.0051)
+    assert not record.breaks(0.029 + 0.049)
+    assert record.breaks(0.029 + 0.053)
     assert record.breaks(0.029)
     assert record.breaks(0.010)
 
