@@ -1,1 +1,1 @@
-"""To be said."""
+"""Figures that depend on the machine, as ratios within one run: `make bench`. Not tests."""

@@ -61,7 +61,7 @@ class MemoryDriver:
         self._check_open()
         plant = self._plant
         return Reading(
-            plant.position_m, plant.pressure_pa, plant.sample_counter, plant.device_time_us / 1e6, plant.status
+            plant.position_m, plant.pressure_pa, plant.sample_counter, plant.device_time_us / 1e6, int(plant.status)
         )
 
     def write(self, command_pa: float) -> None:

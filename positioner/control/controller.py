@@ -14,7 +14,7 @@ from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.states import Situation, State, state_in, why_not_the_law
-from positioner.control.supervision import Limits, Watch, supervise, usable
+from positioner.control.supervision import Watch, supervise, usable
 from positioner.estimation.applied import Applied, accept
 from positioner.estimation.estimate import Estimates
 from positioner.estimation.identification import Identification
@@ -30,6 +30,14 @@ class Running:
 
 
 @dataclass(frozen=True, slots=True)
+class Spent:
+    """Writes whose mode was left since: a reference or a manual pressure does not come back by itself."""
+
+    reference_writes: int = 0
+    manual_writes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Memory:
     """What the controller remembers from one step to the next."""
 
@@ -37,14 +45,13 @@ class Memory:
     """The last command given."""
     held_pa: float
     """What S0 holds, and what it gets back after S3."""
-    applied: Applied
     watch: Watch
     reference: Reference
-    state: State = State.S0_START
-    running: Running | None = None
-    identifying: bool = False
-    reference_writes: int = 0
-    manual_writes: int = 0
+    applied: Applied
+    spent: Spent
+    state: State
+    running: Running | None
+    identifying: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +79,13 @@ class Controller:
         self._memory = Memory(
             command_pa=held_pa,
             held_pa=held_pa,
-            applied=settings.applied,
             watch=Watch(),
             reference=Reference(0.0),
+            applied=settings.applied,
+            spent=Spent(),
+            state=State.S0_START,
+            running=None,
+            identifying=False,
         )
 
     @property
@@ -93,32 +104,27 @@ def step(
 ) -> tuple[Memory, Decision]:
     """Return what is remembered and what is decided after one sample."""
     watch = supervise(memory.watch, sample, memory.command_pa, requests, settings.limits)
-    memory = _changed_mode(memory, watch, sample, requests, settings.limits)
-    automatic = watch.mode is Mode.AUTOMATIC
-    if automatic and requests.reference_writes != memory.reference_writes:
-        memory = replace(memory, reference=memory.reference.follow(requests.reference_m))
-
-    running, refusal = _excitation(memory, sample, requests, settings, automatic)
-    identifying, applied, estimates = _identify(memory, running, sample, requests, settings, identification)
+    spent = _spent(memory, watch.mode, requests)
+    reference = _reference(memory, watch.mode, spent, sample, requests, settings)
+    running, refusal = _excitation(memory, watch.mode, reference, sample, requests, settings)
+    identifying, applied = _identify(memory, running, sample, requests, settings, identification)
     situation = Situation(
-        automatic=automatic,
+        automatic=watch.mode is Mode.AUTOMATIC,
         exciting=running is not None and not running.ended,
         law_ready=applied.ratios is not None,
-        delta_r_m=memory.reference.delta_m,
+        delta_r_m=reference.delta_m,
     )
     state = state_in(situation)
-    held_pa = memory.held_pa if State.S3_IDENTIFY in (memory.state, state) else memory.command_pa
-    memory = replace(
-        memory,
-        watch=watch,
-        running=running,
-        identifying=identifying,
-        applied=applied,
-        state=state,
-        held_pa=_adopted(held_pa, watch, sample),
-    )
-    wanted_pa = _wanted_pa(memory, sample, requests, settings)
+    held_pa = _held_pa(memory, state, watch, sample)
+
+    if watch.fault is not Fault.NONE:
+        wanted_pa = settings.safe_pa(settings.limits.action_on(watch.fault), held_pa)
+    elif watch.mode is Mode.MANUAL and requests.manual_writes != spent.manual_writes:
+        wanted_pa = requests.manual_pa
+    else:
+        wanted_pa = _pressure_pa(state, held_pa, running, sample.now_s, reference, applied)
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
+
     why = refusal if refusal is not Why.NOTHING else why_not_the_law(situation)
     if why is Why.NOTHING and command_pa != wanted_pa:
         why = Why.LAW_BEYOND_LIMITS
@@ -128,65 +134,72 @@ def step(
         mode=watch.mode,
         fault=watch.fault,
         why=why,
-        reference_m=memory.reference.value_m,
-        delta_r_m=memory.reference.delta_m,
+        reference_m=reference.value_m,
+        delta_r_m=reference.delta_m,
         sample_age_s=sample.now_s - watch.good_s,
-        estimates=estimates,
+        estimates=identification.estimates,
         applied=applied,
     )
-    return replace(memory, command_pa=command_pa), decision
+    return Memory(command_pa, held_pa, watch, reference, applied, spent, state, running, identifying), decision
 
 
-def _changed_mode(memory: Memory, watch: Watch, sample: Sample, requests: Requests, limits: Limits) -> Memory:
-    """Make every change of mode bumpless.
-
-    Outside automatic the reference follows the stem, so that delta r is counted from where the stem is. A reference
-    or a manual pressure written in another mode waits for its mode; one that was in force when its mode was left
-    does not come back by itself.
-    """
-    before, now = memory.watch.mode, watch.mode
-    if now is not Mode.AUTOMATIC and usable(sample, limits):
-        memory = replace(memory, reference=Reference(sample.position_m))
-    if before is Mode.AUTOMATIC and now is not Mode.AUTOMATIC:
-        memory = replace(memory, reference_writes=requests.reference_writes)
-    if before is Mode.MANUAL and now is not Mode.MANUAL:
-        memory = replace(memory, manual_writes=requests.manual_writes)
-    return memory
+def _spent(memory: Memory, mode: Mode, requests: Requests) -> Spent:
+    """Return which writes are used up: those whose mode is left now."""
+    before, spent = memory.watch.mode, memory.spent
+    if mode is before:
+        return spent
+    return Spent(
+        requests.reference_writes if before is Mode.AUTOMATIC else spent.reference_writes,
+        requests.manual_writes if before is Mode.MANUAL else spent.manual_writes,
+    )
 
 
-def _adopted(held_pa: float, watch: Watch, sample: Sample) -> float:
-    """Return what to hold: what a device has that came back, when a fault says that it is not ours to command."""
-    if sample.held_pa is not None and watch.fault is not Fault.NONE:
-        return sample.held_pa
-    return held_pa
+def _reference(
+    memory: Memory, mode: Mode, spent: Spent, sample: Sample, requests: Requests, settings: Settings
+) -> Reference:
+    """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
+    if mode is Mode.AUTOMATIC:
+        written = requests.reference_writes != spent.reference_writes
+        start = memory.reference if memory.watch.mode is mode else _at_the_stem(memory, sample, settings)
+        return start.follow(requests.reference_m) if written else start
+    return _at_the_stem(memory, sample, settings)
+
+
+def _at_the_stem(memory: Memory, sample: Sample, settings: Settings) -> Reference:
+    return Reference(sample.position_m if usable(sample, settings.limits) else memory.reference.value_m)
 
 
 def _excitation(
-    memory: Memory, sample: Sample, requests: Requests, settings: Settings, automatic: bool
+    memory: Memory, mode: Mode, reference: Reference, sample: Sample, requests: Requests, settings: Settings
 ) -> tuple[Running | None, Why]:
     """Return the excitation under way, and why none is when one was asked for."""
-    if not automatic or requests.eta[0] != 0:
+    if mode is not Mode.AUTOMATIC or requests.eta[0] != 0:
         return None, Why.NOTHING
     running = memory.running
-    if running is not None:
-        ended = running.ended or sample.now_s - running.start_s > settings.excitation_limit_s
-        return replace(running, ended=ended), Why.EXCITATION_TOO_LONG if ended else Why.NOTHING
-    swing = Swing(
-        requests.alpha_pa if requests.alpha_pa > 0 else _educated_guess_pa(memory),
-        requests.beta_pa,
-        requests.omega_rad_per_s,
-    )
+    if running is None:
+        return _begun(memory, reference, sample, requests, settings)
+    if running.ended:
+        return running, Why.EXCITATION_TOO_LONG
+    if sample.now_s - running.start_s > settings.excitation_limit_s:
+        return replace(running, ended=True), Why.EXCITATION_TOO_LONG
+    return running, Why.NOTHING
+
+
+def _begun(
+    memory: Memory, reference: Reference, sample: Sample, requests: Requests, settings: Settings
+) -> tuple[Running | None, Why]:
+    alpha_pa = requests.alpha_pa if requests.alpha_pa > 0 else _educated_guess_pa(memory, reference)
+    swing = Swing(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
     refusal = swing.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
     return (Running(swing, sample.now_s) if refusal is Why.NOTHING else None), refusal
 
 
-def _educated_guess_pa(memory: Memory) -> float:
+def _educated_guess_pa(memory: Memory, reference: Reference) -> float:
     """Return the constant pressure that keeps the stem near its reference (seed, 4.1)."""
     ratios = memory.applied.ratios
     if ratios is None:
         return memory.command_pa
-    direction = -1 if memory.reference.delta_m < 0 else 1
-    return balance_pa(memory.reference.value_m, direction, ratios)
+    return balance_pa(reference.value_m, -1 if reference.delta_m < 0 else 1, ratios)
 
 
 def _identify(
@@ -196,35 +209,34 @@ def _identify(
     requests: Requests,
     settings: Settings,
     identification: Identification,
-) -> tuple[bool, Applied, Estimates]:
+) -> tuple[bool, Applied]:
     """Run the estimators while eta_2 or eta_3 asks for it; what they find is applied when they are switched off."""
     parameters, friction = requests.eta[1] == 0, requests.eta[2] == 0
-    ended = running is not None and running.ended
-    wanted = (parameters or friction) and not ended
-    begins = wanted and (not memory.identifying or (running is not None and memory.running is None))
-    if begins:
+    wanted = (parameters or friction) and not (running is not None and running.ended)
+    if not wanted:
+        return False, accept(memory.applied, identification.estimates) if memory.identifying else memory.applied
+    if not memory.identifying or (running is not None and memory.running is None):
         identification.restart()
-    if wanted and usable(sample, settings.limits):
+    if usable(sample, settings.limits):
         identification.update(
             sample.time_s, sample.position_m, sample.pressure_pa, parameters=parameters, friction=friction
         )
-    applied = memory.applied
-    if memory.identifying and not wanted:
-        applied = accept(applied, identification.estimates)
-    return wanted, applied, identification.estimates
+    return True, memory.applied
 
 
-def _wanted_pa(memory: Memory, sample: Sample, requests: Requests, settings: Settings) -> float:
-    """Return the pressure that fault, mode or state asks for, Pa."""
-    fault = memory.watch.fault
-    if fault is not Fault.NONE:
-        return settings.safe_pa(settings.limits.action_on(fault), memory.held_pa)
-    if memory.watch.mode is Mode.MANUAL and requests.manual_writes != memory.manual_writes:
-        return requests.manual_pa
-    if memory.state is State.S0_START:
-        return memory.held_pa
-    if memory.state is State.S3_IDENTIFY and memory.running is not None:
-        return memory.running.swing.pressure_pa(sample.now_s - memory.running.start_s)
-    ratios = memory.applied.ratios
-    assert ratios is not None  # S1 and S2 exist only with estimates
-    return balance_pa(memory.reference.value_m, 1 if memory.state is State.S1_UP else -1, ratios)
+def _held_pa(memory: Memory, state: State, watch: Watch, sample: Sample) -> float:
+    """Return what to hold: the last command; over S3 the one before it; after a fault what a device came back with."""
+    if sample.held_pa is not None and watch.fault is not Fault.NONE:
+        return sample.held_pa
+    return memory.held_pa if State.S3_IDENTIFY in (memory.state, state) else memory.command_pa
+
+
+def _pressure_pa(
+    state: State, held_pa: float, running: Running | None, now_s: float, reference: Reference, applied: Applied
+) -> float:
+    """Return the pressure of a state, Pa."""
+    if state is State.S3_IDENTIFY and running is not None:
+        return running.swing.pressure_pa(now_s - running.start_s)
+    if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
+        return balance_pa(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
+    return held_pa

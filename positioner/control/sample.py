@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-from config.device import DeviceStatus
 from config.registers import Quality
-
-HEALTHY = DeviceStatus(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +16,7 @@ class Sample:
     position_m: float
     pressure_pa: float
     quality: Quality = Quality.GOOD
-    status: DeviceStatus = HEALTHY
+    status: int = 0
+    """The device's own bits, `DeviceStatus`; 0 is healthy."""
     held_pa: float | None = None
     """The command the device held, when the connection was made anew in this cycle."""

@@ -51,7 +51,7 @@ class Watch:
     heartbeats: int = 0
 
 
-UNFIT = DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST
+UNFIT = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST)
 
 
 def usable(sample: Sample, limits: Limits) -> bool:

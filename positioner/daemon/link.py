@@ -8,7 +8,6 @@ import logging
 import math
 from dataclasses import dataclass, replace
 
-from config.device import DeviceStatus
 from config.registers import Quality
 from drivers.boundary import Driver, DriverError, Reading
 from positioner.control.sample import Sample
@@ -99,7 +98,7 @@ class Link:
             position_m=reading.position_m,
             pressure_pa=command_pa if reading.pressure_pa is None else reading.pressure_pa,
             quality=Quality.REPEATED if repeated else Quality.GOOD,
-            status=DeviceStatus(reading.status),
+            status=reading.status,
             held_pa=self._held_pa,
         )
 

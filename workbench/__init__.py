@@ -1,0 +1,1 @@
+"""The workbench: hold the model against measurements."""
