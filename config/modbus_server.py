@@ -225,12 +225,12 @@ class _Listener(ThreadingTCPServer):
 
     def process_request(self, request: Any, client_address: Any) -> None:
         self._connections[request] = "{}:{}".format(*client_address)
-        log.info("%s connected", self._connections[request])
+        log.debug("%s connected", self._connections[request])
         super().process_request(request, client_address)
 
     def shutdown_request(self, request: Any) -> None:
         if peer := self._connections.pop(request, None):
-            log.info("%s gone", peer)
+            log.debug("%s gone", peer)
         super().shutdown_request(request)
 
     def handle_error(self: BaseServer, _request: Any, client_address: Any) -> None:

@@ -42,7 +42,10 @@ class ValveParameters(Schema):
 
 
 class EffectTable(BaseModel):
-    """One `[[effect]]` table: its name and that effect's own parameters, which the model side checks."""
+    """One `[[effect]]` table: its name and that effect's own parameters, which the model side checks.
+
+    A name that ends in `.py` is the path of an engineer's own effect, as seen from the valve file's folder.
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
@@ -53,6 +56,12 @@ class EffectTable(BaseModel):
         """The effect's parameters as written, without its name."""
         return dict(self.model_extra or {})
 
+    def seen_from(self, folder: Path) -> Self:
+        """Return the table with an own effect's path made absolute."""
+        if not self.name.endswith(".py"):
+            return self
+        return self.model_copy(update={"name": str((folder / self.name).resolve())})
+
 
 class ValveFile(Schema):
     """A whole valve file."""
@@ -62,12 +71,13 @@ class ValveFile(Schema):
 
 
 def load_valve(path: Path) -> ValveFile:
-    """Read a valve file.
+    """Read a valve file; the paths of own effects in it become absolute.
 
     Raises:
         InputError: names file, key, value and what is allowed.
     """
-    return load(ValveFile, path)
+    file = load(ValveFile, path)
+    return file.model_copy(update={"effect": tuple(each.seen_from(path.parent) for each in file.effect)})
 
 
 def shipped_valve(name: str) -> Path:

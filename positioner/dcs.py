@@ -4,7 +4,7 @@ What `positioner get`, `set` and `identify` use, and what plays the DCS in `posi
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
@@ -78,16 +78,25 @@ class Dcs:
             InputError: no register of that name, read-only, or a value outside its range.
             DcsError: the daemon does not answer, or refuses.
         """
-        register = register_named(name)
-        if problem := register.problem_with(value):
-            raise InputError(name, problem.removeprefix(f"{name}: "))
-        if not self._client.write_multiple_registers(register.address, register.format.encode(value)):
-            raise DcsError(f"{self._where}: {name} = {value:g} was refused: {self._reason()}")
+        self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, float]) -> None:
-        """Write several registers, one after another."""
-        for name, value in values.items():
-            self.set(name, value)
+        """Write several registers; neighbours in one request, which the daemon takes whole or not at all.
+
+        Raises:
+            InputError, DcsError: as `set`.
+        """
+        registers = sorted((register_named(name) for name in values), key=lambda each: each.address)
+        for register in registers:
+            if problem := register.problem_with(values[register.name]):
+                raise InputError(register.name, problem.removeprefix(f"{register.name}: "))
+        while registers:
+            run = _neighbours(registers)
+            registers = registers[len(run) :]
+            words = [word for each in run for word in each.format.encode(values[each.name])]
+            if not self._client.write_multiple_registers(run[0].address, words):
+                asked = ", ".join(f"{each.name} = {values[each.name]:g}" for each in run)
+                raise DcsError(f"{self._where}: {asked} was refused: {self._reason()}")
 
     def identify(
         self, swing: Mapping[str, float], timeout_s: float, show: Callable[[float], None] = lambda _: None
@@ -144,6 +153,16 @@ class Dcs:
         if self._client.last_except:
             return f"exception {self._client.last_except}, {self._client.last_except_as_txt.lower()} (see its log)"
         return str(self._client.last_error_as_txt)
+
+
+def _neighbours(registers: Sequence[Register]) -> list[Register]:
+    """Return the first of them and those that follow it without a gap."""
+    run = [registers[0]]
+    for register in registers[1:]:
+        if register.address != run[-1].end:
+            break
+        run.append(register)
+    return run
 
 
 def _plain(code: Fault | Why) -> str:

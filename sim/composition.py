@@ -14,7 +14,7 @@ from config.errors import InputError
 from config.loading import validated
 from config.valve import ValveFile, ValveParameters
 from sim.compiled import Kernel, kernel
-from sim.effect import Effect, shipped_effect
+from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 
 BASE = (
@@ -42,12 +42,12 @@ class Composition:
 
     @classmethod
     def from_file(cls, file: ValveFile, source: str = "valve file") -> Self:
-        """Compose a valve file with the effects that come with the package.
+        """Compose a valve file with the effects that it names.
 
         Raises:
             InputError: an unknown effect, one that stands twice, a parameter unknown, missing or out of its range.
         """
-        return cls.of(file, [shipped_effect(each.name, source) for each in file.effect], source)
+        return cls.of(file, [find_effect(each.name, source) for each in file.effect], source)
 
     @classmethod
     def of(cls, file: ValveFile, effects: Sequence[Effect], source: str = "valve file") -> Self:

@@ -7,6 +7,9 @@ It defines
 
     class Parameters(NamedTuple)    each field an Annotated[float, Parameter(text, least, most)], unit in its name
     MEMORY = n                      number of its state variables, if it has any
+    LOOKS = text                    what it looks like in a record
+    CONFOUNDED = {name: text}       effects and parameters of the bare valve that look alike, and what record tells
+                                    them apart; an empty text: none of pressure and position does
 
 and a function for its place. The places and what each returns:
 
@@ -23,27 +26,33 @@ With a memory it also defines
     advance    carries the memory over a step h, s, during which the signal goes from before to after
 
 A function names among its arguments only what it needs of: t (s), x (m), v (m/s), p (actuator pressure, Pa), q (the
-parameters), z (the memory, an array), and what its place adds. It may use what numba compiles: floats, math, numpy and
-functions of its own file.
+parameters), z (the memory, an array), and what its place adds. The pressure path sees the stem of the start of the
+step, all others that of its end; t is the time of the call, and middle, in the pressure path, that of the middle of the
+step: what jumps there chooses its side by it. It may use what numba compiles: floats, math, numpy and functions of its
+own file.
 """
 
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 from pathlib import Path
+from textwrap import dedent
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
+from config.valve import ValveParameters
 
 Memory = npt.NDArray[np.float64]
 
 EVERYWHERE = ("t", "x", "v", "p", "q", "z")
 PLACES: Mapping[str, tuple[str, ...]] = {
-    "pressure": ("u", *EVERYWHERE),
+    "pressure": ("u", "middle", *EVERYWHERE),
     "force": EVERYWHERE,
     "friction": ("F_c", "F_s", "direction", *EVERYWHERE),
     "motion": ("F_e", "stiffness", *EVERYWHERE),
@@ -61,11 +70,39 @@ SHIPPED = Path(__file__).parent / "effects"
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """What a parameter means, and the range, both ends included, in which it is physical."""
+    """What a parameter means, the range, both ends included, in which it is physical, and where a fit may start."""
 
     text: str
     least: float
     most: float
+    off: float | None = None
+    """The value at which the effect vanishes; None where another parameter's does it."""
+    starts: tuple[float, ...] = ()
+    """From barely visible to strong, in units of `scale`."""
+    scale: str = ""
+    """Parameters of the bare valve, multiplied and divided, such as "spring_n_per_m * stroke_m"; empty: 1."""
+    given: bool = False
+    """Read from a drawing or a data sheet: a fit leaves it at its start."""
+
+    def starts_for(self, valve: ValveParameters) -> tuple[float, ...]:
+        """Return where a fit may start on this valve; what lies beyond the range stands at its end."""
+        unit = scale_of(self.scale, valve)
+        return tuple(dict.fromkeys(min(max(start * unit, self.least), self.most) for start in self.starts))
+
+
+def scale_of(text: str, valve: ValveParameters) -> float:
+    """Return a product and quotient of a valve's parameters; 1 for an empty text.
+
+    Raises:
+        ValueError: it is not one of its numeric parameters, or not joined by * and /.
+    """
+    unit = 1.0
+    for joint, name in zip(*[iter(["*", *text.split()])] * 2, strict=True) if text else ():
+        value = getattr(valve, name, None)
+        if joint not in {"*", "/"} or not isinstance(value, float):
+            raise ValueError(f"{joint} {name}")
+        unit = unit * value if joint == "*" else unit / value
+    return unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +115,42 @@ class Effect:
     memory: int
     functions: Mapping[str, tuple[str, ...]]
     """Its functions on the path and the arguments each names."""
+    equation: str
+    """The first indented lines of its docstring."""
+    looks: str
+    confounded: Mapping[str, str]
     path: Path
     source: str
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Where it acts."""
+        return tuple(place for place in PLACES if place in self.functions)
+
+    def off(self, valve: ValveParameters) -> tuple[float, ...]:
+        """Return the parameters with which it vanishes from the valve.
+
+        Raises:
+            InputError: a parameter declares neither its off value nor a start.
+        """
+        return tuple(
+            self._starts(key, valve)[0] if parameter.off is None else parameter.off
+            for key, parameter in self.parameters.items()
+        )
+
+    def strengths(self, valve: ValveParameters) -> list[tuple[float, ...]]:
+        """Return the grid of parameters from which a fit may start; the last parameter varies fastest.
+
+        Raises:
+            InputError: a parameter declares no starts.
+        """
+        return list(product(*(self._starts(key, valve) for key in self.parameters)))
+
+    def _starts(self, key: str, valve: ValveParameters) -> tuple[float, ...]:
+        starts = self.parameters[key].starts_for(valve)
+        if not starts:
+            raise InputError(str(self.path), f"Parameters.{key}: declares no starts, from which a fit could begin")
+        return starts
 
     def values(self, written: Mapping[str, Any], source: str) -> tuple[float, ...]:
         """Hold the parameters of an `[[effect]]` table against the declaration; return them in its order.
@@ -121,6 +192,19 @@ def shipped_effect(name: str, source: str) -> Effect:
     return read_effect(SHIPPED / f"{name}.py")
 
 
+def find_effect(text: str, source: str) -> Effect:
+    """Return the effect that a person named: the path of its file, which ends in .py, or a shipped one's name.
+
+    Raises:
+        InputError: there is no such file or name, or the file is not an effect's.
+    """
+    if not text.endswith(".py"):
+        return shipped_effect(text, source)
+    if not Path(text).is_file():
+        raise InputError(source, f"no effect's file {text}")
+    return read_effect(Path(text))
+
+
 def read_effect(path: Path) -> Effect:
     """Read an effect's file.
 
@@ -142,9 +226,19 @@ def _declared(path: Path, source: str) -> Effect:
     if any(place in namespace for place in AT_STEM):
         allowed["start"] = ("F_e", *UPKEEP["start"])
     functions = {name: tuple(inspect.signature(namespace[name]).parameters) for name in allowed if name in namespace}
-    text = (namespace.get("__doc__") or "").partition("\n")[0]
-    memory = namespace.get("MEMORY", 0)
-    effect = Effect(path.stem, text, _parameters(path, namespace), memory, functions, path, source)
+    said = namespace.get("__doc__") or ""
+    effect = Effect(
+        name=path.stem,
+        text=said.partition("\n")[0],
+        parameters=_parameters(path, namespace),
+        memory=namespace.get("MEMORY", 0),
+        functions=functions,
+        equation=_equation(said),
+        looks=namespace.get("LOOKS", ""),
+        confounded=namespace.get("CONFOUNDED", {}),
+        path=path,
+        source=source,
+    )
     for name, arguments in functions.items():
         for argument in arguments:
             if argument not in allowed[name]:
@@ -165,6 +259,12 @@ def execute(source: str, path: Path, namespace: dict[str, Any]) -> None:
         raise InputError(str(path), f"line {error.lineno}: {error.msg}") from None
     except Exception as error:
         raise InputError(str(path), f"{type(error).__name__}: {error}") from None
+
+
+def _equation(said: str) -> str:
+    """Return the first indented lines of a docstring, without their indentation."""
+    indented = re.search(r"(?:^ {4}.*\n|^\n(?= {4}))+", said, re.MULTILINE)
+    return dedent(indented[0]).strip("\n") if indented else ""
 
 
 def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:

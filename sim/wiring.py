@@ -11,7 +11,7 @@ from itertools import accumulate
 from sim.effect import PLACES, Effect
 from sim.karnopp import BASE_PARAMETERS, MEMORY
 
-STEM = {name: f"stem.{name}" for name in ("t", "x", "v", "p")}
+STEM = {name: f"stem.{name}" for name in ("t", "x", "v", "p")} | {"middle": "stem.t"}
 LEVELS = {name: name for name in ("F_c", "F_s", "direction")}
 MOVED = {name: name for name in ("F_e", "stiffness", "x", "v")}
 
@@ -33,13 +33,16 @@ def wiring(effects: Sequence[Effect]) -> str:
             lines += [f"{signal} = {call(place, i, **{signal: signal})}"]
         return lines
 
-    def passed(place: str, signal: str) -> list[str]:
+    def passed(place: str, signal: str, begins: str, middle: str, ends: str) -> list[str]:
         lines = []
         for i in at[place]:
-            lines += [f"shown = {call(place, i, **{signal: 'start'})}"]
+            lines += [f"shown = {call(place, i, **{signal: 'start', 't': begins, 'middle': middle})}"]
             lines += [call("advance", i, before="start", after="end", h="h")] if i in remembering else []
-            lines += [f"end = {call(place, i, **{signal: 'end', 't': 'stem.t + h'})}", "start = shown"]
+            lines += [f"end = {call(place, i, **{signal: 'end', 't': ends, 'middle': middle})}", "start = shown"]
         return lines
+
+    through_pressure = passed("pressure", "u", "stem.t", "stem.t + 0.5 * h", "stem.t + h")
+    through_sensor = passed("sensor", "y", "stem.t - h", "stem.t - 0.5 * h", "stem.t")
 
     return "\n".join(
         [
@@ -51,7 +54,7 @@ def wiring(effects: Sequence[Effect]) -> str:
                 ["y = stem.x", *(call("start", i, signal="y", F_e="F_e") for i in at_stem), *started("sensor", "y")],
                 "y",
             ),
-            _function("pressure(u, h, stem, q, z)", ["start, end = u, u", *passed("pressure", "u")], "start, end"),
+            _function("pressure(u, h, stem, q, z)", ["start, end = u, u", *through_pressure], "start, end"),
             _function("force(stem, q, z)", [], " + ".join(["0.0", *(call("force", i) for i in at["force"])])),
             _function(
                 "friction(F_c, F_s, direction, stem, q, z)",
@@ -68,7 +71,7 @@ def wiring(effects: Sequence[Effect]) -> str:
                 (call("advance", i, before="x0", after="stem.x", h="h") for i in at_stem),
                 "None",
             ),
-            _function("sensor(x0, h, stem, q, z)", ["start, end = x0, stem.x", *passed("sensor", "y")], "end"),
+            _function("sensor(x0, h, stem, q, z)", ["start, end = x0, stem.x", *through_sensor], "end"),
         ]
     )
 

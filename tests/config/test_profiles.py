@@ -1,0 +1,35 @@
+"""The shipped profiles: valid, and the defaults they show are the defaults."""
+
+import tomllib
+
+from config.daemon import DaemonFile, load_daemon
+from config.loading import SHIPPED
+from config.slave import load_slave
+
+PROFILES = SHIPPED / "profiles"
+
+
+def test_the_daemon_profile_shows_the_defaults() -> None:
+    shown = load_daemon(PROFILES / "daemon.toml")
+    least = DaemonFile.model_validate({"valve": {"name": "FV-101", "stroke_m": 0.1016}})
+    assert shown == least
+
+
+def test_the_daemon_profile_shows_every_key() -> None:
+    text = (PROFILES / "daemon.toml").read_text()
+    for name, field in DaemonFile.model_fields.items():
+        assert f"[{name}]" in text, name
+        keys = getattr(field.annotation, "model_fields", {})
+        assert all(f"{key} = " in text or f"[{name}.{key}]" in text for key in keys), (name, list(keys))
+
+
+def test_commented_lines_are_valid_too() -> None:
+    """What a person uncomments must work: only lines that are keys or tables are uncommented here."""
+    lines = (PROFILES / "daemon.toml").read_text().splitlines()
+    keys = [line[2:] if line.startswith(("# [", "# ")) and ("=" in line or "# [" in line) else line for line in lines]
+    text = "\n".join(line for line in keys if not line.startswith("value ="))
+    DaemonFile.model_validate(tomllib.loads(text))
+
+
+def test_the_slave_profile_is_valid() -> None:
+    assert load_slave(PROFILES / "slave.toml").valve == "seed"
