@@ -1,14 +1,18 @@
 """The recording format: CSV with a header row, SI units, time strictly increasing, one row a sample.
 
-`time_s, command_pa, position_m` are required; `pressure_pa` (measured), `reference_m`, `state` and further columns
-are optional. A row's command is the one in force from its time to the next row's. Lines that begin with `#` at the
-top carry metadata, `# key: value`. A last line torn by a crash is left out and told as `torn`.
+`time_s, command_pa, position_m` are required; `pressure_pa` (measured), `load_n` (external force on the stem, positive
+in the opening direction), `reference_m`, `state` and further columns are optional. A row's command is the one in force
+from its time to the next row's. Lines that begin with `#` at the top carry metadata, `# key: value`. A last line torn
+by a crash is left out and told as `torn`. A file named `.parquet` holds the same columns.
 """
 
 import csv
+from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +20,8 @@ from numpy.typing import NDArray
 from config.errors import InputError
 
 REQUIRED = ("time_s", "command_pa", "position_m")
+CLOCK_STEPS_TOLERATED = 0.01
+"""Part of the rows at which a clock may be set back before the time is no clock at all."""
 
 Column = NDArray[np.float64]
 
@@ -42,12 +48,29 @@ class Recording:
         """Measured stem position."""
         return self.columns["position_m"]
 
+    @classmethod
+    def read(cls, path: Path | str) -> Self:
+        """Read a recording whose clock may have been set back here and there, which the workbench cuts there.
+
+        Raises:
+            InputError: names file, column or line, value and what is allowed.
+        """
+        columns, metadata = _read(Path(path), REQUIRED, CLOCK_STEPS_TOLERATED)
+        return cls(columns, metadata)
+
     def __len__(self) -> int:
         return len(self.time_s)
 
 
 def write_recording(path: Path, recording: Recording) -> None:
-    """Write a recording as CSV; numbers keep every bit."""
+    """Write a recording as CSV, or as Parquet if the file is named so; numbers keep every bit.
+
+    Raises:
+        InputError: Parquet without pyarrow.
+    """
+    if path.suffix == ".parquet":
+        _write_parquet(path, recording)
+        return
     with path.open("w", newline="", encoding="utf-8") as file:
         file.writelines(f"# {key}: {value}\n" for key, value in recording.metadata.items())
         file.write(",".join(recording.columns) + "\n")
@@ -66,21 +89,46 @@ def read_recording(path: Path) -> Recording:
 
 
 def read_table(path: Path, required: tuple[str, ...]) -> tuple[dict[str, Column], dict[str, str]]:
-    """Read the columns and the metadata of a CSV file whose `time_s` must increase strictly.
+    """Read the columns and the metadata of a file whose `time_s` must increase strictly.
 
     Raises:
         InputError: the file is not there, lacks a required column, or has a bad line (named with its number).
     """
+    return _read(path, required, 0.0)
+
+
+def _read(path: Path, required: tuple[str, ...], clock_steps: float) -> tuple[dict[str, Column], dict[str, str]]:
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return _table(path, file, required)
+        if path.suffix == ".parquet":
+            columns, metadata = _read_parquet(path)
+            first_line = 0
+            _require(path, required, list(columns), "the file has")
+        else:
+            with path.open(newline="", encoding="utf-8") as file:
+                columns, metadata, first_line = _table(path, file, required)
     except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(str(path), f"is not a CSV file: {error}") from None
+    if not columns["time_s"].size:
+        raise InputError(str(path), "holds no samples")
+    _require_increasing_time(path, columns["time_s"], first_line, clock_steps)
+    return columns, metadata
 
 
-def _table(path: Path, lines: Iterator[str], required: tuple[str, ...]) -> tuple[dict[str, Column], dict[str, str]]:
+def _require(path: Path, required: tuple[str, ...], names: list[str], where: str) -> None:
+    missing = [name for name in required if name not in names]
+    if missing:
+        raise InputError(str(path), f"column {missing[0]} is missing; {where}: {', '.join(names)}")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(str(path), f"column {name} stands {names.count(name)} times; once is allowed")
+
+
+def _table(
+    path: Path, lines: Iterator[str], required: tuple[str, ...]
+) -> tuple[dict[str, Column], dict[str, str], int]:
+    """Return columns, metadata and the number of the header's line."""
     metadata: dict[str, str] = {}
     number, header = 0, ""
     for number, line in enumerate(lines, start=1):  # noqa: B007 - the number of the header line is used below
@@ -90,19 +138,12 @@ def _table(path: Path, lines: Iterator[str], required: tuple[str, ...]) -> tuple
         key, _, value = header.lstrip("# ").partition(":")
         metadata[key.strip()] = value.strip()
     names = [name.strip() for name in header.split(",")]
-    missing = [name for name in required if name not in names]
-    if missing:
-        raise InputError(str(path), f"column {missing[0]} is missing; line {number} names: {', '.join(names)}")
+    _require(path, required, names, f"line {number} names")
     whole = _Whole(lines, len(names))
-    rows = _rows(path, csv.reader(iter(whole)), names, number)
+    table = _rows(path, csv.reader(iter(whole)), names, number)
     if whole.torn:
         metadata["torn"] = f"the last line, {number + whole.count + 1}, is not whole and was left out"
-    if not rows:
-        raise InputError(str(path), "holds no samples")
-    table = np.array(rows, dtype=np.float64)
-    columns = {name: np.ascontiguousarray(table[:, index]) for index, name in enumerate(names)}
-    _require_increasing_time(path, columns["time_s"], number)
-    return columns, metadata
+    return {name: np.ascontiguousarray(table[:, index]) for index, name in enumerate(names)}, metadata, number
 
 
 class _Whole:
@@ -123,37 +164,71 @@ class _Whole:
             yield line
 
 
-def _rows(path: Path, reader: Iterator[list[str]], names: list[str], header_line: int) -> list[list[float]]:
-    rows: list[list[float]] = []
+def _rows(path: Path, reader: Iterator[list[str]], names: list[str], header_line: int) -> Column:
+    """Return the table, (n, names): eight bytes a value while it grows, for recordings of millions of rows."""
+    values = array("d")
     for number, cells in enumerate(reader, start=header_line + 1):
         if not cells or cells[0].lstrip().startswith("#"):
             continue
         if len(cells) != len(names):
             raise InputError(str(path), f"line {number}: {len(cells)} values, the header names {len(names)}")
         try:
-            rows.append([float(cell) if cell.strip() else np.nan for cell in cells])
+            values.extend(map(float, cells))
         except ValueError:
-            bad = next(cell for cell in cells if not _is_number(cell))
-            raise InputError(str(path), f"line {number}: {bad!r} is not a number") from None
-    return rows
+            if any(not _is_number(cell) for cell in cells):
+                bad = next(cell for cell in cells if not _is_number(cell))
+                raise InputError(str(path), f"line {number}: {bad!r} is not a number") from None
+            # extend stops at the first empty cell: the row begins again where it began.
+            del values[len(values) - len(values) % len(names) :]
+            values.extend(float(cell) if cell.strip() else np.nan for cell in cells)
+    return np.frombuffer(values, dtype=np.float64).reshape(-1, len(names))
 
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell or "nan")
+        float(cell.strip() or "nan")
     except ValueError:
         return False
     return True
 
 
-def _require_increasing_time(path: Path, time_s: Column, header_line: int) -> None:
+def _require_increasing_time(path: Path, time_s: Column, header_line: int, tolerated: float) -> None:
     steps = np.diff(time_s)
-    if np.isnan(time_s).any():
-        raise InputError(str(path), f"time_s: sample {int(np.isnan(time_s).argmax()) + 1} is not a number")
-    if (steps <= 0).any():
-        index = int((steps <= 0).argmax()) + 1
+    if not np.isfinite(time_s).all():
+        raise InputError(str(path), f"time_s: sample {int((~np.isfinite(time_s)).argmax()) + 1} is not a number")
+    wrong = steps <= 0
+    if wrong.sum() > tolerated * len(time_s):
+        index = int(wrong.argmax()) + 1
         raise InputError(
             str(path),
             f"time_s must increase strictly: sample {index + 1} (about line {header_line + index + 1}) "
             f"is at {time_s[index]:g} s after {time_s[index - 1]:g} s",
         )
+
+
+def _write_parquet(path: Path, recording: Recording) -> None:
+    arrow, parquet = _pyarrow(path)
+    table = arrow.table({name: arrow.array(column) for name, column in recording.columns.items()})
+    parquet.write_table(table.replace_schema_metadata(dict(recording.metadata)), path)
+
+
+def _read_parquet(path: Path) -> tuple[dict[str, Column], dict[str, str]]:
+    arrow, parquet = _pyarrow(path)
+    try:
+        table = parquet.read_table(path)
+        columns = {name: _float64(table[name]) for name in table.column_names}
+    except (arrow.ArrowException, ValueError, TypeError) as error:
+        raise InputError(str(path), f"is not a Parquet file of numbers: {str(error).splitlines()[0]}") from None
+    said = table.schema.metadata or {}
+    return columns, {key.decode(): value.decode() for key, value in said.items() if key != b"ARROW:schema"}
+
+
+def _float64(column: Any) -> Column:
+    return np.ascontiguousarray(column.to_numpy(), dtype=np.float64)
+
+
+def _pyarrow(path: Path) -> tuple[Any, Any]:
+    try:
+        return import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ModuleNotFoundError:
+        raise InputError(str(path), "Parquet needs pyarrow: pip install pyarrow; or give it as CSV") from None

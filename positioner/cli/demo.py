@@ -28,7 +28,7 @@ ALPHA_PA, BETA_PA = 6.4 * PSI, 1.92 * PSI
 AGED_ALPHA_PA = 11.5 * PSI
 """Enough for the aged packing to break away from where the stem is then."""
 AGEING = 1.3
-AGES_AT_S = 14.0
+AGES_AT_S = 11.0
 PERIOD_S = 1e-3
 NOISE_PU = 1e-4
 STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from config.errors import InputError, Unfulfilled
 
-COMMANDS = ("demo", "sim", "run", "probe", "doctor", "get", "set", "identify", "map", "simulate", "play")
+COMMANDS = ("demo", "sim", "run", "probe", "doctor", "get", "set", "identify", "map", "simulate", "play", "reproduce")
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -10,22 +10,28 @@ What the daemon does instead is exact between the samples (`estimation.identifie
 
 from dataclasses import dataclass
 from math import exp
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from config.errors import InputError
 from config.loading import validated
 from config.valve import ValveFile, ValveParameters
-from positioner.cli.seed_scenario import LITERAL, S1_FROM_S, S2_FROM_S, Course, derivative_window_s
+from positioner.cli.seed_scenario import (
+    AMPLITUDE_PU,
+    HONEST_SINE,
+    LITERAL,
+    S1_FROM_S,
+    S2_FROM_S,
+    UNTIL_S,
+    Course,
+    Noise,
+    derivative_window_s,
+)
 from positioner.control.law import balance_pa
 from positioner.estimation import Ratios
 from positioner.estimation.derivatives import weights
 from positioner.estimation.identifier import Array
 from sim.valve import Valve
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 GRAPHS_FROM_S = 0.4
 """The seed's graphs begin here: before, its (13) is not solved well."""
@@ -115,30 +121,32 @@ def _filtered(position_m: Array, filters: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """What the seed's figures 3 to 6 show, row by row of `time_s`, SI units; corrected forms.
+    """What the seed's figures 3 to 6 show, sample by sample from 0.4 to 0.8 s, SI units; corrected forms.
 
     Attributes:
-        time_s: times from 0.4 to 0.8 s.
-        theta: a, b, c (3, rows) by (13).
-        friction_m_per_s2: k_e by (22), with a, b, c of that time.
+        time_s: of the samples.
+        theta: a, b, c (3, samples) by (13).
+        friction_m_per_s2: k_e by (22), with a, b, c of that time; the measured position is taken for x_e.
+        friction_true_x_m_per_s2: the same with the true position for x_e, for which the seed gives no estimator.
     """
 
     time_s: Array
     theta: Array
     friction_m_per_s2: Array
+    friction_true_x_m_per_s2: Array
 
 
-def tracks(course: Course, every_s: float = 2.5e-4) -> Tracks:
+def tracks(course: Course) -> Tracks:
     """Return the seed's estimates over the stretch its graphs show."""
     seen = course.identifying
-    stride = max(1, round(every_s / course.period_s))
-    last = seen.stop - 1
-    at = np.arange(last, int(np.searchsorted(course.time_s, GRAPHS_FROM_S)), -stride)[::-1]
+    at = np.arange(course.row_at(GRAPHS_FROM_S), seen.stop)
     theta = solved(course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], at)
     velocity, acceleration = derivatives(course)[:, at]
     a, b, c = theta
-    friction = acceleration - a * velocity - b * course.measured_m[at] - c * course.pressure_pa[at]
-    return Tracks(course.time_s[at], theta, friction)
+    but_position = acceleration - a * velocity - c * course.pressure_pa[at]
+    return Tracks(
+        course.time_s[at], theta, but_position - b * course.measured_m[at], but_position - b * course.true_m[at]
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,30 +170,31 @@ class Erratum:
 def errata(course: Course, file: ValveFile) -> list[Erratum]:
     """Return where printed and corrected forms differ; the course is one without noise."""
     valve = file.valve
+    breakaway_n = _breakaway_force_n(file)
     return [
-        *_model(course, file),
+        *_model(course, file, breakaway_n),
         *_identifier(course, valve),
         *_filters(course),
         *_control(course, valve),
-        Erratum("5", "F_s", "N", PRINTED_STATIC_N, valve.static_n, valve.static_n),
+        Erratum("5", "F_s", "N", PRINTED_STATIC_N, valve.static_n, breakaway_n),
         _sampled_sine(course),
     ]
 
 
-def _model(course: Course, file: ValveFile) -> list[Erratum]:
+def _model(course: Course, file: ValveFile, breakaway_n: float) -> list[Erratum]:
     """(1), (2) at rest under the first pressure of S3, (3) in the middle of the graphs."""
     valve = file.valve
     m, static_n, coulomb_n = valve.mass_kg, valve.static_n, valve.coulomb_n
     start_pa = float(course.command_pa[0])
     force_n = valve.diaphragm_area_m2 * start_pa
-    row = int(np.searchsorted(course.time_s, (GRAPHS_FROM_S + S1_FROM_S) / 2))
+    row = course.row_at((GRAPHS_FROM_S + S1_FROM_S) / 2)
     x, v, u = (float(each[row]) for each in (course.true_m, course.true_m_per_s, course.pressure_pa))
     acceleration = float(np.gradient(course.true_m_per_s, course.time_s)[row])
     numbers = truth(valve)
     a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
     stribeck = -(static_n - coulomb_n) / m * exp(-((v / valve.stribeck_velocity_m_per_s) ** 2))
     return [
-        Erratum("(1)", "friction when creeping", "N", coulomb_n - (static_n - coulomb_n), static_n, static_n),
+        Erratum("(1)", "friction as v -> 0", "N", coulomb_n - (static_n - coulomb_n), static_n, breakaway_n),
         Erratum(
             "(2)",
             "x'' at breakaway",
@@ -212,6 +221,14 @@ def _breakaway(file: ValveFile, pressure_pa: float, over_s: float = 1e-7) -> flo
     return valve.velocity_m_per_s / over_s
 
 
+def _breakaway_force_n(file: ValveFile) -> float:
+    """Return the force at which the simulated stem moves when the pressure rises slowly, 1 Pa each 10 us."""
+    valve = Valve.from_file(file)
+    ramp = valve.run(np.arange(0.0, 2 * file.valve.static_n / file.valve.diaphragm_area_m2), 1e-5)
+    moved = int(np.flatnonzero(ramp.velocity_m_per_s)[0])
+    return file.valve.diaphragm_area_m2 * float(ramp.pressure_pa[moved])
+
+
 def _identifier(course: Course, valve: ValveParameters) -> list[Erratum]:
     """(7) and (10) by a, b, c at 0.8 s."""
     seen = course.identifying
@@ -235,7 +252,8 @@ def _filters(course: Course) -> list[Erratum]:
             where,
             f"delay of {name}",
             "ms",
-            *(1e3 * _delay_s(course, each[i], true[i]) for each in (printed, corrected)),
+            1e3 * _delay_s(course, printed[i], true[i]),
+            1e3 * _delay_s(course, corrected[i], true[i]),
             0.0,
         )
         for i, (where, name) in enumerate((("(19)", "x'"), ("(21)", "x''")))
@@ -251,16 +269,15 @@ def _delay_s(course: Course, estimate: Array, true: Array) -> float:
 
 
 def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
-    """(22) at 0.8 s, (23), (24) and the coordinate of 4.2 at the ends of S1 and S2."""
+    """(22) at 0.8 s; (23), (24) and the coordinate of 4.2 at the ends of S1 and S2, where the stem stands at r."""
     last = course.identifying.stop - 1
     numbers = truth(valve)
     a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
     velocity, acceleration = derivatives(course)[:, last].tolist()
     x, u = float(course.measured_m[last]), float(course.pressure_pa[last])
-    up, down = (int(np.searchsorted(course.time_s, time_s - course.period_s / 2)) - 1 for time_s in (S2_FROM_S, 1e9))
+    up, down = course.row_at(S2_FROM_S), course.row_at(UNTIL_S)
     r_up, r_down = float(course.reference_m[up]), float(course.reference_m[down])
     ratios = Ratios(numbers["b_over_c"], numbers["k_over_c"])
-    spring, area, coulomb = valve.spring_n_per_m, valve.diaphragm_area_m2, valve.coulomb_n
     return [
         Erratum(
             "(22)",
@@ -271,7 +288,7 @@ def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
             k,
         ),
         Erratum(
-            "(23)", "u in S1", "Pa", (r_up - b * k) / c, balance_pa(r_up, 1, ratios), (spring * r_up + coulomb) / area
+            "(23)", "u in S1", "Pa", (r_up - b * k) / c, balance_pa(r_up, 1, ratios), float(course.pressure_pa[up])
         ),
         Erratum(
             "(24)",
@@ -279,12 +296,33 @@ def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
             "Pa",
             (r_down + b * k) / c,
             balance_pa(r_down, -1, ratios),
-            (spring * r_down - coulomb) / area,
+            float(course.pressure_pa[down]),
         ),
         Erratum("4.2", "y when x = r", "m", float(course.true_m[up]) + r_up, float(course.true_m[up]) - r_up, 0.0),
     ]
 
 
 def _sampled_sine(course: Course) -> Erratum:
-    """Return the largest sample of the literal sine: corrected is what sin(2 pi n) is, true its amplitude on paper."""
-    raise NotImplementedError
+    """The largest sample of the seed's noise: as printed, in rad/s, and what its amplitude says."""
+    return Erratum(
+        "5",
+        "largest noise sample",
+        "p.u.",
+        largest_sample_pu(LITERAL, course),
+        largest_sample_pu(HONEST_SINE, course),
+        AMPLITUDE_PU,
+    )
+
+
+def largest_sample_pu(noise: Noise, course: Course) -> float:
+    """Return the largest absolute sample of a sine on the grid of a course."""
+    return max(abs(noise.sine_pu(time_s)) for time_s in course.time_s.tolist())
+
+
+def refusal_of_printed_static_friction(valve: ValveParameters) -> str:
+    """Return what is said to a person whose valve file has F_s as printed; empty if nothing is."""
+    try:
+        validated(ValveParameters, valve.model_dump() | {"static_n": PRINTED_STATIC_N}, "F_s as printed")
+    except InputError as error:
+        return str(error).partition(", got")[0]
+    return ""

@@ -41,8 +41,8 @@ ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S = 6.4 * PSI, 1.92 * PSI, 1.0
 S1_FROM_S, S2_FROM_S, UNTIL_S = 0.8, 1.8, 2.8
 UP_PU, DOWN_PU = 0.6, 0.4
 SEED_PERIOD_S = 1e-5
-FIR_LENGTH = 500
-"""Samples of the derivative filters; their window lasts 5 ms at the seed's period, and that at least at any other."""
+DERIVATIVE_WINDOW_S = 500 * SEED_PERIOD_S
+"""Of the derivative filters, the seed's 500 samples; longer where that were fewer samples than those below."""
 SAMPLES_AT_LEAST = 50
 AMPLITUDE_PU = 0.01
 
@@ -95,7 +95,11 @@ class Course:
     @property
     def identifying(self) -> slice:
         """The rows of S3."""
-        return slice(0, int(np.searchsorted(self.time_s, S1_FROM_S + self.period_s / 2)))
+        return slice(0, self.row_at(S1_FROM_S) + 1)
+
+    def row_at(self, time_s: float) -> int:
+        """Return the row of the sample at a time; row 0 is one period after the start."""
+        return round(time_s / self.period_s) - 1
 
 
 class Transmitted:
@@ -142,12 +146,12 @@ class Transmitted:
         self.pressure_pa = self._device.pressure_pa
 
 
-def course(file: ValveFile, noise: Noise, period_s: float = SEED_PERIOD_S, until_s: float = UNTIL_S) -> Course:
-    """Run the scenario."""
+def course(file: ValveFile, noise: Noise, period_s: float) -> Course:
+    """Run the scenario on a valve."""
     parameters = file.valve
     stroke_m = parameters.stroke_m
     slave = _slave(noise, period_s, stroke_m)
-    valve = Valve.from_file(file, step_s=min(SEED_PERIOD_S, period_s))
+    valve = Valve.from_file(file)
     plant = Transmitted(Device(valve, slave, parameters.model_dump(exclude={"name"})), valve, noise, stroke_m)
     pace = DevicePace()
     link = Link(MemoryDriver(plant), pace)
@@ -160,8 +164,9 @@ def course(file: ValveFile, noise: Noise, period_s: float = SEED_PERIOD_S, until
             return then.pop(0)[1]
         return requests
 
-    decided, readings = [], []
-    for snapshot in played(cycle, ask, until_s - period_s / 2):
+    decided: list[tuple[float, float]] = []
+    readings: list[Estimates] = []
+    for snapshot in played(cycle, ask, UNTIL_S - period_s / 2):
         decision = snapshot.decision
         decided.append((decision.command_pa, decision.reference_m))
         if not readings or decision.estimates is not readings[-1]:
@@ -200,7 +205,7 @@ def _phases(stroke_m: float) -> list[tuple[float, Requests]]:
 
 def derivative_window_s(period_s: float) -> float:
     """Return the length of the derivative filters."""
-    return max(FIR_LENGTH * SEED_PERIOD_S, SAMPLES_AT_LEAST * period_s)
+    return max(DERIVATIVE_WINDOW_S, SAMPLES_AT_LEAST * period_s)
 
 
 def _daemon(period_s: float, stroke_m: float) -> DaemonFile:

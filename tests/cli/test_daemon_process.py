@@ -1,10 +1,12 @@
 """The daemon as a process against a slave as a process: registers on the wire, faults, safe states, recovery."""
 
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,6 +114,44 @@ def test_what_it_did_is_on_record(shared: Site) -> None:
     recording = read_recording(path)
     assert recording.columns["pressure_pa"][0] == pytest.approx(24000.0)
     assert (recording.columns["unrecorded"] == 0).all()
+
+
+def test_rude_clients_do_not_touch_the_cycle(shared: Site) -> None:
+    """One never reads its answers, one stops in mid-frame, one vanishes, four write at once; the cycle goes on."""
+    read_all = bytes.fromhex("0001 0000 0006 01 03 0000 007d")
+    with ExitStack() as clients, Dcs("127.0.0.1", shared.port) as dcs:
+        deaf, slow, gone = (clients.enter_context(socket.create_connection(("127.0.0.1", shared.port))) for _ in "123")
+        deaf.sendall(read_all * 2000)
+        slow.sendall(read_all[:5])
+        gone.sendall(read_all)
+        gone.close()
+        before = dcs.get_all("cycles", "lost_replies", "fault")
+        with ThreadPoolExecutor(4) as writers:
+            list(writers.map(lambda beat: write_heartbeats(shared.port, beat), range(4)))
+        until(lambda: dcs.get("cycles") > before["cycles"] + 500, "cycles")
+        assert dcs.get_all("lost_replies", "fault") == {name: before[name] for name in ("lost_replies", "fault")}
+
+
+def write_heartbeats(port: int, beat: int) -> None:
+    with Dcs("127.0.0.1", port) as dcs:
+        for _ in range(100):
+            dcs.set("heartbeat", beat)
+
+
+def test_a_killed_daemon_leaves_a_whole_recording(shared: Site, tmp_path: Path) -> None:
+    path = daemon_file(tmp_path, shared.device_port, '[recorder]\nfolder = "recordings"\n')
+    daemon = subprocess.Popen(
+        [sys.executable, "-m", "positioner.cli", "run", str(path)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert daemon.stdout is not None
+    daemon.stdout.readline()
+    until(lambda: sum(each.stat().st_size for each in (tmp_path / "recordings").glob("*.csv")) > 20_000, "recording")
+    daemon.kill()
+    daemon.communicate()
+    (recording,) = (tmp_path / "recordings").glob("*.csv")
+    read = read_recording(recording)
+    assert len(read) > 200
+    assert "torn" not in read.metadata
 
 
 def test_a_port_in_use_is_one_line(shared: Site, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from config.daemon import DaemonFile
-from config.modbus_server import ExceptionCode, RegisterError
+from config.modbus_server import ExceptionCode, RegisterError, RegisterServer
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST, Fault
 from config.slave import SlaveFile
 from config.valve import shipped_valve
@@ -213,6 +213,14 @@ def test_a_latched_fault_keeps_the_mode_until_acknowledged(panel: Panel, monkeyp
     panel.set("mode", 2)
     panel.run()
     assert panel.get("mode") == 2
+
+
+def test_the_cycle_waits_for_no_request(panel: Panel) -> None:
+    """Even one that is being answered, with the server's lock held, for as long as it likes."""
+    server = RegisterServer(panel.registers, "127.0.0.1", 0, 1)
+    with server.lock:
+        panel.run(10)
+        assert panel.cycle.snapshot.sample.time_s == pytest.approx(0.011)
 
 
 def test_estimates_are_served_with_their_reasons(panel: Panel) -> None:

@@ -1,0 +1,227 @@
+"""`positioner reproduce`: the seed's figures and claims, as printed, corrected, and under honest noise.
+
+In process and virtual time, at the seed's 10 us; the last row of each table is a sample time a fieldbus can give.
+"""
+
+import argparse
+import time
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from positioner.cli.seed_findings import Findings
+    from positioner.cli.seed_formulas import Erratum
+
+HELP = "the seed's figures and claims: as printed, corrected, and under honest noise; takes a minute"
+EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
+
+FIELDBUS_PERIOD_S = 1e-3
+OWN_NOISE = 2
+"""So many of the first cases are noise as the seed says it is: its claims must hold there."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the figures there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run it; exit status 1 when a claim does not hold without noise, or a printed form is no worse than ours."""
+    from config.valve import load_valve, shipped_valve
+    from positioner.cli.seed_findings import findings
+    from positioner.cli.seed_formulas import errata, refusal_of_printed_static_friction
+    from positioner.cli.seed_scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, course
+
+    started_s = time.monotonic()
+    _make_folder(arguments.out)
+    file = load_valve(shipped_valve("seed"))
+    cases = [(noise, SEED_PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE, FIELDBUS_PERIOD_S)]
+    courses = []
+    for noise, period_s in cases:
+        courses.append(course(file, noise, period_s))
+        print(f"S3, S1, S2 at {_period(period_s)}, noise {noise.name}: {len(courses[-1].time_s)} cycles", flush=True)
+    wrong = errata(courses[0], file)
+    refusal = refusal_of_printed_static_friction(file.valve)
+    found = [findings(each, file) for each in courses]
+    _print_lines([*_errata_lines(wrong, refusal), *_estimate_lines(found), *_law_lines(found), *_claim_lines(found)])
+    if arguments.out:
+        from positioner.cli.seed_figures import draw_all
+
+        for path in draw_all(arguments.out, courses[0], (courses[2], courses[3]), file):
+            print(path)
+    if arguments.json:
+        _write_json(arguments.json, _jsonable(wrong, refusal, found, time.monotonic() - started_s))
+    problems = _problems(wrong, refusal, found)
+    for problem in problems:
+        print(f"DOES NOT HOLD: {problem}")
+    print(f"{'failed' if problems else 'done'}, {time.monotonic() - started_s:.0f} s")
+    return 1 if problems else 0
+
+
+def _make_folder(asked: Path | None) -> None:
+    from config.errors import InputError
+
+    if asked is None:
+        return
+    try:
+        asked.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {asked}", f"cannot be written: {error.strerror}") from None
+
+
+def _write_json(path: Path, values: dict[str, object]) -> None:
+    import json
+
+    from config.errors import InputError
+
+    try:
+        path.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        raise InputError(f"--json {path}", f"cannot be written: {error.strerror}") from None
+
+
+def _problems(wrong: list["Erratum"], refusal: str, found: list["Findings"]) -> list[str]:
+    """Return what is not as docs/seed.md says it is."""
+    problems = [
+        f"{each.where}, {each.quantity}: as printed {each.printed:g}, corrected {each.corrected:g}, true {each.true:g}"
+        for each in wrong
+        if not each.printed_fails
+    ]
+    if not refusal:
+        problems.append("F_s as printed is accepted in a valve file")
+    return problems + [
+        f"claim {claim.claim}, noise {each.noise}: {claim.figure:.3g}, limit {claim.limit:g}"
+        for each in found[:OWN_NOISE]
+        for claim in each.claims
+        if not claim.holds
+    ]
+
+
+def _print_lines(lines: Iterable[str]) -> None:
+    for line in lines:
+        print(line)
+
+
+def _errata_lines(wrong: list["Erratum"], refusal: str) -> list[str]:
+    return [
+        "",
+        "as printed and corrected, on the same motion without noise",
+        f"{'where':7}{'quantity':24}{'unit':12}{'printed':>13}{'corrected':>13}{'true':>13}",
+        *(
+            f"{each.where:7}{each.quantity:24}{each.unit:12}{each.printed:13.5g}{each.corrected:13.5g}{each.true:13.5g}"
+            for each in wrong
+        ),
+        refusal,
+    ]
+
+
+def _estimate_lines(found: list["Findings"]) -> list[str]:
+    lines = [
+        "",
+        "relative errors of the seed's estimates, corrected forms: a_e, b_e, c_e at 0.8 s and the worst from 0.4 s on;",
+        "k_e from 0.4 to 0.8 s: mean, standard deviation, last; the last two also with the true position for x_e",
+        f"{'noise':20}{'sample':>8}{'a_e':>10}{'b_e':>10}{'c_e':>10}{'worst':>10}"
+        f"{'k_e mean':>10}{'std':>9}{'last':>10}{'std':>9}{'last':>10}",
+    ]
+    for each in found:
+        k, exact = each.k, each.k_with_true_x
+        worst = max(solved.worst_error for solved in each.solved)
+        lines.append(
+            _head(each)
+            + "".join(f"{_deviation(solved.error):>10}" for solved in each.solved)
+            + f"{_percent(worst):>10}{_deviation(k.mean):>10}{_percent(k.std):>9}{_deviation(k.last):>10}"
+            + f"{_percent(exact.std):>9}{_deviation(exact.last):>10}"
+        )
+    lines += [
+        "",
+        "relative errors of the daemon's estimates at the end of S3; in brackets: it refuses the value",
+        f"{'noise':20}{'sample':>8}" + "".join(f"{name:>11}" for name in ("a", "b", "c", "k", "b/c", "k/c")),
+    ]
+    for each in found:
+        errors_said = (_said(one.value / one.true - 1, one.reason) for one in each.identified)
+        lines.append(_head(each) + "".join(f"{text:>11}" for text in errors_said))
+    return lines + list(_refusal_lines(found))
+
+
+def _refusal_lines(found: list["Findings"]) -> Iterable[str]:
+    from positioner.estimation import Reason
+
+    for each in found:
+        for reason in dict.fromkeys(one.reason for one in each.identified if one.reason != Reason.VALID.name):
+            names = ", ".join(one.name for one in each.identified if one.reason == reason)
+            yield f"  {each.noise}, {_period(each.period_s)}: {names} refused: {Reason[reason].text}"
+
+
+def _law_lines(found: list["Findings"]) -> list[str]:
+    lines = [
+        "",
+        "largest error of the true stem over the last 0.2 s, p.u. of stroke",
+        f"{'noise':20}{'sample':>8}{'':>6}{'reference':>11}{'last k_e kept':>16}{'daemon':>12}",
+    ]
+    for each in found:
+        for step in each.steps:
+            lines.append(
+                f"{_head(each)}{step.state:>6}{step.reference_pu:11.2f}"
+                f"{step.seed_error_pu:16.5f}{step.daemon_error_pu:12.5f}"
+            )
+    return lines
+
+
+def _claim_lines(found: list["Findings"]) -> list[str]:
+    from positioner.cli.seed_findings import CLAIMS
+
+    lines = ["", "the seed's claims", *(f"  {claim:9} {text}" for claim, text in CLAIMS.items())]
+    lines.append(f"{'noise':20}{'sample':>8}" + "".join(f"{claim:>16}" for claim in CLAIMS))
+    for each in found:
+        said = (f"{'yes' if claim.holds else 'NO'} {_figure(claim.figure)}" for claim in each.claims)
+        lines.append(_head(each) + "".join(f"{text:>16}" for text in said))
+    limits = ", ".join(f"{claim.claim} {claim.limit:g}" for claim in found[0].claims)
+    return [*lines, f"limits: {limits}", ""]
+
+
+def _head(each: "Findings") -> str:
+    return f"{each.noise:20}{_period(each.period_s):>8}"
+
+
+def _period(period_s: float) -> str:
+    return f"{1e3 * period_s:g} ms" if period_s >= 1e-3 else f"{1e6 * period_s:g} us"
+
+
+def _deviation(share: float) -> str:
+    """Say a share with its sign, where it has one to speak of."""
+    said = _percent(abs(share))
+    return said if said in ("lost", "0.00 %") else f"{'-' if share < 0 else '+'}{said}"
+
+
+def _percent(share: float) -> str:
+    """Say a share in per cent; beyond 100 % there is nothing left to say."""
+    return f"{100 * share:.2f} %" if share < 1 else "lost"
+
+
+def _said(error: float, reason: str) -> str:
+    return _deviation(error) if reason == "VALID" else f"({_deviation(error)})"
+
+
+def _figure(figure: float) -> str:
+    return f"{figure:.2g}" if figure < 1 else "lost"
+
+
+def _jsonable(wrong: list["Erratum"], refusal: str, found: list["Findings"], seconds: float) -> dict[str, object]:
+    return {
+        "errata": [asdict(each) for each in wrong],
+        "printed_static_friction_refused": refusal,
+        "cases": [_case(each) for each in found],
+        "seconds": seconds,
+    }
+
+
+def _case(each: "Findings") -> dict[str, object]:
+    return {
+        **asdict(each),
+        "solved": [{**asdict(one), "error": one.error} for one in each.solved],
+        "identified": [{**asdict(one), "error": one.value / one.true - 1} for one in each.identified],
+        "claims": [{**asdict(claim), "holds": claim.holds} for claim in each.claims],
+    }
