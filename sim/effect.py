@@ -94,10 +94,11 @@ def scale_of(text: str, valve: ValveParameters) -> float:
     """Return a product and quotient of a valve's parameters; 1 for an empty text.
 
     Raises:
-        ValueError: it is not one of its numeric parameters, or not joined by * and /.
+        ValueError: a name that is none of its numbers, or a joint other than * and /.
     """
+    words = ["*", *text.split()] if text else []
     unit = 1.0
-    for joint, name in zip(*[iter(["*", *text.split()])] * 2, strict=True) if text else ():
+    for joint, name in zip(words[::2], words[1::2], strict=True):
         value = getattr(valve, name, None)
         if joint not in {"*", "/"} or not isinstance(value, float):
             raise ValueError(f"{joint} {name}")

@@ -46,7 +46,11 @@ def run(arguments: argparse.Namespace) -> int:
     wrong = errata(courses[0], file)
     refusal = refusal_of_printed_static_friction(file.valve)
     found = [findings(each, file) for each in courses]
-    _print_lines([*_errata_lines(wrong, refusal), *_estimate_lines(found), *_law_lines(found), *_claim_lines(found)])
+    _print_lines(_errata_lines(wrong, refusal))
+    _print_lines(_estimate_lines(found))
+    _print_lines(_kept_lines(found[OWN_NOISE]))
+    _print_lines(_law_lines(found))
+    _print_lines(_claim_lines(found))
     if arguments.out:
         from positioner.cli.seed_figures import draw_all
 
@@ -119,22 +123,18 @@ def _errata_lines(wrong: list["Erratum"], refusal: str) -> list[str]:
 
 
 def _estimate_lines(found: list["Findings"]) -> list[str]:
+    columns = ("a_e", "b_e", "c_e", "worst", "k_e mean", "std", "last")
     lines = [
         "",
         "relative errors of the seed's estimates, corrected forms: a_e, b_e, c_e at 0.8 s and the worst from 0.4 s on;",
-        "k_e from 0.4 to 0.8 s: mean, standard deviation, last; the last two also with the true position for x_e",
-        f"{'noise':20}{'sample':>8}{'a_e':>10}{'b_e':>10}{'c_e':>10}{'worst':>10}"
-        f"{'k_e mean':>10}{'std':>9}{'last':>10}{'std':>9}{'last':>10}",
+        "k_e from 0.4 to 0.8 s: mean, standard deviation, last",
+        f"{'noise':20}{'sample':>8}" + "".join(f"{name:>10}" for name in columns),
     ]
     for each in found:
-        k, exact = each.k, each.k_with_true_x
         worst = max(solved.worst_error for solved in each.solved)
-        lines.append(
-            _head(each)
-            + "".join(f"{_deviation(solved.error):>10}" for solved in each.solved)
-            + f"{_percent(worst):>10}{_deviation(k.mean):>10}{_percent(k.std):>9}{_deviation(k.last):>10}"
-            + f"{_percent(exact.std):>9}{_deviation(exact.last):>10}"
-        )
+        of_k = _deviation(each.k.mean), _percent(each.k.std), _deviation(each.k.last)
+        row = (*(_deviation(solved.error) for solved in each.solved), _percent(worst), *of_k)
+        lines.append(_head(each) + "".join(f"{text:>10}" for text in row))
     lines += [
         "",
         "relative errors of the daemon's estimates at the end of S3; in brackets: it refuses the value",
@@ -168,6 +168,18 @@ def _law_lines(found: list["Findings"]) -> list[str]:
                 f"{step.seed_error_pu:16.5f}{step.daemon_error_pu:12.5f}"
             )
     return lines
+
+
+def _kept_lines(each: "Findings") -> list[str]:
+    return [
+        "",
+        f"error, p.u., that a single k_e leaves under the {each.noise}, by each reading of the text; plainest first",
+        f"{'filters':14}{'samples':>8}{'x_e':>10}{'last':>10}{'worst':>10}",
+        *(
+            f"{kept.filters:14}{kept.samples:8}{kept.position:>10}{kept.last_error_pu:10.4f}{kept.worst_error_pu:10.4f}"
+            for kept in each.kept
+        ),
+    ]
 
 
 def _claim_lines(found: list["Findings"]) -> list[str]:
@@ -222,6 +234,10 @@ def _case(each: "Findings") -> dict[str, object]:
     return {
         **asdict(each),
         "solved": [{**asdict(one), "error": one.error} for one in each.solved],
-        "identified": [{**asdict(one), "error": one.value / one.true - 1} for one in each.identified],
+        "identified": [_without_nan({**asdict(one), "error": one.value / one.true - 1}) for one in each.identified],
         "claims": [{**asdict(claim), "holds": claim.holds} for claim in each.claims],
     }
+
+
+def _without_nan(values: dict[str, object]) -> dict[str, object]:
+    return {name: None if value != value else value for name, value in values.items()}  # noqa: PLR0124 - NaN is not itself

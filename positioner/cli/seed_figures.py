@@ -9,8 +9,18 @@ import numpy as np
 
 from config.valve import ValveFile
 from positioner.cli.picture import STATE_COLOURS
-from positioner.cli.seed_findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_ratios
-from positioner.cli.seed_formulas import PRINTED_10, Tracks, derivatives, printed_derivatives, solved, tracks, truth
+from positioner.cli.seed_findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
+from positioner.cli.seed_formulas import (
+    PRINTED_10,
+    Tracks,
+    corrected_filters,
+    derivatives,
+    fir_length,
+    printed_filters,
+    solved,
+    tracks,
+    truth,
+)
 from positioner.cli.seed_scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, Course
 from positioner.control.states import State
 
@@ -24,7 +34,7 @@ mpl.use("Agg")
 
 COLOURS = ("#1f6f3f", "#2a5d9f", "#c0392b")
 """No noise, the sine of 1e5 rad/s, white noise."""
-DOTS_PER_INCH = 100
+DOTS_PER_INCH = 90
 JERK_S = (0.0, 0.04)
 SLOW_S = (0.7, 0.7005)
 """Half a millisecond: long enough to see the sine."""
@@ -51,7 +61,7 @@ def draw_all(folder: Path, quiet: Course, noisy: Sequence[Course], file: ValveFi
     paths.append(folder / "seed-derivatives.png")
     _draw_derivatives(paths[-1], quiet, noisy[0])
     paths.append(folder / "seed-fig6.png")
-    friction = [(course, each.friction_m_per_s2) for course, each in seen]
+    friction = [(course, seed_friction(course, each)) for course, each in seen]
     _draw_estimate(paths[-1], "k", "m/s$^2$", true["k"], friction, "by (22), corrected, instant by instant")
     paths.append(folder / "seed-fig7.png")
     _draw_tracking(paths[-1], seen, file)
@@ -86,8 +96,8 @@ def _draw_estimate(
     for colour, (course, values) in zip(COLOURS, curves, strict=True):
         hectic = float(np.std(np.diff(values))) > 1e-3 * abs(true)
         time_s = course.time_s[course.identifying][-len(values) :]
-        style = {"lw": 0.3, "alpha": 0.5, "zorder": 1} if hectic else {"lw": 1.4, "alpha": 1.0, "zorder": 3}
-        axes.plot(time_s, values, color=colour, label=_label(course), **style)
+        width, alpha, order = (0.3, 0.5, 1) if hectic else (1.4, 1.0, 3)
+        axes.plot(time_s, values, color=colour, lw=width, alpha=alpha, zorder=order, label=_label(course))
     axes.axhline(true, color="black", lw=1.4, ls="--", zorder=5, label="true")
     axes.set_xlabel("time, s")
     axes.set_ylabel(f"${name}_e$, {unit}")
@@ -110,7 +120,8 @@ def _draw_derivatives(path: Path, quiet: Course, noisy: Course) -> None:
         rows = (course.time_s >= begin_s) & (course.time_s < end_s)
         time_ms = 1e3 * course.time_s[rows]
         true = course.true_m_per_s, np.gradient(course.true_m_per_s, course.time_s)
-        corrected, printed = derivatives(course), printed_derivatives(course)
+        n, h = fir_length(course), course.period_s
+        corrected, printed = (derivatives(course, each(n, h)) for each in (corrected_filters, printed_filters))
         for row, (unit, name) in enumerate((("m/s", "velocity (19)"), ("m/s$^2$", "acceleration (21)"))):
             axes = grid[row, column]
             axes.plot(time_ms, printed[row][rows], color=COLOURS[2], lw=1.2, label="as printed: a window late")
@@ -143,7 +154,7 @@ def _draw_tracking(path: Path, seen: Sequence[tuple[Course, Tracks]], file: Valv
     above.plot([], [], color="#bbbbbb", lw=5, label=f"measured, {noisy.noise.name}")
     above.plot(noisy.time_s, noisy.true_m / stroke_m, color=COLOURS[1], lw=1.5, label="stem, the daemon's estimates")
     above.plot(noisy.time_s, reference, color="black", lw=1.2, ls="--", label="reference")
-    law_s, law_m = by_the_seeds_law(noisy, file, seed_ratios(noisy_tracks))
+    law_s, law_m = by_the_seeds_law(noisy, file, seed_ratios(noisy, noisy_tracks))
     drawn = law_s > S1_FROM_S
     error = law_m[drawn] - np.interp(law_s[drawn], noisy.time_s, noisy.reference_m)
     below.fill_between(

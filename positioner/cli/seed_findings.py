@@ -1,16 +1,25 @@
 """What a course of the seed's scenario says about the seed's claims.
 
-Two ways stand side by side: the seed's own (its solve, corrected; k_e of the last instant kept) and the daemon's
-(exact between the samples, friction from the means of the motion). The law is the same; it needs b/c and k/c alone.
-An error of k/c is one of the stem's rest: delta x = (F_c / k_s) (delta k / k) in share of k/c.
+Two ways stand side by side: the seed's own (its solve and filters, corrected; k_e of the last instant kept), and the
+daemon's (exact on the samples, friction from the means of the motion). The law is the same: it needs b/c and k/c.
+A relative error e of k/c leaves the stem e F_c / k_s from the reference.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from config.valve import ValveFile
-from positioner.cli.seed_formulas import QUANTITIES, Tracks, tracks, truth
+from config.valve import ValveFile, ValveParameters
+from positioner.cli.seed_formulas import (
+    QUANTITIES,
+    Tracks,
+    corrected_filters,
+    exact_filters,
+    fir_length,
+    friction,
+    tracks,
+    truth,
+)
 from positioner.cli.seed_scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, Course
 from positioner.control.law import balance_pa
 from positioner.estimation import Ratios
@@ -64,6 +73,21 @@ class Scatter:
 
 
 @dataclass(frozen=True, slots=True)
+class Kept:
+    """What keeping a single k_e would leave of error, p.u.: the last one, and the worst from 0.4 s on.
+
+    The seed's text leaves open whether 500 samples are 500 periods, and what x_e is; `filters` are the trapezoidal
+    rule's, as it says, or exact ones.
+    """
+
+    filters: str
+    samples: int
+    position: str
+    last_error_pu: float
+    worst_error_pu: float
+
+
+@dataclass(frozen=True, slots=True)
 class Identified:
     """What the daemon says of one number, SI units; NaN when it says nothing."""
 
@@ -107,7 +131,7 @@ class Findings:
     solved: tuple[Solved, ...]
     k: Scatter
     k_over_c: Scatter
-    k_with_true_x: Scatter
+    kept: tuple[Kept, ...]
     identified: tuple[Identified, ...]
     steps: tuple[Step, ...]
     claims: tuple[Claim, ...]
@@ -121,11 +145,12 @@ def findings(course: Course, file: ValveFile) -> Findings:
         Solved(name, float(row[-1]), true[name], float(np.abs(row / true[name] - 1).max()))
         for name, row in zip(QUANTITIES, seen.theta, strict=True)
     )
-    k_over_c = Scatter.of(seen.friction_m_per_s2 / seen.theta[2], true["k_over_c"])
-    steps = _steps(course, file, seed_ratios(seen))
+    k = seed_friction(course, seen)
+    kept = _kept(course, seen, valve)
+    steps = _steps(course, file, seed_ratios(course, seen))
     figures = {
         "a": max(each.worst_error for each in by_solve),
-        "b": k_over_c.worst * valve.coulomb_n / (valve.spring_n_per_m * valve.stroke_m),
+        "b": kept[0].worst_error_pu,
         "c": max(step.seed_error_pu for step in steps),
         "c daemon": max(step.daemon_error_pu for step in steps),
     }
@@ -133,9 +158,9 @@ def findings(course: Course, file: ValveFile) -> Findings:
         noise=course.noise.name,
         period_s=course.period_s,
         solved=by_solve,
-        k=Scatter.of(seen.friction_m_per_s2, true["k"]),
-        k_over_c=k_over_c,
-        k_with_true_x=Scatter.of(seen.friction_true_x_m_per_s2, true["k"]),
+        k=Scatter.of(k, true["k"]),
+        k_over_c=Scatter.of(k / seen.theta[2], true["k_over_c"]),
+        kept=kept,
         identified=_identified(course, true),
         steps=steps,
         claims=tuple(
@@ -145,10 +170,29 @@ def findings(course: Course, file: ValveFile) -> Findings:
     )
 
 
-def seed_ratios(seen: Tracks) -> Ratios:
+def seed_friction(course: Course, seen: Tracks) -> Array:
+    """Return k_e as the seed says: 500 samples, the trapezoidal rule, the measured position."""
+    return friction(course, seen, corrected_filters(fir_length(course), course.period_s), course.measured_m)
+
+
+def seed_ratios(course: Course, seen: Tracks) -> Ratios:
     """Return what the seed's law goes by: its solve and the friction of the last instant of S3."""
     _, b, c = seen.theta[:, -1].tolist()
-    return Ratios(b / c, float(seen.friction_m_per_s2[-1]) / c)
+    return Ratios(b / c, float(seed_friction(course, seen)[-1]) / c)
+
+
+def _kept(course: Course, seen: Tracks, valve: ValveParameters) -> tuple[Kept, ...]:
+    """Return the errors by every reading of the seed's text, its plainest first."""
+    friction_pu = valve.coulomb_n / (valve.spring_n_per_m * valve.stroke_m)
+    true = truth(valve)["k_over_c"]
+    kept = []
+    for samples in (fir_length(course), fir_length(course) + 1):
+        for name, filters in (("trapezoidal", corrected_filters), ("exact", exact_filters)):
+            for position, position_m in (("measured", course.measured_m), ("true", course.true_m)):
+                k = friction(course, seen, filters(samples, course.period_s), position_m)
+                errors = Scatter.of(k / seen.theta[2], true)
+                kept.append(Kept(name, samples, position, abs(errors.last) * friction_pu, errors.worst * friction_pu))
+    return tuple(kept)
 
 
 def by_the_seeds_law(course: Course, file: ValveFile, ratios: Ratios) -> tuple[Array, Array]:

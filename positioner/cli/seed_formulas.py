@@ -5,7 +5,7 @@
     (22)        friction k_e from these, instant by instant
     (1)-(3), (23), (24), 4.2, 5    a number each, where the printed form and the corrected one differ
 
-What the daemon does instead is exact between the samples (`estimation.identifier`, `estimation.derivatives`).
+What the daemon does instead is exact on the samples (`estimation.identifier`, `estimation.derivatives`).
 """
 
 from dataclasses import dataclass
@@ -92,60 +92,73 @@ def solved(time_s: Array, position_m: Array, pressure_pa: Array, at: Array, iden
     return np.asarray(theta / [[1.0], [1.0], [PRESSURE_UNIT_PA]])
 
 
-def derivatives(course: Course) -> Array:
-    """Return velocity and acceleration (2, rows) at the end of the window that ends at each row; NaN before."""
-    filters = weights(course.time_s[: _window(course)])[:2]
-    return _filtered(course.measured_m, filters)
-
-
-def printed_derivatives(course: Course) -> Array:
-    """Return the same by (19) and (21) as printed, by the trapezoidal rule over the window that ends at each row."""
-    n = _window(course)
-    T = (n - 1) * course.period_s
-    tau = np.linspace(0.0, T, n)
+def printed_filters(samples: int, period_s: float) -> Array:
+    """Return (19) and (21) as printed, by the trapezoidal rule: weights (2, samples), oldest first."""
+    T = (samples - 1) * period_s
+    tau = np.linspace(0.0, T, samples)
     k_19 = -12 / T**4 * (3 * T**2 - 16 * T * tau + 15 * tau**2)
     k_21 = 120 / T**6 * (4 * T**3 - 45 * T**2 * tau + 108 * T * tau**2 - 70 * tau**3)
-    trapezoids = np.full(n, course.period_s)
+    trapezoids = np.full(samples, period_s)
     trapezoids[[0, -1]] /= 2
-    return _filtered(course.measured_m, np.array([k_19, k_21]) * trapezoids)
+    return np.array([k_19 * trapezoids, k_21 * trapezoids])
 
 
-def _window(course: Course) -> int:
-    return round(derivative_window_s(course.period_s) / course.period_s) + 1
+def corrected_filters(samples: int, period_s: float) -> Array:
+    """Return the same run on the window reversed in time, under which the odd derivative changes its sign."""
+    k_19, k_21 = printed_filters(samples, period_s)[:, ::-1]
+    return np.array([-k_19, k_21])
 
 
-def _filtered(position_m: Array, filters: Array) -> Array:
+def exact_filters(samples: int, period_s: float) -> Array:
+    """Return the daemon's: exact for polynomials on the samples there are, where the trapezoidal rule is not."""
+    return weights(period_s * np.arange(samples, dtype=np.float64))[:2]
+
+
+def derivatives(course: Course, filters: Array) -> Array:
+    """Return velocity and acceleration (2, rows) from the window that ends at each row; NaN before the first."""
     empty = np.full(filters.shape[1] - 1, np.nan)
-    return np.array([np.concatenate((empty, np.correlate(position_m, each, "valid"))) for each in filters])
+    return np.array([np.concatenate((empty, np.correlate(course.measured_m, each, "valid"))) for each in filters])
+
+
+def fir_length(course: Course) -> int:
+    """Return the number of samples in the derivative filters, the seed's 500 at its period."""
+    return round(derivative_window_s(course.period_s) / course.period_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """What the seed's figures 3 to 6 show, sample by sample from 0.4 to 0.8 s, SI units; corrected forms.
+    """What the seed's figures 3 to 5 show, sample by sample from 0.4 to 0.8 s: a, b, c by (13), SI units.
 
     Attributes:
-        time_s: of the samples.
-        theta: a, b, c (3, samples) by (13).
-        friction_m_per_s2: k_e by (22), with a, b, c of that time; the measured position is taken for x_e.
-        friction_true_x_m_per_s2: the same with the true position for x_e, for which the seed gives no estimator.
+        rows: of the course.
+        theta: a, b, c (3, samples).
     """
 
-    time_s: Array
+    rows: Array
     theta: Array
-    friction_m_per_s2: Array
-    friction_true_x_m_per_s2: Array
 
 
 def tracks(course: Course) -> Tracks:
-    """Return the seed's estimates over the stretch its graphs show."""
+    """Return the seed's a, b, c over the stretch its graphs show."""
     seen = course.identifying
-    at = np.arange(course.row_at(GRAPHS_FROM_S), seen.stop)
-    theta = solved(course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], at)
-    velocity, acceleration = derivatives(course)[:, at]
-    a, b, c = theta
-    but_position = acceleration - a * velocity - c * course.pressure_pa[at]
-    return Tracks(
-        course.time_s[at], theta, but_position - b * course.measured_m[at], but_position - b * course.true_m[at]
+    rows = np.arange(course.row_at(GRAPHS_FROM_S), seen.stop)
+    theta = solved(course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], rows)
+    return Tracks(rows, theta)
+
+
+def friction(course: Course, seen: Tracks, filters: Array, position_m: Array) -> Array:
+    """Return k_e by (22), corrected, over that stretch, with a, b, c of the same time; figure 6.
+
+    Args:
+        course: the course.
+        seen: its a, b, c.
+        filters: of the derivatives.
+        position_m: taken for x_e, for which the seed gives no estimator; a row per sample of the course.
+    """
+    a, b, c = seen.theta
+    velocity, acceleration = derivatives(course, filters)[:, seen.rows]
+    return np.asarray(
+        acceleration - a * velocity - b * position_m[seen.rows] - c * course.pressure_pa[seen.rows], dtype=np.float64
     )
 
 
@@ -245,7 +258,8 @@ def _identifier(course: Course, valve: ValveParameters) -> list[Erratum]:
 
 def _filters(course: Course) -> list[Erratum]:
     """(19) and (21) by their delay: the one with which they fit the true motion of the first jerk best."""
-    printed, corrected = printed_derivatives(course), derivatives(course)
+    n, h = fir_length(course), course.period_s
+    printed, corrected = (derivatives(course, filters(n, h)) for filters in (printed_filters, corrected_filters))
     true = course.true_m_per_s, np.gradient(course.true_m_per_s, course.time_s)
     return [
         Erratum(
@@ -261,7 +275,7 @@ def _filters(course: Course) -> list[Erratum]:
 
 
 def _delay_s(course: Course, estimate: Array, true: Array) -> float:
-    n = _window(course)
+    n = fir_length(course)
     rows = slice(3 * n, 20 * n)
     lags = np.arange(2 * n)
     misfits = [float(np.mean((estimate[rows] - true[rows.start - lag : rows.stop - lag]) ** 2)) for lag in lags]
@@ -273,7 +287,8 @@ def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
     last = course.identifying.stop - 1
     numbers = truth(valve)
     a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
-    velocity, acceleration = derivatives(course)[:, last].tolist()
+    filters = corrected_filters(fir_length(course), course.period_s)
+    velocity, acceleration = derivatives(course, filters)[:, last].tolist()
     x, u = float(course.measured_m[last]), float(course.pressure_pa[last])
     up, down = course.row_at(S2_FROM_S), course.row_at(UNTIL_S)
     r_up, r_down = float(course.reference_m[up]), float(course.reference_m[down])

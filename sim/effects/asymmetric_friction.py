@@ -9,11 +9,31 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+LOOKS = (
+    "Opening and closing break away at, and slide against, different forces: in open loop the stem drifts one way "
+    "under a symmetric command."
+)
+CONFOUNDED = {
+    "preload": "break-away and sliding levels in both directions: a preload shifts both by the same force, an "
+    "asymmetry in proportion to each",
+    "sensor_offset": "break-away and sliding levels in both directions: an offset shifts both by the same force, an "
+    "asymmetry in proportion to each",
+}
+
 
 class Parameters(NamedTuple):
     """e."""
 
-    asymmetry: Annotated[float, Parameter("half the difference over the mean, > 0: opening is harder", -0.9, 0.9)]
+    asymmetry: Annotated[
+        float,
+        Parameter(
+            "half the difference over the mean, > 0: opening is harder",
+            -0.9,
+            0.9,
+            off=0.0,
+            starts=(-0.02, 0.02, -0.1, 0.1, -0.4, 0.4),
+        ),
+    ]
 
 
 def friction(F_c: float, F_s: float, direction: float, q: Parameters) -> tuple[float, float]:

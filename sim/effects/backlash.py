@@ -12,10 +12,22 @@ from sim.effect import Memory, Parameter
 MEMORY = 1
 
 
+LOOKS = "After every reversal the indication stays while the stem already moves; the curve of a slow cycle is as wide."
+CONFOUNDED = {
+    "coulomb_n": "restarts in the same direction after a hold: friction holds again, the play is taken up already",
+    "static_n": "restarts in the same direction after a hold: friction holds again, the play is taken up already",
+    "presliding": "restarts in the same direction after a hold: the packing yields again, the play is taken up",
+    "quantisation": "a slow ramp without a reversal: the play shows nothing, the quantum equal stairs",
+}
+
+
 class Parameters(NamedTuple):
     """w."""
 
-    width_m: Annotated[float, Parameter("width of the play", 0.0, 0.1)]
+    width_m: Annotated[
+        float,
+        Parameter("width of the play", 0.0, 1.0, off=0.0, starts=(5e-4, 2e-3, 0.01, 0.05), scale="stroke_m"),
+    ]
 
 
 def start(signal: float, z: Memory) -> None:

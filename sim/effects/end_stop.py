@@ -9,14 +9,36 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
+LOOKS = "The stem halts at a position, always the same one, however far the command goes on, and leaves it late."
+CONFOUNDED = {
+    "supply_limit": "measured actuator pressure: the limit cuts it, a stop does not; without it, a load that moves the "
+    "place where the stem halts moves only the limit's",
+}
+
 
 class Parameters(NamedTuple):
     """The stops and their contact."""
 
-    lower_m: Annotated[float, Parameter("position of the lower stop", -10.0, 10.0)]
-    travel_m: Annotated[float, Parameter("distance from the lower to the upper stop", 1e-4, 10.0)]
-    stiffness_n_per_m: Annotated[float, Parameter("contact stiffness", 1e5, 1e9)]
-    damping_ns_per_m: Annotated[float, Parameter("contact damping", 0.0, 1e5)]
+    lower_m: Annotated[
+        float, Parameter("position of the lower stop", -100.0, 100.0, off=-100.0, starts=(0.0, 0.1), scale="stroke_m")
+    ]
+    travel_m: Annotated[
+        float,
+        Parameter(
+            "distance from the lower to the upper stop",
+            1e-4,
+            200.0,
+            off=200.0,
+            starts=(1.0, 0.9, 0.75, 0.5),
+            scale="stroke_m",
+        ),
+    ]
+    stiffness_n_per_m: Annotated[
+        float, Parameter("contact stiffness", 1e5, 1e9, starts=(2000.0,), scale="spring_n_per_m", given=True)
+    ]
+    damping_ns_per_m: Annotated[
+        float, Parameter("contact damping", 0.0, 1e5, starts=(16.0,), scale="viscous_ns_per_m", given=True)
+    ]
 
 
 def force(x: float, v: float, q: Parameters) -> float:

@@ -3,7 +3,7 @@
     T p' = u - p
 
 T time constant, s; u entering pressure, p leaving pressure, Pa. Over a step h in which u goes straight from u_0 to u_1,
-with r = (u_1 - u_0) / h, exactly: p_1 = u_1 - r T + (p_0 - u_0 + r T) exp(-h / T).
+with r = (u_1 - u_0) / h, exactly: p_1 = u_1 - r T + (p_0 - u_0 + r T) exp(-h / T). At T = 0 it lets u through.
 """
 
 from math import exp
@@ -12,12 +12,23 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
+LOOKS = (
+    "After a step of the command the stem starts late and gently, is fastest later and creeps into its end, in the "
+    "same shape whatever the step's height; on a ramp it runs T behind."
+)
+CONFOUNDED = {
+    "dead_time": "the first moments after a step: the lag answers at once, the dead time not at all",
+    "rate_limit": "steps of different heights: the lag stretches none of them, the limit the high ones",
+    "sensor_lag": "measured actuator pressure: the lag lies before it, the sensor's after the stem",
+}
 
 
 class Parameters(NamedTuple):
     """T."""
 
-    time_constant_s: Annotated[float, Parameter("time constant", 1e-4, 60.0)]
+    time_constant_s: Annotated[
+        float, Parameter("time constant", 0.0, 60.0, off=0.0, starts=(0.005, 0.02, 0.05, 0.2, 1.0))
+    ]
 
 
 def start(signal: float, z: Memory) -> None:
@@ -25,12 +36,16 @@ def start(signal: float, z: Memory) -> None:
     z[0] = signal
 
 
-def pressure(z: Memory) -> float:
+def pressure(u: float, q: Parameters, z: Memory) -> float:
     """Return p."""
-    return float(z[0])
+    return float(z[0]) if q.time_constant_s > 0.0 else u
 
 
 def advance(before: float, after: float, h: float, q: Parameters, z: Memory) -> None:
     """Carry p over the step."""
-    ramp = (after - before) / h * q.time_constant_s
-    z[0] = after - ramp + (z[0] - before + ramp) * exp(-h / q.time_constant_s)
+    T = q.time_constant_s
+    if T > 0.0:
+        ramp = (after - before) / h * T
+        z[0] = after - ramp + (z[0] - before + ramp) * exp(-h / T)
+    else:
+        z[0] = after

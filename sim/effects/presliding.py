@@ -17,10 +17,31 @@ HELD, BALANCED_N = 0, 1
 """Whether the packing holds the stem, and the force it balances, F_h + k_p (x - x_h)."""
 
 
+LOOKS = (
+    "Small steps move the stuck stem a little, in proportion, and back again, before break-away; after a slip has "
+    "stopped it gives way when the pressure turns."
+)
+CONFOUNDED = {
+    "backlash": "restarts in the same direction after a hold: the packing yields again, the play is taken up",
+    "stribeck": "small steps against a stuck stem: only presliding moves it",
+    "quantisation": "small steps against a stuck stem: presliding follows each in proportion, a quantum not or wholly",
+}
+
+
 class Parameters(NamedTuple):
     """k_p."""
 
-    stiffness_n_per_m: Annotated[float, Parameter("presliding stiffness", 1e5, 1e10)]
+    stiffness_n_per_m: Annotated[
+        float,
+        Parameter(
+            "presliding stiffness",
+            1.0,
+            1e12,
+            off=1e12,
+            starts=(1e5, 3e4, 1e4, 3e3, 1e3),
+            scale="coulomb_n",
+        ),
+    ]
 
 
 def start(F_e: float, z: Memory) -> None:

@@ -1,0 +1,67 @@
+"""Limited flow of air: the actuator fills and vents no faster than it can.
+
+    p = u where that keeps   -r_v <= p' <= r_f,   else p goes towards u at the limit
+
+r_f filling rate, r_v venting rate, Pa/s; u entering pressure, p leaving pressure, Pa. A jump for which
+a step's time suffices is made at once.
+"""
+
+from typing import Annotated, NamedTuple
+
+from sim.effect import Memory, Parameter
+
+MEMORY = 1
+LOOKS = (
+    "High steps are answered by a ramp whose slope does not depend on the step's height, and differs between opening "
+    "and closing if filling and venting do; small steps are untouched."
+)
+CONFOUNDED = {
+    "ip_lag": "steps of different heights: the limit stretches the high ones, the lag none of them",
+    "viscous_ns_per_m": "measured actuator pressure: the limit lies before it, viscous friction after",
+    "quadratic_drag": "measured actuator pressure: the limit lies before it, drag after",
+}
+
+
+class Parameters(NamedTuple):
+    """r_f and r_v."""
+
+    filling_pa_per_s: Annotated[
+        float,
+        Parameter(
+            "most rise of the pressure per second",
+            1e-3,
+            1e10,
+            off=1e10,
+            starts=(10.0, 3.0, 1.0, 0.3),
+            scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
+        ),
+    ]
+    venting_pa_per_s: Annotated[
+        float,
+        Parameter(
+            "most fall of the pressure per second",
+            1e-3,
+            1e10,
+            off=1e10,
+            starts=(10.0, 3.0, 1.0, 0.3),
+            scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
+        ),
+    ]
+
+
+def start(signal: float, z: Memory) -> None:
+    """Settled."""
+    z[0] = signal
+
+
+def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
+    """Return p; at the start of a step, u if the step's time suffices to get there."""
+    half = middle - t
+    if half > 0.0 and -q.venting_pa_per_s * half <= 0.5 * (u - z[0]) <= q.filling_pa_per_s * half:
+        return u
+    return float(z[0])
+
+
+def advance(after: float, h: float, q: Parameters, z: Memory) -> None:
+    """Follow u as fast as the air does."""
+    z[0] = min(max(after, z[0] - q.venting_pa_per_s * h), z[0] + q.filling_pa_per_s * h)

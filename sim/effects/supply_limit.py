@@ -1,0 +1,48 @@
+"""The supply pressure is all there is, and the exhaust lets not all of it go.
+
+    p = min(max(u, p_e), p_s)
+
+p_s supply pressure, p_e pressure left in the vented actuator, Pa; u entering pressure, p leaving pressure, Pa.
+"""
+
+from typing import Annotated, NamedTuple
+
+from sim.effect import Parameter
+
+LOOKS = "Beyond a command, always the same one, the stem answers no further, at the upper end, at the lower or both."
+CONFOUNDED = {
+    "end_stop": "measured actuator pressure: the limit cuts it, a stop does not; without it, a load that moves the "
+    "place where the stem halts moves only the limit's",
+}
+
+
+class Parameters(NamedTuple):
+    """p_s and p_e."""
+
+    supply_pa: Annotated[
+        float,
+        Parameter(
+            "supply pressure, gauge",
+            0.0,
+            1e7,
+            off=1e7,
+            starts=(0.95, 0.85, 0.7, 0.5),
+            scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
+        ),
+    ]
+    exhaust_pa: Annotated[
+        float,
+        Parameter(
+            "pressure left when vented, gauge; down to that of a vacuum",
+            -101325.0,
+            1e7,
+            off=-101325.0,
+            starts=(-2.0, 0.05, 0.15, 0.3),
+            scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
+        ),
+    ]
+
+
+def pressure(u: float, q: Parameters) -> float:
+    """Cut u at both ends."""
+    return min(max(u, q.exhaust_pa), q.supply_pa)

@@ -1,0 +1,352 @@
+"""Fit: the parameters with which one free run through the whole recording comes closest.
+
+`simulation_error` has the cost and its search, `starts` where searches begin, `parameters` the coordinates,
+`uncertainty` what the recording says about the result. Effects to be added begin on a grid of strengths at the best
+base fits, and at no strength, so that the extended valve is never worse than the base it extends.
+
+Several searches are made, and how far their results agree is told. The result does not depend on the number of
+workers, which are threads: the simulation holds no interpreter lock.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from os import cpu_count
+from typing import Any, TypeVar
+
+import numpy as np
+
+from config.errors import InputError
+from config.loading import validated
+from config.recording import Column, Recording
+from config.valve import EffectTable, ValveFile
+from sim.composition import BASE, Composition
+from sim.effect import Effect, shipped_effect
+from sim.karnopp import Vector
+from workbench.free_run import FreeRun
+from workbench.measures import fit_percent
+from workbench.motion import slips
+from workbench.parameters import DEFAULT, STATIC, Parameter, free_parameters, strengths
+from workbench.record import Record, ready, require_units
+from workbench.simulation_error import SCALES, SimulationError
+from workbench.starts import drawn, forces_regressed
+from workbench.uncertainty import Uncertainty, uncertainty
+
+STARTS = 6
+"""Searches made."""
+POLLED = 3
+"""Of these, the best are carried to the end by polling."""
+BASE_SEEDS = 3
+"""Base fits on which an effect's strengths are tried."""
+DRAWS_REGRESSED, DRAWS_FILE = 40, 12
+SCREEN = SCALES[1]
+AGREE = 1.05
+"""Searches agree if their costs are within this factor of the best."""
+FLAT = 0.5
+"""Rise of the cost that is nothing: within it static friction is put in the middle."""
+AT_BOUND = 1e-3
+LEAST_SLIPS = 3
+
+Progress = Callable[[float], None]
+T = TypeVar("T")
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A parameter with its standard deviation and 95 % interval, in its own unit."""
+
+    value: float
+    std: float
+    lower: float
+    upper: float
+    at_bound: bool
+    """It lies at the end of its physical range."""
+    physical: bool
+    """False if the recording wants it beyond that end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """What one search came to."""
+
+    cost: float
+    rms_m: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted valve, in the habits of scikit-learn: predict, score, and the attributes."""
+
+    valve: ValveFile
+    parameters: Mapping[str, Fitted]
+    rms_m: float
+    floor_m: float
+    """The error that no model undercuts: noise, or repeatability where the command repeats itself."""
+    cost: float
+    """Soft-L1 cost of scale 5, in units of the noise; half the number of samples for white residuals."""
+    count: int
+    """Judged samples."""
+    starts: tuple[Search, ...]
+    """The searches, best first."""
+    agreement: int
+    """How many of the polled searches came within 5 % of the best cost."""
+    condition: float
+    undetermined: tuple[str, ...]
+    notes: tuple[str, ...]
+    from_pressure: bool
+    seeds: tuple[Vector, ...] = field(repr=False)
+    """Parameter vectors of the best searches."""
+
+    @property
+    def trusted(self) -> bool:
+        """Whether more than one search came to the same error."""
+        return self.agreement > 1
+
+    def predict(self, recording: Recording) -> Column:
+        """Return the indicated position of a free run, m; NaN in rows that are not simulated."""
+        return self._run(ready(recording))
+
+    def score(self, recording: Recording) -> float:
+        """Return the fit, 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than a mean."""
+        record = ready(recording)
+        return fit_percent(record, self._run(record)) / 100.0
+
+    def _run(self, record: Record) -> Column:
+        composition = Composition.from_file(self.valve)
+        return FreeRun(composition, record, from_pressure=self.from_pressure).position_m(composition.theta)
+
+
+def fit(
+    recording: Recording,
+    valve: ValveFile,
+    *,
+    effects: Sequence[str] = (),
+    free: Sequence[str] | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    from_pressure: bool = False,
+    base: Fit | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit a valve to a recording.
+
+    Args:
+        recording: what was measured.
+        valve: where to begin; its area, mass, Stribeck velocity and stroke are kept unless named in `free`.
+        effects: names of effects to be added to those of the valve file.
+        free: parameters to be fitted, an effect's as `effect.parameter`; by default spring, viscous, Coulomb and static
+            friction and all that the effects have.
+        seed: of the draws.
+        workers: threads, by default one a core.
+        from_pressure: simulate from the measured pressure instead of the command, without the pressure path.
+        base: the fit without `effects`, if it is there already.
+        progress: told the fraction done.
+
+    Raises:
+        InputError: the recording holds too little, other units than SI, or an unknown effect or parameter.
+    """
+    record = ready(recording)
+    require_units(record, valve.valve)
+    _require_motion(record)
+    if not effects:
+        composition = Composition.from_file(valve)
+        error = _error(composition, record, free, from_pressure)
+        return _searched(composition, error, _base_starts(composition, error, seed), workers, progress)
+    ground = base or fit(recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free))
+    composition = _extended(ground.valve, effects)
+    error = _error(composition, record, free, from_pressure)
+    return _searched(composition, error, _effect_starts(composition, error, effects, ground), workers, progress)
+
+
+def _error(composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool) -> SimulationError:
+    run = FreeRun(composition, record, from_pressure=from_pressure)
+    reached = [
+        name for each in composition.effects if not (from_pressure and "pressure" in each.functions)
+        for name in (f"{each.name}.{key}" for key in each.parameters)
+    ]  # fmt: skip
+    parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free)
+    return SimulationError(run, composition, parameters, composition.theta)
+
+
+def _of_base(free: Sequence[str] | None) -> Sequence[str] | None:
+    return None if free is None else [name for name in free if name in BASE]
+
+
+def _require_motion(record: Record) -> None:
+    found = [
+        each
+        for first, end in record.segments
+        for each in slips(np.where(record.judged, record.position_m, np.nan)[first:end], record.noise_m)
+    ]
+    if len(found) < LEAST_SLIPS:
+        raise InputError(
+            "recording", f"the stem moves {len(found)} times, at least {LEAST_SLIPS} are needed to fit anything"
+        )
+    if len({each.direction for each in found}) < 2:
+        way = "opens" if found[0].direction > 0 else "closes"
+        raise InputError("recording", f"the stem only {way}: friction and spring cannot be told apart without both ways")
+
+
+def _extended(valve: ValveFile, effects: Sequence[str]) -> Composition:
+    """Compose the valve with effects added, each somewhere in its range."""
+    there = [each.name for each in valve.effect]
+    for name in effects:
+        if name in there:
+            raise InputError("valve file", f"effect {name} is there already")
+    tables = [_somewhere(shipped_effect(name, "effects")) for name in effects]
+    return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
+
+
+def _somewhere(effect: Effect) -> EffectTable:
+    values = {key: min(max(0.0, each.least), each.most) for key, each in effect.parameters.items()}
+    return EffectTable.model_validate({"name": effect.name, **values})
+
+
+def _base_starts(composition: Composition, error: SimulationError, seed: int) -> list[Vector]:
+    """Return coordinates: the valve file's, the regression's, and draws round both; the best by the screening cost."""
+    generator = np.random.default_rng(seed)
+    theta = composition.theta
+    regressed = forces_regressed(theta, error.run.record, error.run.from_pressure)
+    pool = [theta, regressed, *drawn(regressed, DRAWS_REGRESSED, generator), *drawn(theta, DRAWS_FILE, generator)]
+    return _screened(error, [error.coordinates(each) for each in pool])
+
+
+def _effect_starts(composition: Composition, error: SimulationError, effects: Sequence[str], base: Fit) -> list[Vector]:
+    """Return coordinates: each base seed with each strength, the best by the screening cost, and the base as it is."""
+    added = [each for each in error.parameters if each.name.partition(".")[0] in effects]
+    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds[:BASE_SEEDS]]
+    grid = [_with(error, theta, added, values) for theta in seeds for values in strengths(composition, added, error.run.record)]
+    ends = [tuple(end(each) for each in added) for end in (_off, lambda each: each.least, lambda each: each.most)]
+    weakest = min((_with(error, seeds[0], added, values) for values in ends), key=error.cost)
+    return [weakest, *_screened(error, grid)]
+
+
+def _off(parameter: Parameter) -> float:
+    return min(max(0.0, parameter.least), parameter.most)
+
+
+def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
+    changed = theta.copy()
+    for parameter, value in zip(added, values, strict=True):
+        changed[parameter.index] = value
+    return error.coordinates(changed)
+
+
+def _screened(error: SimulationError, pool: list[Vector]) -> list[Vector]:
+    return sorted(pool, key=lambda z: error.cost(z, SCREEN))[:STARTS]
+
+
+def _searched(
+    composition: Composition,
+    error: SimulationError,
+    begins: list[Vector],
+    workers: int | None,
+    progress: Progress | None,
+) -> Fit:
+    """Search from every start, poll the best, and judge what was found."""
+    tell = progress or (lambda _: None)
+    # An undescended start stays in the race: descent at a wide scale may lose it.
+    down = _each(error.descended, begins, workers, lambda done: tell(0.5 * done))
+    down = sorted([*down, begins[0]], key=error.cost)
+    ends = _each(lambda z: _ended(error, z), down[:POLLED] + [begins[0]], workers, lambda done: tell(0.5 + 0.4 * done))
+    ends = sorted(ends, key=error.cost)
+    best = _centred(error, ends[0])
+    judged = uncertainty(error, best, ends)
+    tell(1.0)
+    costs = [error.cost(z) for z in ends]
+    valve = _fitted_file(composition, error.theta(best))
+    return Fit(
+        valve,
+        {each.name: _fitted(error, best, judged, i) for i, each in enumerate(error.parameters)},
+        error.rms_m(best),
+        error.run.record.floor_m,
+        error.cost(best),
+        error.count,
+        tuple(_search(error, z) for z in sorted([*ends, *down[POLLED:]], key=error.cost)),
+        sum(cost <= AGREE * costs[0] + error.count * (AGREE - 1.0) for cost in costs),
+        judged.condition,
+        judged.undetermined,
+        error.run.record.notes,
+        error.run.from_pressure,
+        (error.theta(best), *(error.theta(z) for z in ends[1:])),
+    )
+
+
+def _ended(error: SimulationError, z: Vector) -> Vector:
+    """Poll, go down once more, poll."""
+    polled = error.polled(z)
+    again = error.polled(error.descended(polled))
+    return min(polled, again, key=error.cost)
+
+
+def _centred(error: SimulationError, z: Vector) -> Vector:
+    """Put static friction in the middle of the interval that gives the same slips."""
+    at = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
+    if not at:
+        return z
+    limit = error.cost(z) + FLAT
+    ends = []
+    for way in (-1.0, 1.0):
+        reach = 1e-5
+        while reach < 0.2 and error.cost(_moved(error, z, at[0], 2.0 * way * reach)) < limit:
+            reach *= 2.0
+        ends.append(way * reach)
+    middle = _moved(error, z, at[0], 0.5 * sum(ends))
+    return middle if error.cost(middle) < limit else z
+
+
+def _moved(error: SimulationError, z: Vector, i: int, way: float) -> Vector:
+    there = z.copy()
+    there[i] = np.clip(z[i] + way, error.lower[i], error.upper[i])
+    return there
+
+
+def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> Fitted:
+    parameter = error.parameters[i]
+
+    def value(coordinate: float) -> float:
+        there = z.copy()
+        there[i] = coordinate
+        return float(error.theta(there)[parameter.index])
+
+    low, high = error.lower[i], error.upper[i]
+    near = AT_BOUND * (high - low)
+    at_bound = bool(z[i] < low + near or z[i] > high - near)
+    inward = 10.0 * near if z[i] < low + near else -10.0 * near
+    wants_out = at_bound and error.cost(_moved(error, z, i, inward)) > error.cost(z) + judged.rise
+    slope = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
+    return Fitted(
+        value(z[i]),
+        abs(slope) * float(judged.std[i]),
+        value(max(low, float(judged.lower[i]))),
+        value(min(high, float(judged.upper[i]))),
+        at_bound,
+        not wants_out,
+    )
+
+
+def _search(error: SimulationError, z: Vector) -> Search:
+    theta = error.theta(z)
+    return Search(error.cost(z), error.rms_m(z), {each.name: float(theta[each.index]) for each in error.parameters})
+
+
+def _fitted_file(composition: Composition, theta: Vector) -> ValveFile:
+    values: dict[str, Any] = dict(zip(composition.names, theta.tolist(), strict=True))
+    base = composition.valve.model_dump() | {name: values[name] for name in BASE}
+    tables = [
+        {"name": each.name} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
+        for each in composition.effects
+    ]
+    return validated(ValveFile, {"valve": base, "effect": tables}, composition.source)
+
+
+def _each(function: Callable[[T], S], arguments: Sequence[T], workers: int | None, tell: Progress) -> list[S]:
+    """Apply a function to each argument on the workers; results in the order of the arguments."""
+    results = []
+    with ThreadPoolExecutor(workers or cpu_count()) as pool:
+        for result in pool.map(function, arguments):
+            results.append(result)
+            tell(len(results) / len(arguments))
+    return results

@@ -1,0 +1,79 @@
+"""What no model can explain: the sensor's noise, its rounding, and how well the valve repeats itself.
+
+    d_k = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-3),   var d = 20 sigma^2     a smooth motion hardly shows in d
+    sigma = median over blocks of sqrt(mean d^2 / 20), at least q / sqrt 12 for a quantum q
+
+A record whose command repeats after a lag L shows the position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2.
+"""
+
+import numpy as np
+
+from config.recording import Column
+
+BLOCK = 16
+FEW_LEVELS = 0.2
+"""A position is rounded if its differing values are fewer than this part of the samples, or lie on a grid."""
+REPEATS = 1e-3
+"""A command repeats if its rms difference over the lag is below this part of its rms deviation."""
+
+
+def noise_std_m(position_m: Column) -> float:
+    """Return the standard deviation of the white noise in m, rounding included; 0 for fewer than 20 samples."""
+    third = np.diff(position_m[np.isfinite(position_m)], 3)
+    blocks = third[: third.size // BLOCK * BLOCK].reshape(-1, BLOCK)
+    if not len(blocks):
+        return 0.0
+    white = float(np.median(np.sqrt(np.mean(blocks**2, axis=1) / 20.0)))
+    return max(white, quantum_m(position_m) / 12**0.5)
+
+
+def quantum_m(position_m: Column) -> float:
+    """Return the step to which the position is rounded, in m; 0 if it is not."""
+    levels = np.unique(position_m[np.isfinite(position_m)])
+    steps = np.diff(levels)
+    if steps.size < 2:
+        return float(steps[0]) if steps.size else 0.0
+    # Levels a rounding error apart are one level.
+    steps = steps[steps > 1e-9 * float(np.ptp(levels))]
+    quantum = float(np.quantile(steps, 0.02))
+    on_grid = np.abs(steps / quantum - np.round(steps / quantum)) < 0.02
+    is_rounded = on_grid.mean() > 0.95 and levels.size < FEW_LEVELS * position_m.size + 2
+    return float(np.median(steps[steps < 1.5 * quantum])) if is_rounded else 0.0
+
+
+def repeat_lag(command_pa: Column) -> int | None:
+    """Return the shortest lag, in samples, after which the evenly sampled command repeats itself; None if it does not.
+
+    At least a third of the lag must be there twice, and the command must change within it.
+    """
+    n = command_pa.size
+    u = command_pa - command_pa.mean()
+    power = float(np.mean(u**2))
+    if n < 60 or power == 0.0:
+        return None
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(u, size)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, size)[:n]
+    total = np.concatenate([[0.0], np.cumsum(u**2)])
+    lags = np.arange(n)
+    difference = (total[n - lags] + total[n] - total[lags] - 2.0 * products) / (n - lags)
+    allowed = (lags >= 20) & (n - lags >= np.maximum(20, lags // 3)) & (difference < REPEATS**2 * power)
+    for lag in lags[allowed].tolist():
+        # A held command repeats itself after any lag: it must have moved in the meantime.
+        if np.ptp(u[:lag]) > power**0.5 and np.ptp(u[lag:]) > power**0.5 and difference[lag // 2] > 0.01 * power:
+            return int(lag)
+    return None
+
+
+def repeatability_m(command_pa: Column, position_m: Column) -> float | None:
+    """Return the repeatability in m of an evenly sampled stretch, None if its command does not repeat itself.
+
+    A first lap of three or more is left out: it begins elsewhere.
+    """
+    lag = repeat_lag(command_pa)
+    if lag is None:
+        return None
+    first = lag if command_pa.size > 2.5 * lag else 0
+    difference = position_m[first + lag :] - position_m[first:-lag]
+    finite = difference[np.isfinite(difference)]
+    return float(np.sqrt(np.mean(finite**2) / 2.0)) if finite.size else None

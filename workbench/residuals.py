@@ -1,0 +1,105 @@
+"""The residual, simulated minus measured position, against all that could explain it.
+
+    r_xy(k) = sum_i x_i y_(i+k) / sqrt(sum x^2 sum y^2)                     lags k = 0..25 (residual), -25..25 (input)
+    white residual: |r_ee(k)| < 2.58 / sqrt n                               99 % band
+    independent input: |r_ue(k)| < 2.58 sqrt(sum_l r_uu(l) r_ee(l) / n)     99 % band (Bartlett), both with their memory
+
+A residual of a simulation need not be white, but it must not depend on the input.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from config.recording import Column
+
+LAGS = 25
+BAND_99 = 2.576
+MEMORY = 0.2
+"""Part of the record over which correlations are summed for the input's band."""
+BINS = 20
+FEWEST = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Mean and its standard error over bins of something; bins with few samples are left out."""
+
+    centre: Column
+    mean: Column
+    standard_error: Column
+    count: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Correlation:
+    """Correlation by lag, in samples and s, and the half-width of its 99 % band."""
+
+    lag: NDArray[np.int64]
+    lag_s: Column
+    value: Column
+    band: float
+
+    @property
+    def outside(self) -> int:
+        """Number of lags, 0 of an autocorrelation excepted, outside the band."""
+        seen = np.abs(self.value) > self.band
+        return int(seen[(self.lag != 0) | (np.abs(self.value) < 1.0 - 1e-12)].sum())
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """Power spectral density of the residual, m^2/Hz."""
+
+    frequency_hz: Column
+    density_m2_per_hz: Column
+
+
+def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
+    """Return the profile of values over something, both of equal length and finite."""
+    span = float(np.ptp(over)) if over.size else 0.0
+    member = np.minimum(((over - over.min()) / span * bins).astype(np.int64), bins - 1) if span else np.zeros(over.size, np.int64)
+    count = np.bincount(member, minlength=bins)
+    kept = np.flatnonzero(count >= FEWEST)
+    n = count[kept]
+    mean = np.bincount(member, values, bins)[kept] / n
+    square = np.bincount(member, values**2, bins)[kept] / n
+    deviation = np.sqrt(np.maximum(square - mean**2, 0.0))
+    centre = np.bincount(member, over, bins)[kept] / n
+    return Profile(centre, mean, deviation / np.sqrt(n), n)
+
+
+def autocorrelation(residual_m: Column, period_s: float) -> Correlation:
+    """Return lags 0 to 25 of an evenly sampled residual."""
+    rho = _correlated(residual_m, residual_m)
+    lag = np.arange(min(LAGS + 1, residual_m.size))
+    return Correlation(lag, lag * period_s, rho[lag], BAND_99 / residual_m.size**0.5)
+
+
+def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -> Correlation:
+    """Return lags -25 to 25 between input and residual; at positive lags the input comes first."""
+    n = residual_m.size
+    reach = min(LAGS, n - 1)
+    lag = np.arange(-reach, reach + 1)
+    memory = np.arange(1, max(2, int(MEMORY * n)))
+    taper = 1.0 - memory / memory.size
+    both = _correlated(command_pa, command_pa)[memory] * _correlated(residual_m, residual_m)[memory]
+    variance = max(1.0, 1.0 + 2.0 * float(np.sum(taper * both))) / n
+    return Correlation(lag, lag * period_s, _correlated(command_pa, residual_m)[lag], BAND_99 * variance**0.5)
+
+
+def _correlated(first: Column, second: Column) -> Column:
+    """Return the correlation by lag; negative lags at the end, as numpy indexes them."""
+    a, b = first - first.mean(), second - second.mean()
+    size = 1 << (2 * a.size - 1).bit_length()
+    power = float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+    products = np.fft.irfft(np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size), size)
+    return np.asarray(products / power) if power > 0.0 else np.zeros(size)
+
+
+def spectrum(residual_m: Column, period_s: float) -> Spectrum:
+    """Return Welch's estimate for an evenly sampled residual."""
+    frequency, density = welch(residual_m, 1.0 / period_s, nperseg=min(1024, residual_m.size))
+    return Spectrum(frequency, density)
