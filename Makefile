@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test lint bench clean
+.PHONY: venv demo test lint bench soak docs clean
 
 venv: $(READY)
 
@@ -27,6 +27,13 @@ lint: $(READY)
 
 bench: $(READY)         ## figures that depend on the machine, as ratios in one run
 	$(BIN)/python -m benchmarks
+
+soak: $(READY)          ## ten minutes of a polled, recording daemon: does its memory stay flat?
+	$(BIN)/python -m benchmarks.memory --minutes 10
+
+docs: $(READY)          ## the documents' pictures and figures, made anew
+	$(BIN)/positioner reproduce --out docs/img
+	$(BIN)/positioner demo --out demo-out && cp demo-out/run.png docs/img/demo.png
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out build dist

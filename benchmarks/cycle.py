@@ -21,7 +21,7 @@ from config.registers import Mode
 from config.slave import SlaveFile
 from config.valve import shipped_valve
 from drivers import driver_for
-from positioner.cli.virtual import Script, played, virtual_cycle
+from positioner.cli.parts.virtual import Script, played, virtual_cycle
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
@@ -31,6 +31,7 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
+from sim.slave.modbus import device_of
 
 STROKE_M = 0.1016
 DAEMON = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}})
@@ -107,7 +108,7 @@ def full_loop(cycle: Cycle) -> Callable[[], object]:
 def core_alone() -> Iterator[float]:
     """Yield the time of each step of the control core on the samples of a virtual run, us."""
     file = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "sensor": {"noise_std_m": 1e-5}})
-    cycle = virtual_cycle(DAEMON, file, shipped_valve("seed"), FIRST)
+    cycle = virtual_cycle(DAEMON, device_of(file, shipped_valve("seed")), FIRST)
     script = busy_dcs()
     seen: list[tuple[Sample, Requests]] = []
 

@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from positioner.cli.children import port_in, running
+from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 
 SLAVE = "[sensor]\nnoise_std_m = 1e-5\n"

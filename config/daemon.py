@@ -23,6 +23,7 @@ class Cycle(Schema):
 
     pace: Literal["real_time", "device"] = "real_time"
     period_s: Annotated[float, Field(ge=2e-4, le=10)] = 1e-3
+    """Of the loop in real time; a device in lockstep has its own."""
 
 
 class PressureLimits(Schema):

@@ -77,7 +77,9 @@ def _one_line(schema: type[BaseModel], error: ValidationError) -> str:
     if fault["type"] == "missing":
         return f"{key}: is required and missing{more}"
     message = fault["msg"].removeprefix("Value error, ")
-    return f"{key}: {message}, got {fault['input']!r}{more}"
+    # A fault of a whole table says itself what is wrong in it.
+    got = "" if isinstance(fault["input"], dict) else f", got {fault['input']!r}"
+    return f"{key}: {message}{got}{more}"
 
 
 def _keys_beside(schema: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:

@@ -37,7 +37,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import product, zip_longest
 from pathlib import Path
 from textwrap import dedent
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -98,10 +98,10 @@ def scale_of(text: str, valve: ValveParameters) -> float:
     """
     words = ["*", *text.split()] if text else []
     unit = 1.0
-    for joint, name in zip(words[::2], words[1::2], strict=True):
+    for joint, name in zip_longest(words[::2], words[1::2], fillvalue=""):
         value = getattr(valve, name, None)
         if joint not in {"*", "/"} or not isinstance(value, float):
-            raise ValueError(f"{joint} {name}")
+            raise ValueError(repr(text))
         unit = unit * value if joint == "*" else unit / value
     return unit
 
@@ -143,12 +143,16 @@ class Effect:
         """Return the grid of parameters from which a fit may start; the last parameter varies fastest.
 
         Raises:
-            InputError: a parameter declares no starts.
+            InputError: a parameter declares no starts, or a scale that is none.
         """
         return list(product(*(self._starts(key, valve) for key in self.parameters)))
 
     def _starts(self, key: str, valve: ValveParameters) -> tuple[float, ...]:
-        starts = self.parameters[key].starts_for(valve)
+        try:
+            starts = self.parameters[key].starts_for(valve)
+        except ValueError as error:
+            problem = f"Parameters.{key}: scale must be a product of the [valve] table's numbers, got {error}"
+            raise InputError(str(self.path), problem) from None
         if not starts:
             raise InputError(str(self.path), f"Parameters.{key}: declares no starts, from which a fit could begin")
         return starts
@@ -245,6 +249,7 @@ def _declared(path: Path, source: str) -> Effect:
             if argument not in allowed[name]:
                 raise InputError(str(path), f"{name}: unknown argument {argument}; allowed: {', '.join(allowed[name])}")
     _check_places(effect)
+    _check_words(effect)
     return effect
 
 
@@ -289,3 +294,11 @@ def _check_places(effect: Effect) -> None:
         raise InputError(str(effect.path), f"{alone.pop()} must be an effect's only place, got {', '.join(places)}")
     if any((name in effect.functions) != (effect.memory > 0) for name in UPKEEP):
         raise InputError(str(effect.path), "start and advance belong with MEMORY = 1 or more: all three or none")
+
+
+def _check_words(effect: Effect) -> None:
+    if not isinstance(effect.looks, str):
+        raise InputError(str(effect.path), f"LOOKS: must be a text, got {effect.looks!r}")
+    is_table = isinstance(effect.confounded, dict)
+    if not is_table or not all(isinstance(text, str) for pair in effect.confounded.items() for text in pair):
+        raise InputError(str(effect.path), f"CONFOUNDED: must give a text for each name, got {effect.confounded!r}")

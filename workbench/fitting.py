@@ -35,7 +35,7 @@ from workbench.uncertainty import Uncertainty, uncertainty
 STARTS = 6
 """Searches made."""
 POLLED = 3
-"""Of these, the best are carried to the end by polling."""
+"""Of these, the best are carried to the end by polling, the very best once more down and polled."""
 BASE_SEEDS = 3
 """Base fits on which an effect's strengths are tried."""
 DRAWS_REGRESSED, DRAWS_FILE = 40, 12
@@ -91,7 +91,7 @@ class Fit:
     starts: tuple[Search, ...]
     """The searches, best first."""
     agreement: int
-    """How many of the polled searches came within 5 % of the best cost."""
+    """How many of the searches that were carried to the end came within 5 % of the best cost."""
     condition: float
     undetermined: tuple[str, ...]
     notes: tuple[str, ...]
@@ -109,7 +109,7 @@ class Fit:
         return self._run(ready(recording))
 
     def score(self, recording: Recording) -> float:
-        """Return the fit, 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than a mean."""
+        """Return 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than the mean."""
         record = ready(recording)
         return fit_percent(record, self._run(record)) / 100.0
 
@@ -160,7 +160,9 @@ def fit(
     return _searched(composition, error, _effect_starts(composition, error, effects, ground), workers, progress)
 
 
-def _error(composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool) -> SimulationError:
+def _error(
+    composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool
+) -> SimulationError:
     run = FreeRun(composition, record, from_pressure=from_pressure)
     reached = [
         name for each in composition.effects if not (from_pressure and "pressure" in each.functions)
@@ -186,7 +188,9 @@ def _require_motion(record: Record) -> None:
         )
     if len({each.direction for each in found}) < 2:
         way = "opens" if found[0].direction > 0 else "closes"
-        raise InputError("recording", f"the stem only {way}: friction and spring cannot be told apart without both ways")
+        raise InputError(
+            "recording", f"the stem only {way}: friction and spring cannot be told apart without both ways"
+        )
 
 
 def _extended(valve: ValveFile, effects: Sequence[str]) -> Composition:
@@ -217,7 +221,11 @@ def _effect_starts(composition: Composition, error: SimulationError, effects: Se
     """Return coordinates: each base seed with each strength, the best by the screening cost, and the base as it is."""
     added = [each for each in error.parameters if each.name.partition(".")[0] in effects]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds[:BASE_SEEDS]]
-    grid = [_with(error, theta, added, values) for theta in seeds for values in strengths(composition, added, error.run.record)]
+    grid = [
+        _with(error, theta, added, values)
+        for theta in seeds
+        for values in strengths(composition, added, error.run.record)
+    ]
     ends = [tuple(end(each) for each in added) for end in (_off, lambda each: each.least, lambda each: each.most)]
     weakest = min((_with(error, seeds[0], added, values) for values in ends), key=error.cost)
     return [weakest, *_screened(error, grid)]
@@ -247,15 +255,14 @@ def _searched(
 ) -> Fit:
     """Search from every start, poll the best, and judge what was found."""
     tell = progress or (lambda _: None)
-    # An undescended start stays in the race: descent at a wide scale may lose it.
-    down = _each(error.descended, begins, workers, lambda done: tell(0.5 * done))
-    down = sorted([*down, begins[0]], key=error.cost)
-    ends = _each(lambda z: _ended(error, z), down[:POLLED] + [begins[0]], workers, lambda done: tell(0.5 + 0.4 * done))
-    ends = sorted(ends, key=error.cost)
+    # The first start as it is stays in the race: descent at a wide scale may lose it.
+    down = sorted([*_each(error.descended, begins, workers, lambda done: tell(0.6 * done)), begins[0]], key=error.cost)
+    ends = _each(error.polled, down[:POLLED], workers, lambda done: tell(0.6 + 0.3 * done))
+    ends = sorted([*ends, error.polled(error.descended(min(ends, key=error.cost)))], key=error.cost)
     best = _centred(error, ends[0])
     judged = uncertainty(error, best, ends)
     tell(1.0)
-    costs = [error.cost(z) for z in ends]
+    costs = [error.cost(z) for z in ends[:POLLED]]
     valve = _fitted_file(composition, error.theta(best))
     return Fit(
         valve,
@@ -272,13 +279,6 @@ def _searched(
         error.run.from_pressure,
         (error.theta(best), *(error.theta(z) for z in ends[1:])),
     )
-
-
-def _ended(error: SimulationError, z: Vector) -> Vector:
-    """Poll, go down once more, poll."""
-    polled = error.polled(z)
-    again = error.polled(error.descended(polled))
-    return min(polled, again, key=error.cost)
 
 
 def _centred(error: SimulationError, z: Vector) -> Vector:

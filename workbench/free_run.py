@@ -26,6 +26,8 @@ STILL = 4.0
 """Standard deviations of the noise within which the stem stands still."""
 LONGEST_START = 50
 """Samples of the start that are averaged at most."""
+SHORT = 4
+"""Samples within which a stem that leaves its place is in motion from the start."""
 AREA = BASE.index("diaphragm_area_m2")
 
 
@@ -61,7 +63,8 @@ class FreeRun:
         self.record = record
         self._step_s = step_s
         self.from_pressure = from_pressure
-        self._composition, self._kept = _behind_pressure(composition) if from_pressure else (composition, slice(None))
+        everything = (composition, list(range(len(composition.names))))
+        self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
         self._drive_pa = _measured(record) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
@@ -69,7 +72,7 @@ class FreeRun:
 
     def run(self, theta: Vector) -> Run:
         """Simulate; theta as `composition.names`."""
-        vector = np.ascontiguousarray(theta[self._kept])
+        vector = np.array(theta[self._kept])
         load_n = self.record.load_n
         drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
         rows = np.full((4, len(self.record)), np.nan)
@@ -109,10 +112,6 @@ def start(record: Record, first: int, end: int) -> Start:
         return Start(float(np.median(position_m[: max(1, still - 1)])), 0.0)
     slope, place = np.polyfit(time_s[:SHORT] - time_s[0], position_m[:SHORT], 1)
     return Start(float(place), float(slope))
-
-
-SHORT = 4
-"""Samples within which a stem that leaves its place is in motion from the start."""
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:

@@ -49,7 +49,10 @@ def forces(
     acceleration = savgol_filter(position_m, WINDOW, 2, deriv=2, delta=period_s)
     way = directions(position_m, noise_m)
     friction_n = (
-        valve.diaphragm_area_m2 * pressure_pa + load_n - valve.spring_n_per_m * position_m - valve.mass_kg * acceleration
+        valve.diaphragm_area_m2 * pressure_pa
+        + load_n
+        - valve.spring_n_per_m * position_m
+        - valve.mass_kg * acceleration
     )
     moving = way != 0
     return Forces(*(each[moving] for each in (position_m, velocity, way.astype(np.float64), pressure_pa, friction_n)))

@@ -1,7 +1,7 @@
 """Figures of an error: fit percentage, rms, and a robust one that a single missed slip does not carry.
 
-    fit = 100 (1 - ||y - x|| / ||y - mean y||)         as MATLAB's `compare`: x simulated, y measured position
-    robust = median over 1 s blocks of the block's rms
+fit = 100 (1 - ||y - x|| / ||y - mean y||)         as MATLAB's `compare`: x simulated, y measured position
+robust = median over 1 s blocks of the block's rms
 """
 
 import numpy as np

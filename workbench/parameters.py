@@ -1,8 +1,8 @@
 """The parameters of a fit and the coordinates in which they are searched.
 
-    z = log p                     a parameter that is positive throughout
-    z = log(F_s / F_c) >= 0       static friction: never below Coulomb friction
-    z = asinh(p / s)              a parameter that may be zero or negative, s = 1 % of its range
+z = log p                     a parameter that is positive throughout
+z = log(F_s / F_c) >= 0       static friction: never below Coulomb friction
+z = asinh(p / s)              a parameter that may be zero or negative, s = 1 % of its range
 """
 
 from collections.abc import Sequence
@@ -126,19 +126,15 @@ def _natural(composition: Composition, parameter: Parameter, record: Record) -> 
     valve = composition.valve
     name = parameter.name
     span_m = float(np.ptp(record.position_m[record.judged])) or valve.stroke_m
-    if name.endswith("_n_per_m"):
-        return 1.0 * valve.spring_n_per_m, 1e3 * valve.spring_n_per_m
-    if name.endswith("_n"):
-        return 0.02 * valve.coulomb_n, 1.0 * valve.coulomb_n
-    if name.endswith("_pa_per_s"):
-        span_pa = float(np.ptp(record.command_pa))
-        return 0.05 * span_pa, 50.0 * span_pa
-    if name.endswith("_pa"):
-        return 0.02 * valve.coulomb_n / valve.diaphragm_area_m2, float(np.max(np.abs(record.command_pa)))
-    if name.endswith("_per_s"):
-        return 0.01, 10.0
-    if name.endswith("_m"):
-        return max(record.noise_m, 1e-3 * span_m), span_m
-    if name.endswith("_s"):
-        return record.period_s, 0.1 * float(record.time_s[-1] - record.time_s[0])
-    return 0.01 * max(abs(parameter.least), parameter.most), 0.5 * parameter.most
+    span_pa = float(np.ptp(record.command_pa))
+    scales = {
+        "_n_per_m": (valve.spring_n_per_m, 1e3 * valve.spring_n_per_m),
+        "_pa_per_s": (0.05 * span_pa, 50.0 * span_pa),
+        "_per_s": (0.01, 10.0),
+        "_n": (0.02 * valve.coulomb_n, valve.coulomb_n),
+        "_pa": (0.02 * valve.coulomb_n / valve.diaphragm_area_m2, float(np.max(np.abs(record.command_pa)))),
+        "_m": (max(record.noise_m, 1e-3 * span_m), span_m),
+        "_s": (record.period_s, 0.1 * float(record.time_s[-1] - record.time_s[0])),
+        "": (0.01 * max(abs(parameter.least), parameter.most), 0.5 * parameter.most),
+    }
+    return next(scale for ending, scale in scales.items() if name.endswith(ending))

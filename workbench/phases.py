@@ -4,7 +4,9 @@
     reversal     from the first slip of a new direction to the start of the next slip
     slipping up, slipping down, stuck                   the rest
 
-A slip is matched with the nearest one of the same direction within 40 % of the median time between slips.
+A slip finds its match in one of the same direction that goes on within 40 % of the median time between slips. Noise
+cuts a slow slide into pieces, so pieces may share a match, and small ones, below 20 sigma, are neither missed nor
+invented. Times and ends are compared only for slips that are nearest to each other; the ends where both rest.
 """
 
 from collections.abc import Sequence
@@ -15,26 +17,25 @@ from numpy.typing import NDArray
 
 from config.recording import Column
 from config.valve import ValveFile
-from workbench.motion import Slip, directions
+from workbench.motion import REACH, Slip, directions
 
 PHASES = ("stuck", "slipping up", "slipping down", "reversal", "near stops")
 STUCK, UP, DOWN, REVERSAL, NEAR_STOPS = range(len(PHASES))
 NEAR = 0.02
 WITHIN = 0.4
+CLEAR = 20.0
 MATCHED_SAMPLES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """A measured slip and the model's: how much later, s, and farther, m, the model's is."""
+    """A measured slip and the model's: how much later, s, and how much farther in its direction, m, the model goes."""
 
     time_s: float
     direction: int
     reversal: bool
     late_s: float
     farther_m: float
-    ends_farther_m: float
-    """How far beyond the measured end, in the direction of motion, the model's ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,37 +65,47 @@ def _stops(valve: ValveFile) -> list[tuple[float, float]]:
     return [(each["lower_m"], each["lower_m"] + each["travel_m"]) for each in tables]
 
 
-def matched(time_s: Column, measured: Sequence[Slip], simulated: Sequence[Slip]) -> SlipEvents:
-    """Match the slips of an unbroken stretch."""
-    if not measured or not simulated:
-        return SlipEvents((), _times(time_s, measured), _times(time_s, simulated))
-    begins = np.array([time_s[each.first] for each in measured])
-    between_s = float(np.median(np.diff(begins))) if len(measured) > 1 else float(time_s[-1] - time_s[0])
+def matched(
+    time_s: Column,
+    measured: tuple[Sequence[Slip], Column],
+    simulated: tuple[Sequence[Slip], Column],
+    noise_m: float,
+) -> SlipEvents:
+    """Match the slips of an unbroken stretch, each given with the positions, m, they were found in."""
+    (ours, measured_m), (theirs, simulated_m) = measured, simulated
+    begins = time_s[[each.first for each in ours]] if ours else time_s[:1]
+    between_s = float(np.median(np.diff(begins))) if begins.size > 1 else float(time_s[-1] - time_s[0])
     within_s = max(WITHIN * between_s, MATCHED_SAMPLES * float(np.median(np.diff(time_s))))
-    left = list(simulated)
-    pairs, missed = [], []
-    for i, slip in enumerate(measured):
-        near = [each for each in left if each.direction == slip.direction and _apart(time_s, each, slip) <= within_s]
-        if not near:
-            missed.append(slip)
-            continue
-        partner = min(near, key=lambda each, slip=slip: abs(time_s[each.first] - time_s[slip.first]))  # type: ignore[misc]
-        left.remove(partner)
-        pairs.append(
-            Matched(
-                float(time_s[slip.first]),
-                slip.direction,
-                i > 0 and measured[i - 1].direction != slip.direction,
-                float(time_s[partner.first] - time_s[slip.first]),
-                partner.travel_m - slip.travel_m,
-                slip.direction * (partner.to_m - slip.to_m),
+    pairs = []
+    for i, slip in enumerate(ours):
+        partner = _nearest(time_s, slip, theirs, within_s)
+        if partner is not None and _nearest(time_s, partner, ours, within_s) is slip:
+            row = min(max(slip.last, partner.last) + REACH, time_s.size - 1)
+            pairs.append(
+                Matched(
+                    float(time_s[slip.first]),
+                    slip.direction,
+                    i > 0 and ours[i - 1].direction != slip.direction,
+                    float(time_s[partner.first] - time_s[slip.first]),
+                    slip.direction * float(simulated_m[row] - measured_m[row]),
+                )
             )
-        )
-    return SlipEvents(tuple(pairs), _times(time_s, missed), _times(time_s, left))
+    clear_m = CLEAR * noise_m
+    missed = [each for each in ours if each.travel_m > clear_m and _nearest(time_s, each, theirs, within_s) is None]
+    invented = [each for each in theirs if each.travel_m > clear_m and _nearest(time_s, each, ours, within_s) is None]
+    return SlipEvents(tuple(pairs), _times(time_s, missed), _times(time_s, invented))
 
 
-def _apart(time_s: Column, one: Slip, other: Slip) -> float:
-    return abs(float(time_s[one.first] - time_s[other.first]))
+def _nearest(time_s: Column, slip: Slip, others: Sequence[Slip], within_s: float) -> Slip | None:
+    """Return the slip of the same direction that begins nearest, of those under way within a time; None without one."""
+    near = [
+        each
+        for each in others
+        if each.direction == slip.direction
+        and time_s[each.first] <= time_s[slip.last] + within_s
+        and time_s[each.last] >= time_s[slip.first] - within_s
+    ]
+    return min(near, key=lambda each: abs(each.first - slip.first), default=None)
 
 
 def _times(time_s: Column, found: Sequence[Slip]) -> tuple[float, ...]:

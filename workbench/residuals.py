@@ -60,7 +60,11 @@ class Spectrum:
 def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
     """Return the profile of values over something, both of equal length and finite."""
     span = float(np.ptp(over)) if over.size else 0.0
-    member = np.minimum(((over - over.min()) / span * bins).astype(np.int64), bins - 1) if span else np.zeros(over.size, np.int64)
+    member = (
+        np.minimum(((over - over.min()) / span * bins).astype(np.int64), bins - 1)
+        if span
+        else np.zeros(over.size, np.int64)
+    )
     count = np.bincount(member, minlength=bins)
     kept = np.flatnonzero(count >= FEWEST)
     n = count[kept]
@@ -75,7 +79,7 @@ def autocorrelation(residual_m: Column, period_s: float) -> Correlation:
     """Return lags 0 to 25 of an evenly sampled residual."""
     rho = _correlated(residual_m, residual_m)
     lag = np.arange(min(LAGS + 1, residual_m.size))
-    return Correlation(lag, lag * period_s, rho[lag], BAND_99 / residual_m.size**0.5)
+    return Correlation(lag, np.asarray(lag * period_s, np.float64), rho[lag], BAND_99 / residual_m.size**0.5)
 
 
 def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -> Correlation:
@@ -87,7 +91,9 @@ def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -
     taper = 1.0 - memory / memory.size
     both = _correlated(command_pa, command_pa)[memory] * _correlated(residual_m, residual_m)[memory]
     variance = max(1.0, 1.0 + 2.0 * float(np.sum(taper * both))) / n
-    return Correlation(lag, lag * period_s, _correlated(command_pa, residual_m)[lag], BAND_99 * variance**0.5)
+    return Correlation(
+        lag, np.asarray(lag * period_s, np.float64), _correlated(command_pa, residual_m)[lag], BAND_99 * variance**0.5
+    )
 
 
 def _correlated(first: Column, second: Column) -> Column:

@@ -21,6 +21,7 @@ FINAL = SCALES[-1]
 POLLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 MOST_ITERATIONS = 12
 MOST_DAMPINGS = 5
+MOST_SWEEPS = 8
 LONGEST_MOVE = 0.5
 """Of a log-parameter in one iteration."""
 ENOUGH = 1e-5
@@ -32,7 +33,9 @@ HOPELESS = 1e6
 class SimulationError:
     """A free run held against its record, over the coordinates of some parameters."""
 
-    def __init__(self, run: FreeRun, composition: Composition, parameters: tuple[Parameter, ...], theta: Vector) -> None:
+    def __init__(
+        self, run: FreeRun, composition: Composition, parameters: tuple[Parameter, ...], theta: Vector
+    ) -> None:
         record = run.record
         self.parameters = parameters
         self.run = run
@@ -49,7 +52,7 @@ class SimulationError:
     @property
     def count(self) -> int:
         """Number of judged samples."""
-        return self._rows.size
+        return len(self._rows)
 
     def theta(self, z: Vector) -> Vector:
         """Return the parameter vector at z."""
@@ -60,7 +63,8 @@ class SimulationError:
 
     def coordinates(self, theta: Vector) -> Vector:
         """Return z of a parameter vector, inside the bounds."""
-        return np.clip(np.array([each.coordinate(theta) for each in self.parameters]), self.lower, self.upper)
+        z = np.array([each.coordinate(theta) for each in self.parameters])
+        return np.asarray(np.clip(z, self.lower, self.upper))
 
     def residuals(self, z: Vector) -> Vector:
         """Return r, one a judged sample."""
@@ -120,17 +124,18 @@ class SimulationError:
         """Try each coordinate up and down by falling steps until none helps."""
         best = self.cost(z)
         for step in POLLS:
-            improved = True
-            while improved:
-                improved = False
+            for _ in range(MOST_SWEEPS):
+                before = best
                 for i in range(z.size):
                     for way in (step, -step):
                         there = z.copy()
                         there[i] = np.clip(z[i] + way, self.lower[i], self.upper[i])
                         cost = self.cost(there)
                         if cost < best * (1.0 - 1e-4):
-                            z, best, improved = there, cost, True
+                            z, best = there, cost
                             break
+                if best == before:
+                    break
         return z
 
 

@@ -1,6 +1,6 @@
 """Where a search begins: the valve file's values, a regression of forces over the moving samples, and draws round both.
 
-    A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected
+A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected
 """
 
 import numpy as np
@@ -11,8 +11,7 @@ from workbench.motion import directions, velocity_m_per_s
 from workbench.record import Record
 
 AREA, SPRING, VISCOUS, COULOMB, STATIC = (
-    BASE.index(name)
-    for name in ("diaphragm_area_m2", "spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
+    BASE.index(name) for name in ("diaphragm_area_m2", "spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
 )
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""

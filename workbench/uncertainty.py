@@ -50,7 +50,7 @@ def uncertainty(error: SimulationError, z: Vector, others: Sequence[Vector] = ()
     J = _central(error, z) * np.sqrt(weights)[:, None]
     kappa = max(1.0, float(np.mean(weights * residuals**2))) * _correlation(residuals)
     information = J.T @ J
-    covariance = kappa * np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+    covariance = np.asarray(kappa * np.linalg.pinv(information, rcond=1e-14, hermitian=True), np.float64)
     lengths = np.linalg.norm(J, axis=0)
     seen = lengths > 0.0
     scaled = J / np.where(seen, lengths, 1.0)
@@ -66,9 +66,7 @@ def uncertainty(error: SimulationError, z: Vector, others: Sequence[Vector] = ()
     condition = float(np.linalg.cond(scaled)) if seen.all() else np.inf
     deviations = np.sqrt(kappa / np.maximum(values, 1e-300))
     undetermined = tuple(
-        _combination(error, vectors[:, i])
-        for i in range(z.size)
-        if deviations[i] > 1.0 or (condition > ILL and i == 0)
+        _combination(error, vectors[:, i]) for i in range(z.size) if deviations[i] > 1.0 or (condition > ILL and i == 0)
     )
     return Uncertainty(np.maximum(std, 0.5 * (upper - lower) / 1.96), lower, upper, condition, undetermined, rise)
 
@@ -131,7 +129,9 @@ def _combination(error: SimulationError, vector: Vector) -> str:
     """Say which parameters may change together unseen, each to the power with which it goes."""
     leading = vector / vector[np.argmax(np.abs(vector))]
     parts = [
-        (each.name, power) for each, power in zip(error.parameters, leading.tolist(), strict=True) if abs(power) > INVOLVED
+        (each.name, power)
+        for each, power in zip(error.parameters, leading.tolist(), strict=True)
+        if abs(power) > INVOLVED
     ]
     if len(parts) == 1:
         return f"{parts[0][0]} is not determined by this recording"

@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
     import json
 
     from config.valve import load_valve, shipped_valve
-    from positioner.cli.children import port_in, running
+    from positioner.cli.parts.children import port_in, running
 
     valve = load_valve(shipped_valve("seed")).valve
     with _folder(arguments.out) as folder:
@@ -328,7 +328,7 @@ def _recording(folder: Path) -> Path:
 def _picture(folder: Path, outcome: Outcome) -> Path:
     from config.recording import read_recording
     from config.valve import load_valve, shipped_valve
-    from positioner.cli.picture import draw_run
+    from positioner.cli.parts.picture import draw_run
 
     path = folder / "run.png"
     stroke_m = load_valve(shipped_valve("seed")).valve.stroke_m

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from positioner.cli.connection import add_connection, connected
+from positioner.cli.parts.connection import add_connection, connected
 
 if TYPE_CHECKING:
     from positioner.dcs import Dcs

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from config.recording import Column, Recording
     from config.slave import SlaveFile
     from config.valve import ValveParameters
-    from positioner.cli.virtual import Script
+    from positioner.cli.parts.virtual import Script
     from positioner.control.requests import Requests
     from positioner.daemon.snapshot import Snapshot
 
@@ -39,15 +39,16 @@ def run(arguments: argparse.Namespace) -> int:
     from config.errors import Unfulfilled
     from config.recording import write_recording
     from config.valve import find_valve, load_valve
-    from positioner.cli.series import read_series
-    from positioner.cli.virtual import played, virtual_cycle
+    from positioner.cli.parts.series import read_series
+    from positioner.cli.parts.virtual import played, virtual_cycle
+    from sim.slave.modbus import device_of
 
     path = find_valve(arguments.valve)
     valve = load_valve(path).valve
     time_s, reference_m = read_series(arguments.reference, "reference_m")
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
     daemon, slave = _files(arguments, valve)
-    cycle = virtual_cycle(daemon, slave, path, _first_requests(valve))
+    cycle = virtual_cycle(daemon, device_of(slave, path), _first_requests(valve))
     script = _script(time_s, reference_m)
     until_s = IDENTIFY_S + float(time_s[-1] - time_s[0])
     snapshots = list(played(cycle, script, until_s))

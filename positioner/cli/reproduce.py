@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from positioner.cli.seed_findings import Findings
-    from positioner.cli.seed_formulas import Erratum
+    from positioner.cli.seed.findings import Findings
+    from positioner.cli.seed.formulas import Erratum
 
 HELP = "the seed's figures and claims: as printed, corrected, and under honest noise; takes a minute"
 EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
@@ -31,9 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a claim does not hold without noise, or a printed form is no worse than ours."""
     from config.valve import load_valve, shipped_valve
-    from positioner.cli.seed_findings import findings
-    from positioner.cli.seed_formulas import errata, refusal_of_printed_static_friction
-    from positioner.cli.seed_scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, course
+    from positioner.cli.seed.findings import findings
+    from positioner.cli.seed.formulas import errata, refusal_of_printed_static_friction
+    from positioner.cli.seed.scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, course
 
     started_s = time.monotonic()
     _make_folder(arguments.out)
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     _print_lines(_law_lines(found))
     _print_lines(_claim_lines(found))
     if arguments.out:
-        from positioner.cli.seed_figures import draw_all
+        from positioner.cli.seed.figures import draw_all
 
         for path in draw_all(arguments.out, courses[0], (courses[2], courses[3]), file):
             print(path)
@@ -183,7 +183,7 @@ def _kept_lines(each: "Findings") -> list[str]:
 
 
 def _claim_lines(found: list["Findings"]) -> list[str]:
-    from positioner.cli.seed_findings import CLAIMS
+    from positioner.cli.seed.findings import CLAIMS
 
     lines = ["", "the seed's claims", *(f"  {claim:9} {text}" for claim, text in CLAIMS.items())]
     lines.append(f"{'noise':20}{'sample':>8}" + "".join(f"{claim:>16}" for claim in CLAIMS))

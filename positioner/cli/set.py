@@ -2,7 +2,7 @@
 
 import argparse
 
-from positioner.cli.connection import add_connection, connected
+from positioner.cli.parts.connection import add_connection, connected
 
 HELP = "write a supervisory register by name"
 EXAMPLE = "positioner set reference 0.5"

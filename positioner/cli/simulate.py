@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.recording import Recording, write_recording
     from config.slave import Sensor
     from config.valve import find_valve, load_valve
-    from positioner.cli.series import read_series
+    from positioner.cli.parts.series import read_series
     from sim.sensor import Transmitter
     from sim.valve import Valve
 

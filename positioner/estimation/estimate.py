@@ -26,6 +26,7 @@ class Reason(IntEnum):
     B_OVER_C_NOT_NEGATIVE = 15
     K_OVER_C_NOT_NEGATIVE = 16
     IMPLAUSIBLE_CHANGE = 17
+    COMMANDS_MISSED = 18
 
     @property
     def text(self) -> str:
@@ -52,6 +53,7 @@ _TEXTS = {
     Reason.B_OVER_C_NOT_NEGATIVE: "b/c did not come out negative: more pressure would hold the stem lower",
     Reason.K_OVER_C_NOT_NEGATIVE: "k/c did not come out negative: friction would drive the stem",
     Reason.IMPLAUSIBLE_CHANGE: "the value is too far from the one in use",
+    Reason.COMMANDS_MISSED: "commands were missed in a gap of the samples: a, b and c singly hang on each of them",
 }
 
 

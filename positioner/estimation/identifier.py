@@ -116,6 +116,7 @@ class Solution:
         noise_share: expected size of P^-1 δP in units of the parameters; the orders above mean something only while
             it is well below 1.
         condition: of P in its own units.
+        gaps: steps over which commands were missed.
     """
 
     theta: Array
@@ -123,6 +124,7 @@ class Solution:
     bias: Array
     noise_share: float
     condition: float
+    gaps: int
 
 
 class Identifier:
@@ -148,6 +150,7 @@ class Identifier:
         self._z[:] = 0
         self._started = False
         self._t = self._h = self._squared_steps = 0.0
+        self._gaps = 0
 
     @property
     def elapsed_s(self) -> float:
@@ -178,6 +181,7 @@ class Identifier:
         x0, dx = self._x, x - self._x
         # Over a gap the commands in between are not known: a line through them is nearer than the last of them.
         gap = h * self._t > GAP * self._squared_steps > 0
+        self._gaps += gap
         u0, du = (u, 0.0) if self._pressure_held and not gap else (self._u, u - self._u)
         z[STATES:] = (
             x0, k * x0, k2 * x0, k3 * x0, dx, k * dx, k2 * dx, k3 * dx,
@@ -227,4 +231,5 @@ class Identifier:
             bias=bias * unit,
             noise_share=float(np.linalg.norm(noise_in_columns * theta[:, None] / theta)),
             condition=condition,
+            gaps=self._gaps,
         )

@@ -39,7 +39,7 @@ class Judge:
     def parameters(self, solution: Solution) -> tuple[Estimate, Estimate, Estimate, Estimate]:
         """Return a, b, c and b/c."""
         a, b, c = solution.theta.tolist()
-        singly = solution.noise_share <= LARGEST_NOISE_SHARE
+        singly = _why_not_singly(solution)
         unit = np.eye(3)
         ratio = np.array((0.0, 1 / c, -b / c**2))
         return (
@@ -61,21 +61,25 @@ class Judge:
         of_ratio = np.array((-v, -x, -u - direction * k / c)) * direction / c
         k_std = _std(solution, of_k, filters, biased=True)
         ratio_std = _std(solution, of_ratio, filters / c)
-        singly = solution.noise_share <= LARGEST_NOISE_SHARE
+        singly = _why_not_singly(solution)
         return (
             self._judge(k, k_std, Reason.K_NOT_NEGATIVE if k >= 0 else None, singly),
             self._judge(k / c, ratio_std, Reason.K_OVER_C_NOT_NEGATIVE if k / c >= 0 else None),
         )
 
-    def _judge(self, value: float, std: float, unphysical: Reason | None, unbiased: bool = True) -> Estimate:
-        reason = Reason.VALID
-        if not unbiased:
-            reason = Reason.NOISE_DOMINATES
-        elif not std <= self.largest_relative_std * abs(value):
-            reason = Reason.TOO_UNCERTAIN
-        elif unphysical is not None:
-            reason = unphysical
-        return Estimate(value, std, reason)
+    def _judge(self, value: float, std: float, unphysical: Reason | None, singly: Reason = Reason.VALID) -> Estimate:
+        if singly is not Reason.VALID:
+            return Estimate(value, std, singly)
+        if not std <= self.largest_relative_std * abs(value):
+            return Estimate(value, std, Reason.TOO_UNCERTAIN)
+        return Estimate(value, std, Reason.VALID if unphysical is None else unphysical)
+
+
+def _why_not_singly(solution: Solution) -> Reason:
+    """Return why a, b, c and k may not be used singly, although their ratios may."""
+    if solution.gaps:
+        return Reason.COMMANDS_MISSED
+    return Reason.NOISE_DOMINATES if solution.noise_share > LARGEST_NOISE_SHARE else Reason.VALID
 
 
 def _std(solution: Solution, gradient: Array, filters: float = 0.0, *, biased: bool = False) -> float:

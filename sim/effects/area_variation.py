@@ -9,7 +9,9 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
-LOOKS = "The static curve bends, and with it, in moves, the gain from pressure to force: less so at low pressure."
+LOOKS = (
+    "The static curve bends, the more the higher the pressure; in fast moves the force per pascal depends on position."
+)
 CONFOUNDED = {
     "flow_force": "fast moves, in which the pressure parts from the static curve",
     "spring_hardening": "fast moves, in which the pressure parts from the static curve",

@@ -12,7 +12,7 @@ from sim.effect import Memory, Parameter
 MEMORY = 1
 
 
-LOOKS = "After every reversal the indication stays while the stem already moves; the curve of a slow cycle is as wide."
+LOOKS = "After every reversal the indication stays while the stem already moves; a slow cycle's branches part by w."
 CONFOUNDED = {
     "coulomb_n": "restarts in the same direction after a hold: friction holds again, the play is taken up already",
     "static_n": "restarts in the same direction after a hold: friction holds again, the play is taken up already",

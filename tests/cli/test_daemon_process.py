@@ -18,7 +18,7 @@ from config.device import ModbusTcpDevice
 from config.recording import read_recording
 from config.registers import BY_NAME, Fault, Mode
 from drivers import driver_for
-from positioner.cli.children import port_in, running
+from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 
 WITHIN_S = 20.0

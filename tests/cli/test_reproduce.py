@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from config.valve import load_valve, shipped_valve
-from positioner.cli import seed_scenario
+from positioner.cli.seed import scenario
 from positioner.cli.main import main
-from positioner.cli.seed_findings import CLAIMS, Findings, findings
-from positioner.cli.seed_formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
-from positioner.cli.seed_scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
+from positioner.cli.seed.findings import CLAIMS, Findings, findings
+from positioner.cli.seed.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
+from positioner.cli.seed.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
 from positioner.estimation import Reason
 
 PERIOD_S = 1e-4
@@ -142,7 +142,7 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At a tenth of the seed's sample rate its trapezoidal solve misses a, b, c by 2 %, and the command says so."""
-    monkeypatch.setattr(seed_scenario, "SEED_PERIOD_S", PERIOD_S)
+    monkeypatch.setattr(scenario, "SEED_PERIOD_S", PERIOD_S)
     words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json")]
     assert main(words) == 1
     assert "DOES NOT HOLD: claim a, noise none: 0.019, limit 0.01" in capsys.readouterr().out

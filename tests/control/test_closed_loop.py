@@ -10,12 +10,13 @@ from config.daemon import DaemonFile
 from config.registers import Mode, Quality
 from config.slave import SlaveFile
 from config.valve import load_valve, shipped_valve
-from positioner.cli.virtual import virtual_cycle
+from positioner.cli.parts.virtual import virtual_cycle
 from positioner.control.controller import Controller, Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.estimation.estimate import Reason
+from sim.slave.modbus import device_of
 
 VALVE = load_valve(shipped_valve("seed")).valve
 STROKE_M = VALVE.stroke_m
@@ -34,7 +35,7 @@ class Plant:
             {"clock": {"mode": "lockstep"}, "sensor": {"noise_std_m": 1e-4 * STROKE_M, "seed": seed}}
         )
         first = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=ALPHA_PA, beta_pa=BETA_PA)
-        self.cycle = virtual_cycle(DAEMON, slave, shipped_valve("seed"), first)
+        self.cycle = virtual_cycle(DAEMON, device_of(slave, shipped_valve("seed")), first)
 
     def ask(self, **values: object) -> None:
         self.cycle.requests = replace(self.cycle.requests, **values)  # type: ignore[arg-type]
@@ -113,7 +114,11 @@ def repeated(index: int, sample: Sample) -> Sample:
     return replace(sample, quality=Quality.REPEATED, position_m=0.0) if index % 50 == 25 else sample
 
 
-@pytest.mark.parametrize("spoil", [spiked, dropped, repeated])
+def interrupted(index: int, sample: Sample) -> Sample:
+    return replace(sample, quality=Quality.LOST, position_m=math.nan) if 300 <= index < 330 else sample
+
+
+@pytest.mark.parametrize("spoil", [spiked, dropped, repeated, interrupted])
 def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) -> None:
     plant = Plant(2)
     seen: list[tuple[Sample, Requests]] = []
@@ -127,3 +132,5 @@ def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) ->
     assert ratios is not None
     assert ratios.b_over_c == pytest.approx(B_OVER_C, rel=0.01)
     assert ratios.k_over_c == pytest.approx(K_OVER_C, rel=0.01)
+    singly = {decisions[-1].estimates.a.reason, decisions[-1].estimates.k.reason}
+    assert singly == {Reason.COMMANDS_MISSED if spoil is interrupted else Reason.NOISE_DOMINATES}

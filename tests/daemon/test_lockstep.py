@@ -11,8 +11,8 @@ from config.registers import Mode
 from config.slave import SlaveFile
 from config.valve import shipped_valve
 from drivers import driver_for
-from positioner.cli.children import port_in, running
-from positioner.cli.virtual import played, virtual_cycle
+from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.virtual import played, virtual_cycle
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
@@ -21,6 +21,7 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
+from sim.slave.modbus import device_of
 
 STROKE_M = 0.1016
 SLAVE = '[clock]\nmode = "lockstep"\nperiod_s = 1e-3\n[sensor]\nnoise_std_m = 1e-5\nseed = 4\n'
@@ -66,7 +67,7 @@ def test_two_runs_give_the_same_recording_bit_by_bit(tmp_path: Path) -> None:
 def test_the_bus_changes_nothing_but_float32_rounding(tmp_path: Path) -> None:
     """The same device in memory: what the wire rounds is all that differs."""
     slave = SlaveFile.model_validate(tomllib.loads(SLAVE))
-    cycle = virtual_cycle(DAEMON, slave, shipped_valve("seed"), EXCITED)
+    cycle = virtual_cycle(DAEMON, device_of(slave, shipped_valve("seed")), EXCITED)
     in_memory = [snapshot.sample.position_m for snapshot in played(cycle, dcs, 1.8)]
     over_tcp = [float(line.split(",")[2]) for line in islice(recorded(tmp_path / "tcp"), 1, None)]
     assert len(in_memory) == len(over_tcp)

@@ -11,10 +11,11 @@ from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST, Fa
 from config.slave import SlaveFile
 from config.valve import shipped_valve
 from drivers.boundary import Capabilities, NoConnection, Reading
-from positioner.cli.virtual import virtual_cycle
+from positioner.cli.parts.virtual import virtual_cycle
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.supervisory import SupervisoryRegisters
+from sim.slave.modbus import device_of
 
 STROKE_M = 0.1016
 LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
@@ -28,7 +29,7 @@ class Panel:
             {"valve": {"stroke_m": STROKE_M}, "law": LAW, "pressure": {"minimum_pa": 0.0, "maximum_pa": 200e3}}
         )
         slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})
-        self.cycle: Cycle = virtual_cycle(daemon, slave, shipped_valve("seed"), Requests())
+        self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
         self.registers = SupervisoryRegisters(self.cycle, STROKE_M, 0.0, 200e3)
 
     def get(self, name: str) -> float:

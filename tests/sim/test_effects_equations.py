@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.effect import read_effect
-from sim.effects import dead_time
+from sim.effects import dead_time, quadratic_drag, spring_hardening
 from sim.karnopp import Vector
 from sim.open_loop import respond
 from tests.sim.library import SEED, Series, library, plain, valve_with
@@ -111,6 +111,14 @@ def test_the_force_along_a_slip(name: str, parameters: dict[str, float], extra_n
     assert sliding.sum() > 1000
     assert np.ptp(x) > 5e-3
     assert np.abs(inertia - net)[sliding].max() < 0.5, "which is what the central difference leaves"
+
+
+def test_the_spring_and_the_drag_work_both_ways() -> None:
+    spring, drag = spring_hardening.Parameters(4e6), quadratic_drag.Parameters(2e3)
+    assert spring_hardening.force(0.05, spring) == pytest.approx(-500.0)
+    assert spring_hardening.force(-0.05, spring) == pytest.approx(500.0)
+    assert quadratic_drag.force(0.5, drag) == pytest.approx(-500.0)
+    assert quadratic_drag.force(-0.5, drag) == pytest.approx(500.0)
 
 
 @pytest.mark.parametrize(("rate", "at_s", "left"), [(0.1, 3.0, 1.3), (-0.1, 4.0, 0.6), (-1.0, 2.0, 0.0)])

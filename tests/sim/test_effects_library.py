@@ -171,10 +171,34 @@ def test_starts_are_scaled_by_the_valve_and_stay_in_the_range() -> None:
     assert wide.starts_for(SEED.valve) == (1423.4, 2e3), "what lies beyond the range stands at its end, once"
 
 
-@pytest.mark.parametrize("text", ["coulomb", "coulomb_n + static_n", "name", "coulomb_n *"])
-def test_a_scale_is_a_product_of_the_valve_s_numbers(text: str) -> None:
-    with pytest.raises(ValueError, match=r"coulomb|static|name|zip"):
-        scale_of(text, SEED.valve)
+HEAD = "from typing import Annotated, NamedTuple\nfrom sim.effect import Parameter\ndef force(q): return q.weight_n\n"
+
+
+@pytest.mark.parametrize("scale", ["coulomb", "coulomb_n + static_n", "name", "coulomb_n *", "coulomb_n static_n"])
+def test_a_scale_is_a_product_of_the_valve_s_numbers(tmp_path: Path, scale: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(repr(scale))):
+        scale_of(scale, SEED.valve)
+    path = tmp_path / "weight.py"
+    declared = f"Annotated[float, Parameter('weight', 0.0, 1e3, starts=(1.0,), scale={scale!r})]"
+    path.write_text(f"{HEAD}class Parameters(NamedTuple):\n    weight_n: {declared}\n")
+    with pytest.raises(InputError, match=r"weight\.py: Parameters\.weight_n: scale must be a product") as refusal:
+        read_effect(path).strengths(SEED.valve)
+    assert scale in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("LOOKS = ('a', 'b')", "LOOKS: must be a text, got"),
+        ("CONFOUNDED = ('ip_lag',)", "CONFOUNDED: must give a text for each name, got"),
+        ("CONFOUNDED = {'ip_lag': None}", "CONFOUNDED: must give a text for each name, got"),
+    ],
+)
+def test_what_it_says_of_itself_is_text(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(f"{text}\ndef force(x): return x\n")
+    with pytest.raises(InputError, match=re.escape(f"own.py: {expected}")):
+        read_effect(path)
 
 
 def test_an_effect_without_starts_can_be_simulated_but_not_fitted(tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ import matplotlib as mpl
 import numpy as np
 
 from config.valve import ValveFile
-from positioner.cli.picture import STATE_COLOURS
-from positioner.cli.seed_findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
-from positioner.cli.seed_formulas import (
+from positioner.cli.parts.picture import STATE_COLOURS
+from positioner.cli.seed.findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
+from positioner.cli.seed.formulas import (
     PRINTED_10,
     Tracks,
     corrected_filters,
@@ -21,7 +21,7 @@ from positioner.cli.seed_formulas import (
     tracks,
     truth,
 )
-from positioner.cli.seed_scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, Course
+from positioner.cli.seed.scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, Course
 from positioner.control.states import State
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.valve import ValveFile, ValveParameters
-from positioner.cli.seed_formulas import (
+from positioner.cli.seed.formulas import (
     QUANTITIES,
     Tracks,
     corrected_filters,
@@ -20,7 +20,7 @@ from positioner.cli.seed_formulas import (
     tracks,
     truth,
 )
-from positioner.cli.seed_scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, Course
+from positioner.cli.seed.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, Course
 from positioner.control.law import balance_pa
 from positioner.estimation import Ratios
 from positioner.estimation.identifier import Array

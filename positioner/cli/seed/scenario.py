@@ -20,14 +20,8 @@ from config.loading import validated
 from config.registers import Mode
 from config.slave import SlaveFile
 from config.valve import ValveFile
-from drivers.memory import MemoryDriver
-from positioner.cli.virtual import played
-from positioner.control.controller import Controller
+from positioner.cli.parts.virtual import played, virtual_cycle
 from positioner.control.requests import QUIET, Requests
-from positioner.control.settings import Settings
-from positioner.daemon.cycle import Cycle
-from positioner.daemon.link import Link
-from positioner.daemon.pacing import DevicePace
 from positioner.estimation import Applied, Estimates
 from sim.slave.device import Device
 from sim.valve import Valve
@@ -153,11 +147,8 @@ def course(file: ValveFile, noise: Noise, period_s: float) -> Course:
     slave = _slave(noise, period_s, stroke_m)
     valve = Valve.from_file(file)
     plant = Transmitted(Device(valve, slave, parameters.model_dump(exclude={"name"})), valve, noise, stroke_m)
-    pace = DevicePace()
-    link = Link(MemoryDriver(plant), pace)
-    held_pa, _ = link.open()
     first, *then = _phases(stroke_m)
-    cycle = Cycle(link, Controller(Settings.of(_daemon(period_s, stroke_m)), held_pa), pace, first[1], recorder=None)
+    cycle = virtual_cycle(_daemon(period_s, stroke_m), plant, first[1])
 
     def ask(snapshot: "Snapshot", requests: Requests) -> Requests:
         if then and snapshot.sample.time_s > then[0][0] - period_s / 2:

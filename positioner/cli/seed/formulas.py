@@ -16,7 +16,7 @@ import numpy as np
 from config.errors import InputError
 from config.loading import validated
 from config.valve import ValveFile, ValveParameters
-from positioner.cli.seed_scenario import (
+from positioner.cli.seed.scenario import (
     AMPLITUDE_PU,
     HONEST_SINE,
     LITERAL,
@@ -339,5 +339,5 @@ def refusal_of_printed_static_friction(valve: ValveParameters) -> str:
     try:
         validated(ValveParameters, valve.model_dump() | {"static_n": PRINTED_STATIC_N}, "F_s as printed")
     except InputError as error:
-        return str(error).partition(", got")[0]
+        return str(error)
     return ""

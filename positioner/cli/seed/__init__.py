@@ -1,0 +1,1 @@
+"""What `positioner reproduce` holds against each other: the seed's scenario, its formulas as printed, its claims."""
