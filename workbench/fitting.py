@@ -91,7 +91,7 @@ class Fit:
     starts: tuple[Search, ...]
     """The searches, best first."""
     agreement: int
-    """How many of the searches that were carried to the end came within 5 % of the best cost."""
+    """How many of the three searches that were carried to the end came within 5 % of the best cost."""
     condition: float
     undetermined: tuple[str, ...]
     notes: tuple[str, ...]
@@ -257,12 +257,12 @@ def _searched(
     tell = progress or (lambda _: None)
     # The first start as it is stays in the race: descent at a wide scale may lose it.
     down = sorted([*_each(error.descended, begins, workers, lambda done: tell(0.6 * done)), begins[0]], key=error.cost)
-    ends = _each(error.polled, down[:POLLED], workers, lambda done: tell(0.6 + 0.3 * done))
-    ends = sorted([*ends, error.polled(error.descended(min(ends, key=error.cost)))], key=error.cost)
+    polled = _each(error.polled, down[:POLLED], workers, lambda done: tell(0.6 + 0.3 * done))
+    ends = sorted([*polled, error.polled(error.descended(min(polled, key=error.cost)))], key=error.cost)
     best = _centred(error, ends[0])
     judged = uncertainty(error, best, ends)
     tell(1.0)
-    costs = [error.cost(z) for z in ends[:POLLED]]
+    costs = [error.cost(z) for z in polled]
     valve = _fitted_file(composition, error.theta(best))
     return Fit(
         valve,
@@ -272,7 +272,7 @@ def _searched(
         error.cost(best),
         error.count,
         tuple(_search(error, z) for z in sorted([*ends, *down[POLLED:]], key=error.cost)),
-        sum(cost <= AGREE * costs[0] + error.count * (AGREE - 1.0) for cost in costs),
+        sum(cost <= AGREE * error.cost(ends[0]) for cost in costs),
         judged.condition,
         judged.undetermined,
         error.run.record.notes,

@@ -9,9 +9,7 @@ from typing import Annotated, NamedTuple
 
 from sim.effect import Parameter
 
-LOOKS = (
-    "The static curve bends, the more the higher the pressure; in fast moves the force per pascal depends on position."
-)
+LOOKS = "The static curve bends, the more the higher the pressure; in fast moves the pull of a pascal varies with x."
 CONFOUNDED = {
     "flow_force": "fast moves, in which the pressure parts from the static curve",
     "spring_hardening": "fast moves, in which the pressure parts from the static curve",

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from config.valve import load_valve, shipped_valve
-from positioner.cli.seed import scenario
 from positioner.cli.main import main
+from positioner.cli.seed import scenario
 from positioner.cli.seed.findings import CLAIMS, Findings, findings
 from positioner.cli.seed.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
 from positioner.cli.seed.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
