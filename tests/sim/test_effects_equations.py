@@ -164,6 +164,11 @@ def test_dead_time_behind_a_lag_is_the_lag_s_answer_later() -> None:
     np.testing.assert_allclose(delayed[250:], prompt[:-250], atol=1e-3 * np.ptp(prompt))
 
 
+def test_joined_stretches_of_a_ramp_are_the_ramp() -> None:
+    ramp = 1e5 * np.arange(400) * 2e-3
+    np.testing.assert_allclose(through_dead_time(ramp, 2e-3, 0.5)[250:], ramp[:-250], atol=1e-6)
+
+
 def through_dead_time(samples: Series, period_s: float, dead_time_s: float) -> Series:
     """Pass straight lines between samples through a dead time, 50 steps a period; return its output at the samples."""
     q, z = dead_time.Parameters(dead_time_s), np.zeros(dead_time.MEMORY)
