@@ -92,7 +92,7 @@ def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int)
     _inlined(module.__dict__)
     try:
         compiled = {
-            name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, **OPTIONS)(entry)
+            name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, nogil=True, **OPTIONS)(entry)
             for name, entry in entries.items()
         }
     except Exception as error:

@@ -32,8 +32,8 @@ from workbench.simulation_error import SCALES, SimulationError
 from workbench.starts import drawn, forces_regressed
 from workbench.uncertainty import Uncertainty, uncertainty
 
-STARTS = 6
-"""Searches made."""
+STARTS, STARTS_EFFECT = 6, 11
+"""Searches made, of the base and of a valve with an effect added."""
 POLLED = 3
 """Of these, the best are carried to the end by polling, the very best once more down and polled."""
 BASE_SEEDS = 3
@@ -214,7 +214,7 @@ def _base_starts(composition: Composition, error: SimulationError, seed: int) ->
     theta = composition.theta
     regressed = forces_regressed(theta, error.run.record, error.run.from_pressure)
     pool = [theta, regressed, *drawn(regressed, DRAWS_REGRESSED, generator), *drawn(theta, DRAWS_FILE, generator)]
-    return _screened(error, [error.coordinates(each) for each in pool])
+    return _screened(error, [error.coordinates(each) for each in pool], STARTS)
 
 
 def _effect_starts(composition: Composition, error: SimulationError, effects: Sequence[str], base: Fit) -> list[Vector]:
@@ -228,7 +228,7 @@ def _effect_starts(composition: Composition, error: SimulationError, effects: Se
     ]
     ends = [tuple(end(each) for each in added) for end in (_off, lambda each: each.least, lambda each: each.most)]
     weakest = min((_with(error, seeds[0], added, values) for values in ends), key=error.cost)
-    return [weakest, *_screened(error, grid)]
+    return [weakest, *_screened(error, grid, STARTS_EFFECT)]
 
 
 def _off(parameter: Parameter) -> float:
@@ -242,8 +242,8 @@ def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], val
     return error.coordinates(changed)
 
 
-def _screened(error: SimulationError, pool: list[Vector]) -> list[Vector]:
-    return sorted(pool, key=lambda z: error.cost(z, SCREEN))[:STARTS]
+def _screened(error: SimulationError, pool: list[Vector], count: int) -> list[Vector]:
+    return sorted(pool, key=lambda z: error.cost(z, SCREEN))[:count]
 
 
 def _searched(

@@ -11,8 +11,6 @@ import numpy as np
 from config.recording import Column
 
 BLOCK = 16
-FEW_LEVELS = 0.2
-"""A position is rounded if its differing values are fewer than this part of the samples, or lie on a grid."""
 REPEATS = 1e-3
 """A command repeats if its rms difference over the lag is below this part of its rms deviation."""
 
@@ -35,10 +33,10 @@ def quantum_m(position_m: Column) -> float:
         return float(steps[0]) if steps.size else 0.0
     # Levels a rounding error apart are one level.
     steps = steps[steps > 1e-9 * float(np.ptp(levels))]
-    quantum = float(np.quantile(steps, 0.02))
-    on_grid = np.abs(steps / quantum - np.round(steps / quantum)) < 0.02
-    is_rounded = on_grid.mean() > 0.95 and levels.size < FEW_LEVELS * position_m.size + 2
-    return float(np.median(steps[steps < 1.5 * quantum])) if is_rounded else 0.0
+    quantum = float(np.median(steps[steps < 1.5 * float(steps.min())]))
+    small = steps[steps < 10.5 * quantum] / quantum
+    on_grid = np.abs(small - np.round(small)) < 0.02
+    return quantum if small.size > 0.1 * steps.size and on_grid.mean() > 0.95 else 0.0
 
 
 def repeat_lag(command_pa: Column) -> int | None:

@@ -46,9 +46,13 @@ class Parameter:
         return log(value) if self.least > 0 else asinh(value / self.scale)
 
     def put(self, theta: Vector, z: float) -> None:
-        """Write the value of z into theta; static friction after Coulomb friction."""
+        """Write the value of z into theta; Coulomb friction takes the static along, which is free after it or not."""
         if self.index == STATIC:
             theta[STATIC] = theta[COULOMB] * exp(z)
+        elif self.index == COULOMB:
+            ratio = max(1.0, theta[STATIC] / theta[COULOMB]) if theta[COULOMB] else 1.0
+            theta[COULOMB] = exp(z)
+            theta[STATIC] = ratio * theta[COULOMB]
         else:
             theta[self.index] = exp(z) if self.least > 0 else self.scale * sinh(z)
 

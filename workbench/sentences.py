@@ -1,6 +1,7 @@
 """Where the model fails, in plain sentences, the gravest first.
 
-A finding is said when it is both certain (3.5 standard errors, over slips or over blocks of 1 s) and matters (a mean
+A finding is said when it is both certain (3.5 standard errors, over slips, or over blocks of 1 s but no
+more of them than slips: between slips an error stands) and matters (a mean
 error above the floor, or a time above two periods).
 """
 
@@ -99,6 +100,11 @@ def _by_direction(
             if _certain(mean, error, matters):
                 means[direction] = mean
     if not means:
+        pooled = np.array(values)
+        if pooled.size >= FEWEST and len({each.direction for each in pairs}) == 2:
+            mean, error = float(np.median(pooled)), float(np.std(pooled, ddof=1)) / pooled.size**0.5
+            if _certain(mean, error, matters):
+                yield abs(mean), f"{when}, {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
         return
     told = {way: f"{unit(abs(mean))} {words[0] if mean > 0 else words[1]}" for way, mean in means.items()}
     grade = max(abs(mean) for mean in means.values())
@@ -129,10 +135,11 @@ def _trends(found: Findings) -> Iterator[tuple[float, str]]:
         blocks = _blocks(found.time_s)
         count = np.bincount(blocks)
         x, y = np.bincount(blocks, over) / count, np.bincount(blocks, found.residual_m) / count
-        if x.size < 8 or np.ptp(x) == 0.0:
+        independent = min(x.size, len(found.measured_slips))
+        if independent < 8 or np.ptp(x) == 0.0:
             continue
         slope, intercept = np.polyfit(x, y, 1)
-        spread = float(np.std(y - slope * x - intercept)) / (float(np.std(x)) * (x.size - 2) ** 0.5)
+        spread = float(np.std(y - slope * x - intercept)) / (float(np.std(x)) * (independent - 2) ** 0.5)
         low, high = float(np.min(x)), float(np.max(x))
         change = float(slope) * (high - low)
         if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.floor_m, found.rms_m):
@@ -176,9 +183,10 @@ def _block_mean(found: Findings, rows: NDArray[np.bool_]) -> tuple[float, float]
     """Return the mean residual and its standard error over blocks of 1 s."""
     blocks = _blocks(found.time_s[rows])
     means = np.bincount(blocks, found.residual_m[rows]) / np.bincount(blocks)
-    if means.size < FEWEST:
+    independent = min(means.size, len(found.measured_slips))
+    if independent < FEWEST:
         return float(means.mean()), np.inf
-    return float(means.mean()), float(np.std(means, ddof=1)) / means.size**0.5
+    return float(means.mean()), float(np.std(means, ddof=1)) / independent**0.5
 
 
 def _certain(mean: float, error: float, matters: float) -> bool:

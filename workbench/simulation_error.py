@@ -3,8 +3,8 @@
     r_i = (simulated_i - measured_i) / sigma,    cost_s = sum s^2 (sqrt(1 + (r_i / s)^2) - 1)       soft L1 of scale s
 
 The cost is a staircase: a slip happens or does not. So the scale falls, 100, 30, 5 sigma, and with it the step of the
-forward differences, 1e-3, 3e-4, 1e-4 of a log-parameter: large errors are first bounded, then resolved. Coordinate
-polling ends the search where derivatives see no further.
+forward differences, 1e-3, 3e-4, 1e-4 of a log-parameter: large errors are first bounded, then resolved. Polling
+ends the search where derivatives see no further.
 """
 
 import numpy as np
@@ -22,6 +22,8 @@ POLLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 MOST_ITERATIONS = 12
 MOST_DAMPINGS = 5
 MOST_SWEEPS = 8
+NOTICED = 1e-4
+"""Relative fall of the cost for which polling goes on."""
 LONGEST_MOVE = 0.5
 """Of a log-parameter in one iteration."""
 ENOUGH = 1e-5
@@ -121,19 +123,22 @@ class SimulationError:
         return z
 
     def polled(self, z: Vector) -> Vector:
-        """Try each coordinate up and down by falling steps until none helps."""
+        """Try each direction both ways by falling steps until none helps.
+
+        The directions are the coordinates and the eigenvectors of J'J, which follow the valleys.
+        """
         best = self.cost(z)
+        J = self.jacobian(z, STEPS[0])
+        _, vectors = np.linalg.eigh(J.T @ J)
+        ways = [*np.eye(z.size), *(vectors / np.max(np.abs(vectors), axis=0)).T]
         for step in POLLS:
             for _ in range(MOST_SWEEPS):
                 before = best
-                for i in range(z.size):
-                    for way in (step, -step):
-                        there = z.copy()
-                        there[i] = np.clip(z[i] + way, self.lower[i], self.upper[i])
-                        cost = self.cost(there)
-                        if cost < best * (1.0 - 1e-4):
-                            z, best = there, cost
-                            break
+                for way in (sign * step * each for each in ways for sign in (1.0, -1.0)):
+                    there = np.clip(z + way, self.lower, self.upper)
+                    cost = self.cost(there)
+                    if cost < best * (1.0 - NOTICED):
+                        z, best = there, cost
                 if best == before:
                     break
         return z

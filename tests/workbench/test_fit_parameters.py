@@ -1,0 +1,92 @@
+"""Fit: the truth's error is reached, the numbers are the truth's, and what cannot be known is said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.recording import Recording
+from config.valve import ValveFile, ValveParameters
+from sim.composition import Composition
+from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
+from workbench import fit
+from workbench.free_run import FreeRun
+from workbench.measures import rms
+from workbench.record import ready
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
+
+
+def error_of(valve: ValveFile, recording: Recording) -> float:
+    composition = Composition.from_file(valve)
+    return rms(FreeRun(composition, ready(recording)).position_m(composition.theta) - recording.position_m)
+
+
+@pytest.mark.parametrize(("seed", "dirty"), [(2, False), (5, True)])
+def test_the_error_of_the_truth_is_reached(seed: int, dirty: bool) -> None:
+    truth = drawn_valve(np.random.default_rng(seed))
+    recording = record_of(truth, seed, dirty=dirty)
+    found = fit(recording, SEED)
+    assert found.rms_m <= 1.02 * error_of(truth, recording)
+    assert found.trusted
+    tolerance = 0.05 if dirty else 0.01
+    for name in ("spring_n_per_m", "coulomb_n", "static_n"):
+        assert getattr(found.valve.valve, name) == pytest.approx(getattr(truth.valve, name), rel=tolerance)
+
+
+def test_an_effect_is_fitted_on_top_and_the_same_whatever_the_workers() -> None:
+    truth = with_effect(drawn_valve(np.random.default_rng(0)), "asymmetric_friction", asymmetry=0.15)
+    recording = record_of(truth, 0, 1500)
+    base = fit(recording, SEED, workers=1)
+    extended = fit(recording, SEED, effects=("asymmetric_friction",), base=base, workers=2)
+    assert extended.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(0.15, abs=0.02)
+    assert extended.rms_m < 0.3 * base.rms_m
+    assert fit(recording, SEED, workers=2).parameters == base.parameters
+    np.testing.assert_array_equal(np.isfinite(extended.predict(recording)), True)
+
+
+def test_an_effect_that_is_not_there_never_makes_it_worse() -> None:
+    recording = record_of(drawn_valve(np.random.default_rng(2)), 2, 1500)
+    base = fit(recording, SEED)
+    extended = fit(recording, SEED, effects=("backlash",), base=base)
+    assert extended.cost <= base.cost + 0.5
+    assert extended.parameters["backlash.width_m"].value < 2e-4
+
+
+def test_what_the_recording_does_not_determine_is_said() -> None:
+    recording = record_of(drawn_valve(np.random.default_rng(2)), 2, 1500)
+    found = fit(recording, SEED, free=("coulomb_n", "static_n", "stribeck_velocity_m_per_s", "deadzone_ratio"))
+    assert any("not determined" in each or "together" in each for each in found.undetermined)
+
+
+@pytest.mark.parametrize(
+    ("free", "said"),
+    [(("diaphragm_area_m2",), "cannot be fitted: only ratios"), (("mass",), "unknown parameter mass")],
+)
+def test_what_cannot_be_fitted_is_refused(free: tuple[str, ...], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        fit(record_of(SEED, 1), SEED, free=free)
+
+
+def test_without_motion_both_ways_nothing_is_fitted() -> None:
+    columns = dict(record_of(SEED, 3).columns)
+    with pytest.raises(InputError, match="the stem moves 0 times"):
+        fit(Recording(columns | {"position_m": np.full(3000, 0.05)}), SEED)
+    t = columns["time_s"]
+    stairs = 1e-3 * np.floor(t) + 0.02 + 1e-5 * np.random.default_rng(1).standard_normal(3000)
+    with pytest.raises(InputError, match="the stem only opens"):
+        fit(Recording({"time_s": t, "command_pa": 1e3 * t, "position_m": stairs}), SEED)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not there")
+def test_the_servo_motors_friction_is_asymmetric() -> None:
+    motor = {"mass_kg": 2e-4, "diaphragm_area_m2": 1.0, "spring_n_per_m": 1e-9, "viscous_ns_per_m": 2.5e-4}
+    friction = {"coulomb_n": 0.0303, "static_n": 0.0303, "stribeck_velocity_m_per_s": 0.1, "deadzone_ratio": 0.6}
+    valve = ValveFile(valve=ValveParameters(name="servo", stroke_m=40.0, **motor, **friction))
+    recording = Recording.read(DATA / "J_5.csv")
+    free = ("viscous_ns_per_m", "coulomb_n", "asymmetric_friction.asymmetry")
+    base = fit(recording, valve, free=free[:2])
+    extended = fit(recording, valve, effects=("asymmetric_friction",), free=free, base=base)
+    assert extended.rms_m < 2.0
+    assert extended.rms_m < 0.4 * base.rms_m

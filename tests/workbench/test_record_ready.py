@@ -1,0 +1,108 @@
+"""What is wrong with a recording is told and handled, and nothing else is touched."""
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.recording import Column, Recording
+from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
+from workbench.noise import noise_std_m, quantum_m, repeatability_m
+from workbench.record import ready, require_units
+
+
+def plain(count: int = 1000) -> dict[str, Column]:
+    generator = np.random.default_rng(1)
+    t = 0.01 * np.arange(count)
+    return {
+        "time_s": t,
+        "command_pa": 4e4 + 1e4 * np.sin(t),
+        "position_m": 0.05 + 0.01 * np.sin(t) + 1e-5 * generator.standard_normal(count),
+    }
+
+
+def test_a_sound_recording_has_nothing_to_tell() -> None:
+    record = ready(Recording(plain()))
+    assert record.notes == ()
+    assert record.segments == ((0, 1000),)
+    assert record.judged.all()
+
+
+def test_a_gap_a_clock_set_back_and_lost_samples_begin_new_segments() -> None:
+    columns = plain()
+    columns["time_s"] = columns["time_s"].copy()
+    columns["time_s"][300:] += 2.0
+    columns["time_s"][600:] -= 5.0
+    columns["lost_samples"] = np.where(np.arange(1000) < 800, 0.0, 3.0)
+    record = ready(Recording(columns))
+    assert record.segments == ((0, 300), (300, 600), (600, 800), (800, 1000))
+    assert [note.partition(":")[0] for note in record.notes] == [
+        "before sample 301 a gap of 2.01 s",
+        "before sample 601 the clock is set back by 4.99 s",
+        "before sample 801 lost_samples rises by 3",
+    ]
+
+
+def test_a_missing_command_is_held_and_missing_positions_and_spikes_are_not_judged() -> None:
+    columns = plain()
+    command, position = columns["command_pa"].copy(), columns["position_m"].copy()
+    command[100:103] = np.nan
+    position[200] = np.nan
+    position[500] = 0.9
+    record = ready(Recording(columns | {"command_pa": command, "position_m": position}))
+    assert (record.command_pa[99:103] == command[99]).all()
+    assert np.flatnonzero(~record.judged).tolist() == [200, 500]
+    assert record.notes == (
+        "command_pa is not a number in 3 samples, the first 101: the command before is held",
+        "position_m is not a number in sample 201: left out of the error",
+        "position_m has a spike in sample 501: left out of the error",
+    )
+
+
+def test_uneven_sampling_is_told_and_is_no_gap() -> None:
+    columns = plain()
+    columns["time_s"] = np.cumsum(np.random.default_rng(2).exponential(0.01, 1000) + 1e-6)
+    record = ready(Recording(columns))
+    assert len(record.segments) == 1
+    assert record.notes[-1].startswith("sampling is uneven")
+
+
+@pytest.mark.parametrize("quantum", [0.0, 1e-5, 1e-4])
+def test_noise_and_rounding_are_measured(quantum: float) -> None:
+    position = record_of(drawn_valve(np.random.default_rng(5)), 5).position_m
+    if quantum:
+        position = quantum * np.round(position / quantum)
+    expected = (NOISE_M**2 + quantum**2 / 12.0) ** 0.5
+    assert noise_std_m(position) == pytest.approx(expected, rel=0.15)
+    assert quantum_m(position) == pytest.approx(quantum, rel=1e-3)
+
+
+def test_a_repeated_command_gives_the_repeatability_and_another_does_not() -> None:
+    columns = plain(1200)
+    command = np.tile(columns["command_pa"][:400], 3)
+    position = np.tile(columns["position_m"][:400], 3) + 1e-4 * np.random.default_rng(3).standard_normal(1200)
+    assert repeatability_m(command, position) == pytest.approx(1e-4, rel=0.1)
+    recording = record_of(drawn_valve(np.random.default_rng(5)), 5)
+    assert repeatability_m(recording.command_pa, recording.position_m) is None
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "said"),
+    [
+        ("position_m", 100 / 0.1016, "per cent"),
+        ("command_pa", 1e-5, "bar"),
+        ("command_pa", 1 / 6894.757, "psi"),
+        ("command_pa", 1e-3, "kPa"),
+    ],
+)
+def test_other_units_are_recognised(column: str, factor: float, said: str) -> None:
+    columns = dict(record_of(SEED, 3).columns)
+    require_units(ready(Recording(columns)), SEED.valve)
+    with pytest.raises(InputError, match=f"looks like {said}"):
+        require_units(ready(Recording(columns | {column: columns[column] * factor})), SEED.valve)
+
+
+def test_nothing_to_simulate_is_refused() -> None:
+    with pytest.raises(InputError, match="position_m: no sample is a number"):
+        ready(Recording(plain() | {"position_m": np.full(1000, np.nan)}))
+    with pytest.raises(InputError, match="no stretch of at least"):
+        ready(Recording({name: column[:2] for name, column in plain().items()}))
