@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from workbench import Comparison
 
 HELP = "hold a model against a recording in free run and say where it fails; exit status 1 if it is not adequate"
-EXAMPLE = "positioner compare rec.csv --valve seed --json compared.json"
+EXAMPLE = "positioner compare rec.csv --valve seed --report compared.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="REC", help="a recording, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
     add_export_arguments(parser)
 
 
@@ -42,6 +43,11 @@ def run(arguments: argparse.Namespace) -> int:
     print("\n".join(_lines(arguments, compared)))
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
+    if arguments.report is not None:
+        from workbench.report import Subject, report_comparison
+
+        subject = Subject(valve, (str(arguments.recording),), recording.metadata)
+        report_comparison(compared, arguments.report, subject)
     return 0 if compared.adequate else 1
 
 
