@@ -165,7 +165,7 @@ def test_dead_time_behind_a_lag_is_the_lag_s_answer_later() -> None:
 
 
 def test_joined_stretches_of_a_ramp_are_the_ramp() -> None:
-    ramp = 1e5 * np.arange(400) * 2e-3
+    ramp = np.asarray(200.0 * np.arange(400), dtype=np.float64)
     np.testing.assert_allclose(through_dead_time(ramp, 2e-3, 0.5)[250:], ramp[:-250], atol=1e-6)
 
 
