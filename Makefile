@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test lint bench soak docs clean
+.PHONY: venv demo test lint bench soak blind docs clean
 
 venv: $(READY)
 
@@ -30,6 +30,10 @@ bench: $(READY)         ## figures that depend on the machine, as ratios in one 
 
 soak: $(READY)          ## ten minutes of a polled, recording daemon: does its memory stay flat?
 	$(BIN)/python -m benchmarks.memory --minutes 10
+
+blind: $(READY)         ## hours: recordings with hidden effects, diagnosed blind
+	$(BIN)/python -m benchmarks.blind --cases 100
+	$(BIN)/python -m benchmarks.blind --cases 100 --dirty
 
 docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner reproduce --out docs/img

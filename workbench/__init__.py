@@ -1,17 +1,31 @@
-"""The workbench: hold the model against measurements, see where it fails, fit it.
+"""The workbench: hold the model against measurements, see where it fails, fit it, find what it lacks.
 
-    from workbench import Recording, compare, fit
+    from workbench import Recording, compare, diagnose, fit
 
     recording = Recording.read("rec.csv")
     print(compare(recording, load_valve("valve.toml")).sentences)
     better = fit(recording, load_valve("valve.toml")).valve
+    print(diagnose(recording, load_valve("valve.toml")).sentence)
 
 `record` makes a recording ready for simulation and tells what is wrong with it, `free_run` simulates it, `comparison`
-holds the two against each other, `fitting` finds the parameters.
+holds the two against each other, `fitting` finds the parameters, `diagnosis` the effects that are missing, `extension`
+adds them, `report` writes it all down for a browser. `hiding` draws recordings whose hidden effect nobody knows.
 """
 
 from config.recording import Recording
 from workbench.comparison import Comparison, compare
+from workbench.diagnosis import Diagnosis, diagnose
+from workbench.extension import Extension, extend
 from workbench.fitting import Fit, fit
 
-__all__ = ["Comparison", "Fit", "Recording", "compare", "fit"]
+__all__ = [
+    "Comparison",
+    "Diagnosis",
+    "Extension",
+    "Fit",
+    "Recording",
+    "compare",
+    "diagnose",
+    "extend",
+    "fit",
+]

@@ -10,7 +10,24 @@ from collections.abc import Sequence
 
 from config.errors import InputError, Unfulfilled
 
-COMMANDS = ("demo", "sim", "run", "probe", "doctor", "get", "set", "identify", "map", "simulate", "play", "reproduce")
+COMMANDS = (
+    "demo",
+    "sim",
+    "run",
+    "probe",
+    "doctor",
+    "get",
+    "set",
+    "identify",
+    "map",
+    "simulate",
+    "play",
+    "compare",
+    "diagnose",
+    "extend",
+    "reproduce",
+    "hide",
+)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -1,0 +1,110 @@
+"""`positioner diagnose`: which effect is missing."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from workbench.diagnosis import Diagnosis
+    from workbench.preview import Suspect
+
+HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
+EXAMPLE = "positioner diagnose rec.csv --valve seed --test other.csv --json diagnosed.json"
+
+PREVIEWED = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
+    parser.add_argument("--effects", nargs="+", metavar="NAME", help="what is tried (all that come with the package)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
+    parser.add_argument(
+        "--experiment",
+        type=Path,
+        default=Path("experiment.csv"),
+        metavar="FILE",
+        help="where the input goes that would tell apart what the recordings do not (experiment.csv)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose and print; 0 if nothing is missing, else 1."""
+    import json
+    import time
+
+    from config.recording import Recording
+    from config.valve import find_valve, load_valve
+    from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.progress import show
+    from workbench.diagnosis import diagnose
+    from workbench.diagnosis_json import as_json
+    from workbench.report import Subject, report_diagnosis, require_plotly
+
+    if arguments.report is not None:
+        require_plotly(arguments.report)
+    began_s = time.monotonic()
+    valve = load_valve(find_valve(arguments.valve))
+    recordings = [Recording.read(path) for path in arguments.recordings]
+    test = Recording.read(arguments.test) if arguments.test else None
+    named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
+    with naming(named):
+        diagnosis = diagnose(
+            recordings,
+            valve,
+            test=test,
+            effects=arguments.effects,
+            seed=arguments.seed,
+            told=_tell_preview,
+            progress=show,
+        )
+    if diagnosis.experiment:
+        diagnosis.experiment.write(arguments.experiment)
+    print("\n".join(_lines(diagnosis, arguments.experiment)))
+    if arguments.json is not None:
+        written = str(arguments.experiment) if diagnosis.experiment else None
+        whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
+        arguments.json.write_text(json.dumps(whole, allow_nan=False) + "\n", encoding="utf-8")
+    if arguments.report is not None:
+        files = tuple(str(path) for path in (*arguments.recordings, arguments.test) if path)
+        subject = Subject(valve, files, recordings[0].metadata)
+        report_diagnosis(diagnosis, arguments.report, subject, str(arguments.experiment))
+    return 0 if diagnosis.verdict == "adequate" else 1
+
+
+def _tell_preview(suspects: "tuple[Suspect, ...]") -> None:
+    named = ", ".join(f"{each.name} {each.score:.2f}" for each in suspects[:PREVIEWED])
+    print(f"tangent preview, not a verdict: {named}", flush=True)
+
+
+def _lines(diagnosis: "Diagnosis", path: Path) -> list[str]:
+    lines = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
+    for number, step in enumerate(diagnosis.steps, start=1):
+        base = step.before.errors
+        lines += [
+            "",
+            f"step {number}: error {1e3 * base.train_rmse_m:.4f} mm rms fitted, {1e3 * base.test_rmse_m:.4f} held out, "
+            f"floor {1e3 * diagnosis.split.floor_m:.4f}",
+            f"  {'effect':<20}{'fitted mm':>11}{'held out mm':>13}{'evidence':>10}{'gain':>7}{'std errors':>12}",
+        ]
+        for each in step.candidates:
+            if each.model is None or each.gain is None:
+                lines.append(f"  {each.name:<20}{each.why_not}")
+                continue
+            errors, found = each.model.errors, each.gain
+            said = "accepted" if each.accepted else each.why_not
+            lines.append(
+                f"  {each.name:<20}{1e3 * errors.train_rmse_m:>11.4f}{1e3 * errors.test_rmse_m:>13.4f}"
+                f"{found.bic:>10.1f}{found.held_out:>7.0%}{found.standard_errors:>12.1f}  {said}"
+            )
+    if diagnosis.experiment:
+        lines += [
+            "",
+            f"{path}: {diagnosis.experiment.name}; after a refit the rivals differ by "
+            f"{diagnosis.experiment.separation:.3g} times the noise",
+        ]
+    return lines

@@ -1,0 +1,15 @@
+"""What the workbench calls "recording" or "valve file" gets the name that the person gave it."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from config.errors import InputError
+
+
+@contextmanager
+def naming(names: Mapping[str, str]) -> Iterator[None]:
+    """Give errors that name a kind of file the name of the file."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(names.get(error.source, error.source), error.problem) from None

@@ -1,0 +1,157 @@
+"""What a candidate is held against: block errors, the meter of structure, algebraic classes, what is held out."""
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.recording import Recording
+from sim.effect import shipped_effect, shipped_effects
+from workbench.confounding import algebraic_class, bare_parameter, classes
+from workbench.evidence import Errors, Gain, alike, block_logs, fall
+from workbench.held_out import joined, residual_m, split
+from workbench.record import ready
+from workbench.structure import STRUCTURED, structure
+
+LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
+NOISE_M = 5e-5
+
+
+def moving(count: int = 3000, seed: int = 1) -> Recording:
+    generator = np.random.default_rng(seed)
+    time_s = 0.01 * np.arange(count)
+    position_m = 0.05 + 0.03 * np.sin(1.3 * time_s) + 0.01 * np.sin(4.1 * time_s)
+    command_pa = 8e5 * position_m + 5e3 * np.sign(np.gradient(position_m))
+    columns = {"time_s": time_s, "command_pa": command_pa}
+    return Recording(columns | {"position_m": position_m + NOISE_M * generator.standard_normal(count)})
+
+
+def noise(count: int, seed: int = 2) -> np.ndarray:
+    return NOISE_M * np.random.default_rng(seed).standard_normal(count)
+
+
+def test_block_errors_are_those_of_one_second_each_and_skip_what_does_not_count() -> None:
+    error_m = np.repeat([1e-3, 2e-3, np.nan, 4e-3], 100)
+    logs = block_logs(np.linspace(0.0, 3.99, 400), error_m, 0.0)
+    assert np.exp(logs) == pytest.approx([1e-3, 2e-3, 4e-3])
+
+
+def test_an_error_far_below_the_floor_does_not_count_as_a_gain() -> None:
+    time_s = np.linspace(0.0, 1.99, 200)
+    tiny, none = (block_logs(time_s, np.full(200, each), 1e-5) for each in (1e-9, 0.0))
+    assert tiny == pytest.approx(none, abs=1e-6)
+
+
+def test_a_slip_missed_by_a_hair_does_not_hide_a_gain_in_all_other_blocks() -> None:
+    before = np.log(np.full(30, 1e-4))
+    after = np.log(np.full(30, 5e-5))
+    after[12:15] = np.log(6e-3)
+    gain, standard_errors = fall(before, after)
+    assert gain > 0.05
+    assert standard_errors > 2.0
+
+
+def test_a_slip_met_by_luck_is_no_gain() -> None:
+    before = np.log(np.full(30, 5e-5))
+    before[12:14] = np.log(6e-3)
+    _, standard_errors = fall(before, np.log(np.full(30, 5e-5)))
+    assert standard_errors < 2.0
+
+
+def errors_of(logs: np.ndarray) -> Errors:
+    return Errors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0)
+
+
+def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_worse_throughout() -> None:
+    best = np.log(np.full(60, 5e-5)) + 0.05 * np.random.default_rng(3).standard_normal(60)
+    missed = best.copy()
+    missed[40] = np.log(6e-3)
+    assert alike(errors_of(best), errors_of(missed))
+    assert not alike(errors_of(best), errors_of(best + 0.1))
+
+
+@pytest.mark.parametrize(
+    ("gain", "said"),
+    [
+        (Gain(9.0, 0.5, 9.0), "evidence 9"),
+        (Gain(90.0, 0.04, 9.0), "falls by 4 %"),
+        (Gain(90.0, 0.5, 1.9), "1.9 standard errors"),
+    ],
+)
+def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> None:
+    assert said in gain.short
+
+
+def test_what_passes_every_part_is_not_refused() -> None:
+    assert not Gain(11.0, 0.06, 2.1).short
+
+
+def test_noise_has_no_structure() -> None:
+    record = ready(moving())
+    assert max(structure(record, noise(3000, seed)) for seed in range(10)) < STRUCTURED
+
+
+@pytest.mark.parametrize("cause", ["direction", "position", "pressure", "time"])
+def test_a_residual_that_hangs_on_the_state_is_structured(cause: str) -> None:
+    record = ready(moving())
+    shapes = {
+        "direction": np.sign(np.gradient(record.command_pa)),
+        "position": ((record.position_m - 0.05) / 0.02) ** 2,
+        "pressure": (record.command_pa - 4e4) / 2e4,
+        "time": record.time_s / 15.0,
+    }
+    assert structure(record, noise(3000) + NOISE_M * shapes[cause]) > STRUCTURED
+
+
+def test_a_missed_slip_is_not_structure_and_does_not_hide_it() -> None:
+    record = ready(moving())
+    slip_m = np.zeros(3000)
+    slip_m[1500:1580] = 8e-3
+    assert structure(record, noise(3000) + slip_m) < STRUCTURED
+    assert structure(record, noise(3000) + NOISE_M * np.sign(np.gradient(record.command_pa)) + slip_m) > STRUCTURED
+
+
+def test_preload_and_sensor_offset_are_one_class_and_gain_is_the_spring() -> None:
+    assert (
+        algebraic_class("preload", LIBRARY)
+        == algebraic_class("sensor_offset", LIBRARY)
+        == {
+            "preload",
+            "sensor_offset",
+        }
+    )
+    assert bare_parameter("sensor_gain", LIBRARY) == "spring_n_per_m"
+    assert bare_parameter("preload", LIBRARY) is None
+    assert bare_parameter("preload", {"preload": LIBRARY["preload"]}) is None
+
+
+def test_classes_keep_the_order_of_their_first_member() -> None:
+    gathered = classes(["sensor_offset", "backlash", "preload"], LIBRARY)
+    assert gathered == [{"sensor_offset", "preload"}, {"backlash"}]
+
+
+def test_the_end_is_held_out_and_the_fit_never_sees_it() -> None:
+    recording = moving(900)
+    parts = split([recording])
+    assert len(parts.train.recording) == 600
+    counted = np.isfinite(residual_m(parts.judged, recording.position_m))
+    assert not counted[:600].any()
+    assert counted[600:].all()
+
+
+def test_another_recording_is_held_out_whole() -> None:
+    parts = split([moving(300)], moving(200, seed=9))
+    assert len(parts.train.recording) == 300
+    assert parts.judged.counted.sum() == 200
+
+
+def test_recordings_one_after_another_begin_anew_and_keep_what_all_have() -> None:
+    one, other = moving(300), moving(200, seed=9)
+    extra = Recording({**one.columns, "pressure_pa": one.command_pa})
+    whole = joined([extra, other])
+    assert set(whole.columns) == {"time_s", "command_pa", "position_m"}
+    assert ready(whole).segments == ((0, 300), (300, 500))
+
+
+def test_too_little_to_hold_some_out_is_said() -> None:
+    with pytest.raises(InputError, match="33 samples held out are too few"):
+        split([moving(100)])

@@ -1,0 +1,376 @@
+"""Diagnose: which effect is missing. Every candidate is refitted in full; none is believed for a falling error alone.
+
+A step fits the valve with each effect of the library added, all with the same effort, and accepts what passes the rule
+of `evidence` inside its physical range. The best by robust BIC on the fitted part is added, unless the bare valve,
+fitted once more from that effect's own base parameters, does as well: an optimiser's failure must not look like
+physics. Steps go on until the result is explained (it reaches the floor and leaves no structured residual), nothing
+more is accepted, or three effects are added.
+
+    adequate      nothing is missing: no effect is accepted, and the valve is at the floor without
+    missing       these effects, and with them all is explained
+    one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
+    unexplained   something is missing that the library does not have; what lowered the error so far is still named
+    untrusted     the searches disagree, and the best of them explains nothing
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from os import cpu_count
+from typing import Literal
+
+from config.errors import InputError
+from config.recording import Recording
+from config.valve import ValveFile, ValveParameters
+from sim.composition import Composition
+from sim.effect import Effect, Parameter, find_effect, shipped_effects
+from workbench.confounding import algebraic_class, bare_parameter, classes, told_apart
+from workbench.evidence import Errors, Gain, alike, errors, gain
+from workbench.experiment import Experiment, experiment
+from workbench.fitting import Fit, fit
+from workbench.free_run import FreeRun
+from workbench.held_out import Split, split
+from workbench.parameters import free_parameters
+from workbench.preview import Suspect, preview
+from workbench.simulation_error import SimulationError
+from workbench.structure import STRUCTURED
+
+MOST_ADDED = 3
+AT_END = 0.2
+"""Of the weakest start: nearer to the end of its range a parameter is at it."""
+BETTER = 0.999
+"""Factor on the cost at which a base fit counts as better than the one before."""
+
+REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
+SAME = 1.01
+"""Factor on the cost within which two members of a class came out as the one they are."""
+
+Verdict = Literal["adequate", "missing", "one_of", "unexplained", "untrusted"]
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A fit and how it does on what was held out."""
+
+    fit: Fit
+    errors: Errors
+    at_floor: bool
+
+    @property
+    def structured(self) -> bool:
+        """Whether the residual still hangs on the state."""
+        return self.errors.structure > STRUCTURED
+
+    @property
+    def explained(self) -> bool:
+        """Whether nothing is left but what no model explains."""
+        return self.at_floor and not self.structured
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in it."""
+        return tuple(each.name for each in self.fit.valve.effect)
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An effect tried in one step. Without a model it could not be fitted; `why_not` says why it is not accepted."""
+
+    step: int
+    name: str
+    model: Model | None
+    gain: Gain | None
+    physical: bool
+    why_not: str
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it passes the rule; the best of the accepted is added."""
+        return not self.why_not
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One forward step: the model before, all candidates, and the one added with those that do equally well."""
+
+    before: Model
+    candidates: tuple[Candidate, ...]
+    added: Candidate | None
+    alike: tuple[Candidate, ...]
+    """The added one and all that the block errors do not tell from it, by evidence; classes stand together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What is missing, and all that led to it."""
+
+    verdict: Verdict
+    base: Model
+    best: Model
+    preview: tuple[Suspect, ...]
+    steps: tuple[Step, ...]
+    experiment: Experiment | None
+    split: Split
+    sentence: str
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The effects added, in order."""
+        return tuple(step.added.name for step in self.steps if step.added)
+
+    @property
+    def indistinguishable(self) -> tuple[tuple[str, ...], ...]:
+        """For each step with more than one equally good effect, their names."""
+        return tuple(tuple(each.name for each in step.alike) for step in self.steps if len(step.alike) > 1)
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All candidates of all steps."""
+        return tuple(each for step in self.steps for each in step.candidates)
+
+
+def diagnose(
+    recording: Recording | Sequence[Recording],
+    valve: ValveFile,
+    *,
+    test: Recording | None = None,
+    effects: Sequence[str] | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    told: Callable[[tuple[Suspect, ...]], None] | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find the effects that a valve file lacks to explain a recording.
+
+    Args:
+        recording: one or several.
+        valve: where the fit begins; its own effects stay.
+        test: held out; by default the last third of the recording.
+        effects: names, or paths of own effects' files, to be tried; by default all that come with the package.
+        seed: of the searches.
+        workers: threads, by default one a core; the result does not depend on it.
+        told: given the tangent preview as soon as it is there.
+        progress: told what is being done, and the fraction of it done.
+
+    Raises:
+        InputError: the recording holds too little or other units than SI, an unknown effect.
+    """
+    return _Search(recording, valve, test, effects, seed, workers, progress).diagnosis(told)
+
+
+class _Search:
+    """The forward search, and what it holds on to."""
+
+    def __init__(
+        self,
+        recording: Recording | Sequence[Recording],
+        valve: ValveFile,
+        test: Recording | None,
+        effects: Sequence[str] | None,
+        seed: int,
+        workers: int | None,
+        progress: Progress | None,
+    ) -> None:
+        self._split = split([recording] if isinstance(recording, Recording) else recording, test)
+        self._valve = valve
+        there = {each.name for each in valve.effect}
+        names = [name for name in (shipped_effects() if effects is None else effects) if name not in there]
+        self._library = {name: find_effect(name, "effects") for name in names}
+        self._seed = seed
+        self._workers = workers or cpu_count() or 1
+        self._progress = progress or (lambda _what, _done: None)
+
+    def diagnosis(self, told: Callable[[tuple[Suspect, ...]], None] | None) -> Diagnosis:
+        base = self._model(self._base(self._valve))
+        suspects = preview(base.fit, self._split, self._library)
+        if told:
+            told(suspects)
+        steps = self._steps(base)
+        # A base fitted again, and better, takes the place of the first.
+        base, last = steps[0].before, steps[-1]
+        best = last.added.model if last.added and last.added.model else last.before
+        verdict = _verdict(best, steps)
+        chosen = self._experiment(steps) if verdict == "one_of" else None
+        sentence = _sentence(verdict, best, steps, self._library, self._split.repeats)
+        return Diagnosis(verdict, base, best, suspects, steps, chosen, self._split, sentence)
+
+    def _steps(self, base: Model) -> tuple[Step, ...]:
+        steps: list[Step] = []
+        here = base
+        while len(steps) < MOST_ADDED:
+            steps.append(self._step(len(steps) + 1, here))
+            added = steps[-1].added
+            if added is None or added.model is None or added.model.explained:
+                break
+            here = added.model
+        return tuple(steps)
+
+    def _step(self, number: int, before: Model) -> Step:
+        models = self._refitted(number, before)
+        candidates, added = self._judged(number, before, models)
+        if added is None or added.model is None:
+            return Step(before, candidates, None, ())
+        bare = ValveFile(valve=added.model.fit.valve.valve, effect=before.fit.valve.effect)
+        if self._descends(before.fit, bare):
+            before = self._model(self._base(bare))
+            candidates, added = self._judged(number, before, models)
+        return Step(before, candidates, added, self._alike(candidates, added) if added else ())
+
+    def _descends(self, base: Fit, valve: ValveFile) -> bool:
+        """Whether a search from this valve's parameters ends below the base fit."""
+        composition = Composition.from_file(valve)
+        run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure)
+        parameters = free_parameters(composition, tuple(base.parameters))
+        error = SimulationError(run, composition, parameters, composition.theta)
+        return error.cost(error.descended(error.coordinates(composition.theta))) < BETTER * base.cost
+
+    def _base(self, valve: ValveFile) -> Fit:
+        return fit(
+            self._split.train.recording,
+            valve,
+            seed=self._seed,
+            workers=self._workers,
+            progress=lambda done: self._progress("fitting the valve as it is", done),
+        )
+
+    def _refitted(self, number: int, before: Model) -> dict[str, Model | str]:
+        """Refit every effect not yet in, each on one thread; where that is not possible, say why."""
+        names = [name for name in self._library if name not in before.effects]
+        train, here = self._split.train.recording, before.fit
+
+        def refitted(name: str) -> Model | str:
+            try:
+                found = fit(train, here.valve, effects=(name,), base=here, seed=self._seed, workers=1)
+            except InputError as error:
+                return error.problem
+            return self._model(found)
+
+        models: dict[str, Model | str] = {}
+        with ThreadPoolExecutor(self._workers) as pool:
+            for name, model in zip(names, pool.map(refitted, names), strict=True):
+                models[name] = model
+                self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
+        return models
+
+    def _model(self, found: Fit) -> Model:
+        judged = errors(found, self._split)
+        return Model(found, judged, judged.at_floor(self._split.floor_m))
+
+    def _judged(
+        self, number: int, before: Model, models: Mapping[str, Model | str]
+    ) -> tuple[tuple[Candidate, ...], Candidate | None]:
+        """Hold every candidate against the model before; the best accepted one, or the first of its class."""
+        candidates = tuple(self._candidate(number, name, before, model) for name, model in models.items())
+        ordered = tuple(sorted(candidates, key=lambda each: -each.gain.bic if each.gain else float("inf")))
+        accepted = {each.name: each for each in ordered if each.accepted}
+        if not accepted:
+            return ordered, None
+        best, first = next(iter(accepted.values())), accepted[min(classes(accepted, self._library)[0])]
+        assert best.model
+        assert first.model
+        # A class is not ranked inside, but a search that failed is no reason to go on from there.
+        return ordered, first if first.model.fit.cost < SAME * best.model.fit.cost else best
+
+    def _candidate(self, number: int, name: str, before: Model, model: Model | str) -> Candidate:
+        if isinstance(model, str):
+            return Candidate(number, name, None, None, False, model)
+        found = gain(before.fit, model.fit, before.errors, model.errors)
+        beyond = _beyond(name, model.fit, self._library[name])
+        same = bare_parameter(name, self._library)
+        why_not = beyond or found.short
+        if same and not why_not:
+            why_not = f"no record of pressure and position tells it from {same}"
+        return Candidate(number, name, model, found, not beyond, why_not)
+
+    def _alike(self, candidates: Sequence[Candidate], added: Candidate) -> tuple[Candidate, ...]:
+        assert added.model
+        refitted = {each.name: each for each in candidates if each.model}
+        as_good = [
+            each.name
+            for each in refitted.values()
+            if each.accepted and each.model and alike(added.model.errors, each.model.errors)
+        ]
+        # A class is one by algebra, whether or not the search for each of its members succeeded.
+        return tuple(
+            refitted[name]
+            for each in classes(as_good, self._library)
+            for name in sorted(algebraic_class(min(each), self._library))
+            if name in refitted
+        )
+
+    def _experiment(self, steps: Sequence[Step]) -> Experiment | None:
+        """Choose the input for the first set with more than one class: one valve of each class."""
+        for step in steps:
+            fits = {each.name: each.model.fit for each in step.alike if each.model}
+            apart = [fits[min(each)] for each in classes(fits, self._library)]
+            if len(apart) > 1:
+                self._progress("choosing the experiment", 0.0)
+                record = self._split.judged.record
+                return experiment(apart, record, seed=self._seed, workers=self._workers)
+        return None
+
+
+def _beyond(name: str, found: Fit, effect: Effect) -> str:
+    """Say which parameter of an effect the recording wants beyond its physical range; empty if none."""
+    for key, declared in effect.parameters.items():
+        parameter = found.parameters.get(f"{effect.name}.{key}")
+        if parameter and not parameter.physical and _at_end(parameter.value, declared, found.valve.valve):
+            return (
+                f"not physical: the recording wants {name}.{key} beyond {parameter.value:.4g}, "
+                f"the end of its range from {declared.least:g} to {declared.most:g}"
+            )
+    return ""
+
+
+def _at_end(value: float, declared: Parameter, valve: ValveParameters) -> bool:
+    """Whether a value lies nearer to an end of the range than a fifth of any start that is not the end itself."""
+    starts = declared.starts_for(valve)
+    return any(
+        abs(value - end) < AT_END * min((abs(start - end) for start in starts if start != end), default=0.0)
+        for end in (declared.least, declared.most)
+    )
+
+
+def _verdict(best: Model, steps: Sequence[Step]) -> Verdict:
+    added = [step for step in steps if step.added]
+    if best.explained and added:
+        return "one_of" if any(len(step.alike) > 1 for step in added) else "missing"
+    if best.at_floor and not added:
+        return "adequate"
+    return "unexplained" if best.fit.trusted else "untrusted"
+
+
+def _sentence(
+    verdict: Verdict, best: Model, steps: Sequence[Step], library: Mapping[str, Effect], repeats: bool
+) -> str:
+    names = " and ".join(step.added.name for step in steps if step.added)
+    before, after = 1e3 * steps[0].before.errors.test_rmse_m, 1e3 * best.errors.test_rmse_m
+    fell = f"the held-out error falls from {before:.3g} to {after:.3g} mm"
+    repeat = "" if repeats else REPEAT
+    if verdict == "adequate":
+        return f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
+    if verdict == "missing":
+        return f"Missing: {names}; {fell}, and nothing is left to explain."
+    if verdict == "one_of":
+        return f"Missing: {names}, or another that does as well; {fell}." + "".join(
+            _apart(each, library) for each in steps
+        )
+    begun = f" {names} explains a part: {fell}." if names else f" The held-out error is {after:.3g} mm."
+    if verdict == "unexplained":
+        return f"Something is missing that the library does not have.{begun}{repeat}"
+    return f"Not to be trusted: the searches end at different errors.{begun}"
+
+
+def _apart(step: Step, library: Mapping[str, Effect]) -> str:
+    """Say for a set what would tell its members apart."""
+    names = [each.name for each in step.alike]
+    if len(names) < 2:
+        return ""
+    texts = [
+        f" {name} or {other}: {told_apart(name, other, library) or 'no record of pressure and position tells'}."
+        for i, name in enumerate(names)
+        for other in names[i + 1 :]
+        if told_apart(name, other, library) or len(classes((name, other), library)) == 1
+    ]
+    return "".join(texts) or f" Equally good: {', '.join(names)}."

@@ -1,0 +1,456 @@
+"""The report of a diagnosis: what is missing, how the error fell, what is not told apart, what to measure next."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from config.recording import Recording
+from sim.effect import Effect, find_effect
+from workbench.comparison import Comparison, compare
+from workbench.confounding import classes, told_apart
+from workbench.diagnosis import Candidate, Diagnosis, Model, Step
+from workbench.evidence import LEAST_BIC, LEAST_GAIN, LEAST_STANDARD_ERRORS
+from workbench.experiment import Experiment
+from workbench.fitting import Fitted
+from workbench.report import ranking
+from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
+from workbench.report.comparison import MEANINGS, WORDS, facts, recording, thinned
+from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
+from workbench.report.page import (
+    Row,
+    Subject,
+    bullets,
+    figures_of_merit,
+    folded,
+    glossary,
+    heading,
+    plot,
+    preformatted,
+    section,
+    subheading,
+    table,
+    text,
+    verdict,
+    write,
+)
+from workbench.report.ranking import Tried
+from workbench.report.series import drawn, rounded
+from workbench.report.units import Shown, length, of_stroke, parameter, times
+
+VERDICTS = {
+    "adequate": ("good", "Nothing is missing that this recording could show."),
+    "missing": ("good", "The missing effect is found."),
+    "one_of": ("open", "It is one of several effects; this recording does not tell which."),
+    "unexplained": ("bad", "Something is missing that the library of effects does not have."),
+    "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
+}
+DIAGNOSIS_WORDS = {
+    "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "
+    "play in the linkage, a sensor's fault.",
+    "Fitted, held out": "The model's parameters are fitted to one part of the data. The other part is held out: "
+    "the model has not seen it, so that an error which falls there is no trick of the fit.",
+    "Evidence": "How much better an effect explains the fitted part than the model without it, less a price for "
+    f"each parameter it brings (gain of the robust Bayesian information criterion). Above {LEAST_BIC:g} it counts.",
+    "95 % interval": "Where the parameter lies, as far as this recording says.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What the report takes from a diagnosis beyond its models: the recording judged, and which of it was held out."""
+
+    judged: Recording
+    held_out: Mask
+    floor_m: float
+    base: Comparison
+    best: Comparison
+
+
+def _seen(diagnosis: Diagnosis) -> _Seen:
+    part = diagnosis.split.judged
+    base, best = (compare(part.recording, each.fit.valve) for each in (diagnosis.base, diagnosis.best))
+    return _Seen(part.recording, part.counted, diagnosis.split.floor_m, base, best)
+
+
+def report_diagnosis(
+    diagnosis: Diagnosis, path: Path, subject: Subject, experiment_file: str = "experiment.csv"
+) -> None:
+    """Write the report.
+
+    Args:
+        diagnosis: what `diagnose` returned.
+        path: the HTML file.
+        subject: the valve as it was given, and the recordings.
+        experiment_file: where the experiment's input was or would be written, for the reader.
+
+    Raises:
+        InputError: plotly is not installed, or the file cannot be written.
+    """
+    seen = _seen(diagnosis)
+    name = subject.valve.valve.name
+    write(
+        path,
+        f"Valve {name}: which effect is missing",
+        [
+            heading(f"Valve “{name}”: which effect is missing", subject, _facts(diagnosis, seen)),
+            _verdict(diagnosis, seen),
+            _key_figures(diagnosis, seen),
+            _fall(diagnosis, seen),
+            _overlay(seen),
+            _where(seen),
+            _ranking(diagnosis, seen),
+            _added(diagnosis),
+            _alike(diagnosis),
+            _next(diagnosis, experiment_file),
+            _untold(diagnosis),
+            _preview(diagnosis),
+            recording(subject, diagnosis.split.train.record.notes, []),
+            section("words", "Words used here", glossary(DIAGNOSIS_WORDS | WORDS)),
+        ],
+    )
+
+
+def _facts(diagnosis: Diagnosis, seen: _Seen) -> str:
+    held_out, fitted = int(seen.held_out.sum()), int(diagnosis.split.train.counted.sum())
+    if held_out < len(seen.judged):
+        return f"{facts(seen.base)}; {fitted} fitted, {held_out} held out"
+    return f"fitted {fitted} samples; held out {facts(seen.base)}"
+
+
+def _verdict(diagnosis: Diagnosis, seen: _Seen) -> str:
+    kind, first = VERDICTS[diagnosis.verdict]
+    if diagnosis.verdict == "missing" and len(diagnosis.missing) > 1:
+        first = "The missing effects are found."
+    return verdict(
+        kind, first, text(diagnosis.sentence, "Where the model failed before:"), bullets(seen.base.sentences)
+    )
+
+
+def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
+    before, after = diagnosis.base.errors, diagnosis.best.errors
+    stroke_m = diagnosis.base.fit.valve.valve.stroke_m
+    tried = len({each.name for each in diagnosis.candidates})
+    return figures_of_merit(
+        [
+            (
+                "Held-out error before, rms, mm",
+                length(before.test_rmse_m),
+                f"{of_stroke(before.test_rmse_m, stroke_m)}, base parameters refitted",
+            ),
+            ("and after, mm", length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
+            ("Floor, mm", length(seen.floor_m), "no model does better"),
+            ("Added", Shown(", ".join(diagnosis.missing) or "nothing"), f"of {tried} effects tried"),
+        ]
+    )
+
+
+def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
+    stages: list[tuple[str, Model, Candidate | None]] = [("as it was, refitted", diagnosis.base, None)]
+    stages += [
+        (f"+ {step.added.name}", step.added.model, step.added)
+        for step in diagnosis.steps
+        if step.added and step.added.model
+    ]
+    figure = ranking.fall(
+        [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages], seen.floor_m
+    )
+    rows = [
+        Row(
+            [
+                name,
+                length(model.errors.train_rmse_m),
+                length(model.errors.test_rmse_m),
+                times(model.errors.test_rmse_m, seen.floor_m),
+                length(model.errors.test_block_m),
+                "–" if candidate is None or candidate.gain is None else f"{candidate.gain.bic:.4g}",
+            ],
+            "" if model.explained else "something is left to explain",
+            "good" if model.explained else "",
+        )
+        for name, model, candidate in stages
+    ]
+    head = ["Model", "Error, fitted, mm", "Held out, mm", "In floors", "Median second, held out, mm", "Evidence"]
+    return section(
+        "fall",
+        "How the error fell",
+        plot(
+            "plot-fall",
+            figure,
+            300,
+            f"Error, rms, of each model. The held-out data it had not seen before. Dashed: the floor, "
+            f"{length(seen.floor_m).text} mm.",
+        ),
+        table("table-fall", head, rows),
+        text(
+            "The median second is the error in a typical second: one slip missed by a hair weighs nothing in it, and "
+            "much in the rms."
+        ),
+    )
+
+
+def _overlay(seen: _Seen) -> str:
+    base, best = seen.base, seen.best
+    models = [Simulated("before", MODEL, base.simulated_m)]
+    if base is not best and not np.array_equal(base.simulated_m, best.simulated_m, equal_nan=True):
+        models.append(Simulated("after", EXTENDED, best.simulated_m))
+    whole = bool(seen.held_out.all())
+    figure = overlay(
+        base.time_s,
+        base.command_pa,
+        base.measured_m,
+        models,
+        [] if whole else [Shade("held out", HELD_OUT, seen.held_out)],
+    )
+    told = "All of it was held out." if whole else "On the green ground: what was held out."
+    return section(
+        "overlay",
+        "Measured and simulated position",
+        plot(
+            "plot-overlay",
+            figure,
+            640,
+            "Above the stem position, in the middle the error (simulated less measured), below the command. "
+            f"{told} Drag across a plot to look closer, all three follow; double-click to return."
+            f"{thinned(base.time_s.size)}",
+        ),
+    )
+
+
+def _where(seen: _Seen) -> str:
+    rows = [
+        Row(
+            [before.name, length(before.rms_m), length(after.rms_m), times(after.rms_m, seen.floor_m)],
+            MEANINGS[before.name],
+        )
+        for before, after in zip(seen.base.phases, seen.best.phases, strict=True)
+        if before.count
+    ]
+    slips = [
+        f"slips {when}: {len(each.slips.matched)} matched, {len(each.slips.missed_s)} missed, "
+        f"{len(each.slips.invented_s)} invented"
+        for when, each in (("before", seen.base), ("after", seen.best))
+    ]
+    return section(
+        "where",
+        "Where it failed, and what is left",
+        table("table-phases", ["What the stem does", "Error before, mm", "After, mm", "After, in floors"], rows),
+        bullets([*slips, *(f"after: {each}" for each in seen.best.sentences)]),
+    )
+
+
+def _ranking(diagnosis: Diagnosis, seen: _Seen) -> str:
+    parts = [
+        text(
+            "Each effect of the library was added in turn and the whole model refitted with it, all with equal effort. "
+            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, second by second, falls "
+            f"by more than {100 * LEAST_GAIN:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
+            "and its parameters are physically possible."
+        )
+    ]
+    for number, step in enumerate(diagnosis.steps, start=1):
+        rows = sorted(_tried(step), key=lambda each: each.order)
+        before = step.before.errors.test_rmse_m
+        title = f"Step {number}: beside {', '.join(step.before.effects)}" if step.before.effects else f"Step {number}"
+        parts += [
+            subheading(title),
+            plot(
+                f"plot-ranking-{number}",
+                ranking.ranking(rows, before, seen.floor_m),
+                110 + 26 * len(rows),
+                "Held-out error, rms, with each effect added; dashed the floor, dotted the error without any of them. "
+                "The scale is logarithmic.",
+            ),
+            table(
+                f"table-ranking-{number}",
+                ["Effect", "Outcome", "Held-out error, mm", "Fitted, mm", "Fall, in its uncertainties", "Evidence"],
+                [_ranked(each) for each in rows],
+                (0, 1),
+            ),
+        ]
+    return section("ranking", "The effects that were tried", *parts)
+
+
+def _tried(step: Step) -> list[Tried]:
+    alike = {each.name for each in step.alike}
+    added = step.added.name if step.added else ""
+
+    def outcome(each: Candidate) -> str:
+        if each.name == added:
+            return "added"
+        if each.name in alike:
+            return "as good"
+        return "accepted" if each.accepted else "refused"
+
+    return [
+        Tried(
+            each.name,
+            each.model.errors.test_rmse_m if each.model else None,
+            each.model.errors.train_rmse_m if each.model else None,
+            each.gain.standard_errors if each.gain else None,
+            each.gain.bic if each.gain else None,
+            outcome(each),
+            each.why_not,
+        )
+        for each in step.candidates
+    ]
+
+
+def _ranked(each: Tried) -> Row:
+    kinds = {"added": "good", "as good": "set"}
+    return Row(
+        [
+            each.name,
+            f"{each.outcome}: {each.why}" if each.why else each.outcome,
+            length(each.test_m),
+            length(each.train_m),
+            "–" if each.fall_errors is None else f"{each.fall_errors:.3g}",
+            "–" if each.evidence is None else f"{each.evidence:.4g}",
+        ],
+        _effect(each.name).text.rstrip("."),
+        kinds.get(each.outcome, ""),
+    )
+
+
+def _effect(name: str) -> Effect:
+    return find_effect(name, "effects")
+
+
+def _added(diagnosis: Diagnosis) -> str:
+    parts = []
+    for name in diagnosis.missing:
+        effect = _effect(name)
+        parts += [subheading(name), text(effect.text, f"In a record: {effect.looks}" if effect.looks else "")]
+        parts.append(preformatted(effect.equation))
+    if not parts:
+        parts = [text("No effect was added; the parameters below are those of the valve itself, refitted.")]
+    names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
+    rows = [
+        _parameter(name, diagnosis.base.fit.parameters.get(name), diagnosis.best.fit.parameters.get(name))
+        for name in names
+    ]
+    head = ["Parameter", "Before", "After", "95 % interval", "Unit"]
+    return section("added", "What was added", *parts, table("table-parameters", head, rows, (0,)))
+
+
+def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
+    words, factor, unit = parameter(name)
+
+    def shown(each: Fitted | None) -> Shown:
+        return Shown("–") if each is None else Shown(f"{factor * each.value:.4g}", f"{name} = {each.value:.6g}")
+
+    interval = "–" if after is None else f"{factor * after.lower:.4g} to {factor * after.upper:.4g}"
+    remark = "at the end of its physical range" if after and after.at_bound else ""
+    return Row([words, shown(before), shown(after), interval, unit], remark)
+
+
+def _alike(diagnosis: Diagnosis) -> str:
+    sets = diagnosis.indistinguishable
+    if not sets:
+        return section(
+            "alike",
+            "What could not be told apart",
+            text("Nothing: no other accepted effect comes within reach of the one that was added.")
+            if diagnosis.missing
+            else text("The question does not arise: no effect was accepted."),
+        )
+    library = {each.name: _effect(each.name) for each in diagnosis.candidates}
+    rows = [_two(name, other, library) for names in sets for i, name in enumerate(names) for other in names[i + 1 :]]
+    return section(
+        "alike",
+        "What could not be told apart",
+        text(
+            f"These explain the recording equally well: {'; '.join(' or '.join(names) for names in sets)}. "
+            "One of each set was added to go on with; it is not proved."
+        ),
+        table("table-alike", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
+    )
+
+
+def _two(name: str, other: str, library: Mapping[str, Effect]) -> Row:
+    same = len(classes((name, other), library)) == 1
+    none = "none of pressure and position: their equations are the same" if same else "see the next section"
+    return Row([name, other, told_apart(name, other, library) or none])
+
+
+def _next(diagnosis: Diagnosis, experiment_file: str) -> str:
+    chosen = diagnosis.experiment
+    if chosen is None:
+        return section("next", "What to measure next", bullets(_advice(diagnosis)))
+    return section(
+        "next",
+        "What to measure next",
+        text(
+            f"Play this command to the valve: {chosen.name}. It was chosen from a menu by what it tells apart after "
+            f"every rival has been refitted: the wrong one is then left with an error of {chosen.separation:.3g} times "
+            "the sensor's noise. It stays within the pressures of the recording and begins at rest.",
+        ),
+        plot("plot-experiment", _command(chosen), 260, f"The command of the experiment, in {experiment_file}."),
+        text("Then diagnose again with both recordings."),
+    )
+
+
+def _advice(diagnosis: Diagnosis) -> list[str]:
+    advice = []
+    if diagnosis.verdict == "adequate":
+        advice.append("nothing is needed; record again when the valve has aged or been serviced")
+    if diagnosis.verdict == "missing":
+        advice.append("put the extended valve file into use, and compare it with a recording of another day")
+    if diagnosis.verdict == "one_of":
+        advice.append("no input tells these apart; measure what lies between them, such as the actuator pressure")
+    if diagnosis.verdict in ("unexplained", "untrusted"):
+        advice.append(
+            "record again with slow ramps, steps of several heights and restarts in the same direction after holds"
+        )
+        advice.append("write the missing effect as a file of your own, where the section above says what is left")
+    if diagnosis.split.train.record.pressure_pa is None and diagnosis.verdict != "adequate":
+        advice.append(
+            "record the actuator pressure too: it parts what happens before the actuator from what happens at the stem"
+        )
+    if diagnosis.split.train.record.repeatability_m is None:
+        advice.append(
+            "let the command repeat a stretch of at least some seconds: how well the valve repeats is the floor"
+        )
+    return advice
+
+
+def _command(chosen: Experiment) -> dict[str, object]:
+    series = drawn(chosen.time_s, chosen.command_pa)
+    trace = line(
+        rounded(series.time_s, 4),
+        rounded(1e-3 * series.value, 3),
+        "command",
+        QUIET,
+        "%{y:.2f} kPa (%{customdata:.6~g} Pa)<br>at %{x:.3f} s",
+        customdata=rounded(series.value, 0),
+    )
+    return {"data": [trace], "layout": layout(xaxis=axis("time, s"), yaxis=axis("command, kPa"), showlegend=False)}
+
+
+def _untold(diagnosis: Diagnosis) -> str:
+    best = diagnosis.best.fit
+    said = [
+        f"not determined by this recording: {', '.join(parameter(name)[0] for name in each.split(', '))}"
+        for each in best.undetermined
+    ]
+    said += [
+        f"at the end of its physical range: {parameter(key)[0]}" for key, f in best.parameters.items() if f.at_bound
+    ]
+    if not best.trusted:
+        said.append("searches from different starts end at different errors: a better fit may exist")
+    said.append(
+        "only ratios of forces can be read from pressure and position: the diaphragm area is taken from the valve file"
+    )
+    said.append("an effect that does not show under this recording's inputs may still be there")
+    return section("untold", "What the recording does not tell", bullets(said))
+
+
+def _preview(diagnosis: Diagnosis) -> str:
+    rows = [Row([each.name, f"{100 * each.score:.3g} %"]) for each in diagnosis.preview]
+    return folded(
+        "preview",
+        "For specialists: the first guess, before any effect was fitted",
+        text("Share of the error that a weak effect of each kind would explain: a guess, right in about two of three."),
+        table("table-preview", ["Effect", "Share"], rows),
+    )

@@ -1,0 +1,171 @@
+"""The overlay: measured and simulated position, the error below, the command at the foot; one time axis for all.
+
+Behind them stand the phases, or what was held out; triangles mark slips that the model misses or invents.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.recording import Column
+from workbench.phases import PHASES, STUCK, SlipEvents
+from workbench.report.charts import GRID, INK, MEASURED, QUIET, Figure, Trace, axis, layout, line
+from workbench.report.series import drawn, rounded, running_s
+
+SHADES = {
+    "slipping up": "rgba(60,130,200,0.13)",
+    "slipping down": "rgba(217,160,43,0.17)",
+    "reversal": "rgba(150,90,170,0.13)",
+    "near stops": "rgba(90,100,115,0.16)",
+}
+HELD_OUT = "rgba(27,127,121,0.10)"
+FINEST = 4000
+"""Columns in which phases are shaded at most."""
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """One model's position, m, a value a sample."""
+
+    name: str
+    colour: str
+    position_m: Column
+
+
+@dataclass(frozen=True, slots=True)
+class Shade:
+    """Samples with a coloured ground."""
+
+    name: str
+    colour: str
+    rows: Mask
+
+
+def overlay(
+    time_s: Column,
+    command_pa: Column,
+    measured_m: Column,
+    models: Sequence[Simulated],
+    shades: Sequence[Shade],
+    slips: SlipEvents | None = None,
+) -> Figure:
+    """Return the figure; arrays of one length, NaN where there is nothing."""
+    traces: list[Trace] = [*_grounds(time_s, shades)]
+    traces.append(_position(time_s, measured_m, "measured", MEASURED, "y"))
+    for each in models:
+        traces.append(_position(time_s, each.position_m, each.name, each.colour, "y"))
+        error_m = each.position_m - measured_m
+        traces.append(_position(time_s, error_m, f"error, {each.name}", each.colour, "y2", showlegend=False))
+    if slips is not None and bool(np.all(np.diff(time_s) > 0.0)):
+        traces += _marks(time_s, measured_m, slips)
+    command = drawn(time_s, command_pa)
+    traces.append(
+        line(
+            rounded(command.time_s, 5),
+            rounded(1e-3 * command.value, 3),
+            "command",
+            QUIET,
+            "%{y:.2f} kPa (%{customdata:.6~g} Pa)<br>at %{x:.3f} s",
+            customdata=rounded(command.value, 0),
+            yaxis="y3",
+            showlegend=False,
+        )
+    )
+    return {
+        "data": traces,
+        "layout": layout(
+            margin={"l": 62, "r": 18, "t": 60, "b": 46},
+            dragmode="zoom",
+            xaxis=axis(
+                "time, s",
+                anchor="y3",
+                range=[0.0, float(running_s(time_s)[-1])],
+                showspikes=True,
+                spikemode="across",
+                spikethickness=1,
+                spikecolor=GRID,
+            ),
+            **_axes(bool(shades)),
+        ),
+    }
+
+
+def _axes(has_ground: bool) -> Figure:
+    """Return the ordinates; a ground is an axis of its own from 0 to 1, which gives its place to what overlays it."""
+    position, error = {"domain": [0.50, 1.0]}, {"domain": [0.21, 0.45]}
+    ground = {"range": [0, 1], "visible": False, "fixedrange": True}
+    zero = {"zeroline": True, "zerolinecolor": INK, "zerolinewidth": 1}
+    behind = {"yaxis4": position | ground, "yaxis5": error | ground} if has_ground else {}
+    return {
+        "yaxis": axis("position, mm", **({"overlaying": "y4"} if has_ground else position)),
+        "yaxis2": axis("error, mm", **zero, **({"overlaying": "y5"} if has_ground else error)),
+        "yaxis3": axis("command, kPa", domain=[0.0, 0.16], nticks=4),
+        **behind,
+    }
+
+
+def phase_shades(phase: NDArray[np.int64], judged: Mask) -> list[Shade]:
+    """Return a ground for each phase but rest."""
+    return [
+        Shade(name, SHADES[name], judged & (phase == i))
+        for i, name in enumerate(PHASES)
+        if i != STUCK and bool(np.any(judged & (phase == i)))
+    ]
+
+
+def _position(time_s: Column, position_m: Column, name: str, colour: str, y_axis: str, **changes: object) -> Trace:
+    series = drawn(time_s, position_m)
+    return line(
+        rounded(series.time_s, 5),
+        rounded(1e3 * series.value, 4),
+        name,
+        colour,
+        "%{y:.3f} mm (%{customdata:.5~g} m)<br>at %{x:.3f} s",
+        customdata=rounded(series.value, 7),
+        yaxis=y_axis,
+        **changes,
+    )
+
+
+def _grounds(time_s: Column, shades: Sequence[Shade]) -> Iterator[Trace]:
+    along_s = running_s(time_s)
+    stride = max(1, time_s.size // FINEST)
+    for shade in shades:
+        x: list[float | None] = []
+        y: list[float | None] = []
+        for first, end in _runs(shade.rows[::stride]):
+            begins, ends = (float(along_s[min(row * stride, time_s.size - 1)]) for row in (first, end))
+            x += [begins, begins, ends, ends, None]
+            y += [0, 1, 1, 0, None]
+        for axis_ in ("y4", "y5"):
+            yield {
+                "type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": shade.colour, "line": {"width": 0},
+                "x": [each if each is None else round(each, 5) for each in x], "y": y, "yaxis": axis_,
+                "name": shade.name, "legendgroup": shade.name, "showlegend": axis_ == "y4", "hoverinfo": "skip",
+            }  # fmt: skip
+
+
+def _runs(rows: Mask) -> Iterator[tuple[int, int]]:
+    """Yield the half-open runs of true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
+    yield from list(pairwise(edges.tolist()))[::2]
+
+
+def _marks(time_s: Column, measured_m: Column, slips: SlipEvents) -> Iterator[Trace]:
+    along_s = time_s - time_s[0]
+    for name, times, symbol, colour in (
+        ("missed slip", slips.missed_s, "triangle-up", "#b4491b"),
+        ("invented slip", slips.invented_s, "triangle-down-open", "#7a3fa0"),
+    ):
+        if times:
+            rows = np.clip(np.searchsorted(along_s, np.asarray(times)), 0, time_s.size - 1)
+            yield {
+                "type": "scatter", "mode": "markers", "name": name, "yaxis": "y",
+                "x": rounded(np.asarray(times, np.float64), 5), "y": rounded(1e3 * measured_m[rows], 4),
+                "marker": {"symbol": symbol, "size": 11, "color": colour, "line": {"width": 2, "color": colour}},
+                "hovertemplate": "at %{x:.3f} s<extra>" + name + "</extra>",
+            }  # fmt: skip
