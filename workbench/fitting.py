@@ -19,9 +19,9 @@ import numpy as np
 from config.errors import InputError
 from config.loading import validated
 from config.recording import Column, Recording
-from config.valve import EffectTable, ValveFile
+from config.valve import EffectTable, ValveFile, ValveParameters
 from sim.composition import BASE, Composition
-from sim.effect import Effect, shipped_effect
+from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 from workbench.free_run import FreeRun
 from workbench.measures import fit_percent
@@ -165,9 +165,12 @@ def _error(
 ) -> SimulationError:
     run = FreeRun(composition, record, from_pressure=from_pressure)
     reached = [
-        name for each in composition.effects if not (from_pressure and "pressure" in each.functions)
-        for name in (f"{each.name}.{key}" for key in each.parameters)
-    ]  # fmt: skip
+        f"{each.name}.{key}"
+        for each in composition.effects
+        if not (from_pressure and "pressure" in each.functions)
+        for key, declared in each.parameters.items()
+        if not declared.given
+    ]
     parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free)
     return SimulationError(run, composition, parameters, composition.theta)
 
@@ -199,13 +202,13 @@ def _extended(valve: ValveFile, effects: Sequence[str]) -> Composition:
     for name in effects:
         if name in there:
             raise InputError("valve file", f"effect {name} is there already")
-    tables = [_somewhere(shipped_effect(name, "effects")) for name in effects]
+    tables = [_switched_off(find_effect(name, "effects"), name, valve.valve) for name in effects]
     return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
 
 
-def _somewhere(effect: Effect) -> EffectTable:
-    values = {key: min(max(0.0, each.least), each.most) for key, each in effect.parameters.items()}
-    return EffectTable.model_validate({"name": effect.name, **values})
+def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTable:
+    """Return an effect's table as it vanishes, drawing data as declared."""
+    return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
 
 
 def _base_starts(composition: Composition, error: SimulationError, seed: int) -> list[Vector]:
@@ -219,20 +222,14 @@ def _base_starts(composition: Composition, error: SimulationError, seed: int) ->
 
 def _effect_starts(composition: Composition, error: SimulationError, effects: Sequence[str], base: Fit) -> list[Vector]:
     """Return coordinates: each base seed with each strength, the best by the screening cost, and the base as it is."""
-    added = [each for each in error.parameters if each.name.partition(".")[0] in effects]
+    names = {find_effect(name, "effects").name for name in effects}
+    added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds[:BASE_SEEDS]]
-    grid = [
-        _with(error, theta, added, values)
-        for theta in seeds
-        for values in strengths(composition, added, error.run.record)
-    ]
-    ends = [tuple(end(each) for each in added) for end in (_off, lambda each: each.least, lambda each: each.most)]
-    weakest = min((_with(error, seeds[0], added, values) for values in ends), key=error.cost)
+    grid = [_with(error, theta, added, values) for theta in seeds for values in strengths(added)]
+    ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
+    switched_off = error.coordinates(seeds[0])
+    weakest = min((switched_off, *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost)
     return [weakest, *_screened(error, grid, STARTS_EFFECT)]
-
-
-def _off(parameter: Parameter) -> float:
-    return min(max(0.0, parameter.least), parameter.most)
 
 
 def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:

@@ -2,7 +2,7 @@
 
 z = log p                     a parameter that is positive throughout
 z = log(F_s / F_c) >= 0       static friction: never below Coulomb friction
-z = asinh(p / s)              a parameter that may be zero or negative, s = 1 % of its range
+z = asinh(p / s)              a parameter that may be zero or negative, s = half of what is barely visible
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,6 @@ import numpy as np
 from config.errors import InputError
 from sim.composition import BASE, Composition
 from sim.karnopp import Vector
-from workbench.record import Record
 
 DEFAULT = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
 """What is free of the base model by default. A is fixed: pressure and position give only ratios of forces."""
@@ -23,7 +22,6 @@ FACTOR = 50.0
 """A base parameter is sought within this factor of the valve file's."""
 MOST_STATIC = 5.0
 """F_s / F_c at most."""
-STRENGTHS = 6
 MOST_GRID = 48
 COULOMB, STATIC = BASE.index("coulomb_n"), BASE.index("static_n")
 
@@ -36,6 +34,8 @@ class Parameter:
     index: int
     least: float
     most: float
+    starts: tuple[float, ...] = ()
+    """Where a fit may begin, as an effect declares it."""
 
     def coordinate(self, theta: Vector) -> float:
         """Return z of the value in theta, inside the range."""
@@ -58,8 +58,9 @@ class Parameter:
 
     @property
     def scale(self) -> float:
-        """s."""
-        return 0.01 * max(abs(self.least), abs(self.most))
+        """s: half of what is barely visible; without starts, a hundredth of the range."""
+        visible = [abs(start) for start in self.starts if start]
+        return 0.5 * min(visible) if visible else 0.01 * max(abs(self.least), abs(self.most))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -95,7 +96,7 @@ def _parameter(composition: Composition, index: int) -> Parameter:
         return Parameter(name, index, value / FACTOR, value * FACTOR)
     effect, _, key = name.partition(".")
     declared = next(each for each in composition.effects if each.name == effect).parameters[key]
-    return Parameter(name, index, declared.least, declared.most)
+    return Parameter(name, index, declared.least, declared.most, declared.starts_for(composition.valve))
 
 
 def _smallest(composition: Composition, name: str) -> float:
@@ -106,39 +107,10 @@ def _smallest(composition: Composition, name: str) -> float:
     return 0.01 * valve.spring_n_per_m * valve.stroke_m
 
 
-def strengths(composition: Composition, parameters: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
-    """Return a grid of values of the parameters, weak to strong, on the scales of the valve and the record."""
-    axes = [_axis(composition, each, record) for each in parameters]
-    points = list(product(*axes))
+def strengths(parameters: Sequence[Parameter]) -> list[tuple[float, ...]]:
+    """Return the grid of values of the parameters, weak to strong, from which their effects declare a fit may begin."""
+    points = list(product(*(each.starts for each in parameters)))
     if len(points) > MOST_GRID:
         chosen = np.random.default_rng(0).choice(len(points), MOST_GRID, replace=False)
         points = [points[i] for i in sorted(chosen.tolist())]
     return points
-
-
-def _axis(composition: Composition, parameter: Parameter, record: Record) -> list[float]:
-    weak, strong = _natural(composition, parameter, record)
-    least, most = parameter.least, parameter.most
-    values = np.geomspace(weak, max(strong, 2.0 * weak), STRENGTHS)
-    both = np.concatenate([-values[::-1], values]) if least < 0.0 else values
-    inside = both[(both >= least) & (both <= most)].tolist()
-    return inside or [most if least <= 0.0 else float(np.sqrt(least * most))]
-
-
-def _natural(composition: Composition, parameter: Parameter, record: Record) -> tuple[float, float]:
-    """Return a weak and a strong value by the unit at the end of the name."""
-    valve = composition.valve
-    name = parameter.name
-    span_m = float(np.ptp(record.position_m[record.judged])) or valve.stroke_m
-    span_pa = float(np.ptp(record.command_pa))
-    scales = {
-        "_n_per_m": (valve.spring_n_per_m, 1e3 * valve.spring_n_per_m),
-        "_pa_per_s": (0.05 * span_pa, 50.0 * span_pa),
-        "_per_s": (0.01, 10.0),
-        "_n": (0.02 * valve.coulomb_n, valve.coulomb_n),
-        "_pa": (0.02 * valve.coulomb_n / valve.diaphragm_area_m2, float(np.max(np.abs(record.command_pa)))),
-        "_m": (max(record.noise_m, 1e-3 * span_m), span_m),
-        "_s": (record.period_s, 0.1 * float(record.time_s[-1] - record.time_s[0])),
-        "": (0.01 * max(abs(parameter.least), parameter.most), 0.5 * parameter.most),
-    }
-    return next(scale for ending, scale in scales.items() if name.endswith(ending))
