@@ -54,7 +54,8 @@ class Parameter:
             theta[COULOMB] = exp(z)
             theta[STATIC] = ratio * theta[COULOMB]
         else:
-            theta[self.index] = exp(z) if self.least > 0 else self.scale * sinh(z)
+            value = exp(z) if self.least > 0 else self.scale * sinh(z)
+            theta[self.index] = min(max(value, self.least), self.most)  # at the end of the range rounding may leave it
 
     @property
     def scale(self) -> float:

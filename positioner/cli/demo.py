@@ -202,25 +202,15 @@ def _play(port: int, valve: "ValveParameters", powered_s: float) -> Outcome:
     return Outcome(steps, identified, cycle)
 
 
-def _identify(dcs: "Dcs", phase: str, alpha_pa: float, truth: "ValveParameters") -> list[Identified]:
+def _identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[Identified]:
+    from positioner.cli.parts.truth import truth
+
     def show(progress: float) -> None:
         _live(f"identifying ({phase}): {100 * progress:3.0f} %")
 
     problem = dcs.identify({"alpha": alpha_pa, "beta": BETA_PA, "omega": 1.0}, 5.0, show)
     _say(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
-    return [_held_against(dcs, phase, name, true) for name, true in _truth(truth).items()]
-
-
-def _truth(valve: "ValveParameters") -> dict[str, float]:
-    m, A = valve.mass_kg, valve.diaphragm_area_m2
-    return {
-        "a": -valve.viscous_ns_per_m / m,
-        "b": -valve.spring_n_per_m / m,
-        "c": A / m,
-        "k": -valve.coulomb_n / m,
-        "b_over_c": -valve.spring_n_per_m / A,
-        "k_over_c": -valve.coulomb_n / A,
-    }
+    return [_held_against(dcs, phase, name, true) for name, true in truth(valve).items()]
 
 
 def _held_against(dcs: "Dcs", phase: str, name: str, true: float) -> Identified:

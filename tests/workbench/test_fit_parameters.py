@@ -7,12 +7,14 @@ import pytest
 
 from config.errors import InputError
 from config.recording import Recording
-from config.valve import ValveFile, ValveParameters
+from config.valve import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
+from sim.effect import shipped_effect
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench import fit
 from workbench.free_run import FreeRun
 from workbench.measures import rms
+from workbench.parameters import free_parameters
 from workbench.record import ready
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
@@ -90,3 +92,18 @@ def test_the_servo_motors_friction_is_asymmetric() -> None:
     extended = fit(recording, valve, effects=("asymmetric_friction",), free=free, base=base)
     assert extended.rms_m < 2.0
     assert extended.rms_m < 0.4 * base.rms_m
+
+
+@pytest.mark.parametrize("name", ["rate_limit", "sensor_offset", "ip_lag"])
+def test_the_ends_of_a_range_stay_inside_it(name: str) -> None:
+    """A coordinate goes there and back by logarithms: rounding must not leave what the valve file allows."""
+    effect = shipped_effect(name, "test")
+    values = dict(zip(effect.parameters, effect.off(SEED.valve), strict=True))
+    file = ValveFile(valve=SEED.valve, effect=(EffectTable.model_validate({"name": name, **values}),))
+    composition = Composition.from_file(file)
+    for each in free_parameters(composition, [f"{name}.{key}" for key in effect.parameters]):
+        for end in (each.least, each.most):
+            theta = composition.theta.copy()
+            theta[each.index] = end
+            each.put(theta, each.coordinate(theta))
+            assert each.least <= theta[each.index] <= each.most

@@ -9,6 +9,7 @@ import numpy as np
 
 from config.valve import ValveFile
 from positioner.cli.parts.picture import STATE_COLOURS
+from positioner.cli.parts.truth import truth
 from positioner.cli.seed.findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
 from positioner.cli.seed.formulas import (
     PRINTED_10,
@@ -19,7 +20,6 @@ from positioner.cli.seed.formulas import (
     printed_filters,
     solved,
     tracks,
-    truth,
 )
 from positioner.cli.seed.scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, Course
 from positioner.control.states import State

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.valve import ValveFile, ValveParameters
+from positioner.cli.parts.truth import truth
 from positioner.cli.seed.formulas import (
     QUANTITIES,
     Tracks,
@@ -18,7 +19,6 @@ from positioner.cli.seed.formulas import (
     fir_length,
     friction,
     tracks,
-    truth,
 )
 from positioner.cli.seed.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, Course
 from positioner.control.law import balance_pa

@@ -16,6 +16,7 @@ import numpy as np
 from config.errors import InputError
 from config.loading import validated
 from config.valve import ValveFile, ValveParameters
+from positioner.cli.parts.truth import truth
 from positioner.cli.seed.scenario import (
     AMPLITUDE_PU,
     HONEST_SINE,
@@ -51,19 +52,6 @@ class Identity:
 CORRECTED = Identity()
 PRINTED_7 = Identity(of_11_12=1.0)
 PRINTED_10 = Identity(of_10=-6.0)
-
-
-def truth(valve: ValveParameters) -> dict[str, float]:
-    """Return the true a, b, c, k, b/c and k/c, SI units."""
-    m, A = valve.mass_kg, valve.diaphragm_area_m2
-    return {
-        "a": -valve.viscous_ns_per_m / m,
-        "b": -valve.spring_n_per_m / m,
-        "c": A / m,
-        "k": -valve.coulomb_n / m,
-        "b_over_c": -valve.spring_n_per_m / A,
-        "k_over_c": -valve.coulomb_n / A,
-    }
 
 
 def solved(time_s: Array, position_m: Array, pressure_pa: Array, at: Array, identity: Identity = CORRECTED) -> Array:
