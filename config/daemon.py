@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from config.device import ActionName, ModbusTcpDevice
-from config.loading import NonNegative, Positive, Schema, load
+from config.loading import Fraction, NonNegative, Positive, Schema, load
 
 
 class PositionedValve(Schema):
@@ -46,7 +46,7 @@ class Safety(Schema):
     """On a fault of the device or its bus, and when the daemon ends."""
     lost_after_cycles: Annotated[int, Field(ge=1)] = 3
     stale_after_s: Positive = 0.1
-    travel_margin: Annotated[float, Field(ge=0, le=1)] = 0.1
+    travel_margin: Fraction = 0.1
     """A position farther than this fraction of the stroke outside the stroke is implausible."""
     heartbeat_timeout_s: NonNegative = 0.0
     """Silence of the DCS that is a fault; 0 is never."""

@@ -126,6 +126,11 @@ def _overlay(each: Comparison) -> str:
         phase_shades(each.phase, judged),
         each.slips,
     )
+    return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
+
+
+def overlaid(figure: Figure, ground: str, samples: int) -> str:
+    """Return the section of an overlay; `ground` says what the shades behind it mean."""
     return section(
         "overlay",
         "Measured and simulated position",
@@ -134,8 +139,7 @@ def _overlay(each: Comparison) -> str:
             figure,
             640,
             "Above the stem position, in the middle the error (simulated less measured), below the command. "
-            "The ground shows what the measured stem is doing; white: it rests. Drag across a plot to look closer, all "
-            f"three follow; double-click to return.{thinned(each.time_s.size)}",
+            f"{ground} Drag across a plot to look closer, all three follow; double-click to return.{thinned(samples)}",
         ),
     )
 

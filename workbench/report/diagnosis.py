@@ -16,7 +16,7 @@ from workbench.experiment import Experiment
 from workbench.fitting import Fitted
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
-from workbench.report.comparison import MEANINGS, WORDS, facts, recording, thinned
+from workbench.report.comparison import MEANINGS, WORDS, facts, overlaid, recording
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
     Row,
@@ -204,18 +204,7 @@ def _overlay(seen: _Seen) -> str:
         [] if whole else [Shade("held out", HELD_OUT, seen.held_out)],
     )
     told = "All of it was held out." if whole else "On the green ground: what was held out."
-    return section(
-        "overlay",
-        "Measured and simulated position",
-        plot(
-            "plot-overlay",
-            figure,
-            640,
-            "Above the stem position, in the middle the error (simulated less measured), below the command. "
-            f"{told} Drag across a plot to look closer, all three follow; double-click to return."
-            f"{thinned(base.time_s.size)}",
-        ),
-    )
+    return overlaid(figure, told, base.time_s.size)
 
 
 def _where(seen: _Seen) -> str:
