@@ -7,6 +7,8 @@ the running integrals of the identification. It reads no clock.
 from dataclasses import dataclass, replace
 
 from config.registers import Fault, Mode, Why
+from positioner.control import breakaway
+from positioner.control.breakaway import Breakaway
 from positioner.control.excitation import Swing
 from positioner.control.law import balance_pa
 from positioner.control.reference import Reference
@@ -18,6 +20,7 @@ from positioner.control.supervision import Watch, supervise, usable
 from positioner.estimation.applied import Applied, accept
 from positioner.estimation.estimate import Estimates
 from positioner.estimation.identification import Identification
+from positioner.estimation.refiner import Refiner
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,8 @@ class Memory:
     state: State
     running: Running | None
     identifying: bool
+    breakaway: Breakaway | None
+    """Of the law for small moves; None: the seed's law."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +78,9 @@ class Decision:
 class Controller:
     """The control core with its memory. `held_pa` is the command the device has at the start: it is held."""
 
-    def __init__(self, settings: Settings, held_pa: float) -> None:
+    def __init__(self, settings: Settings, held_pa: float, refiner: Refiner | None = None) -> None:
         self._settings = settings
-        self._identification = Identification(settings.identification)
+        self._identification = Identification(settings.identification, refiner)
         self._memory = Memory(
             command_pa=held_pa,
             held_pa=held_pa,
@@ -86,6 +91,7 @@ class Controller:
             state=State.S0_START,
             running=None,
             identifying=False,
+            breakaway=breakaway.at_start(settings.breakaway) if settings.breakaway else None,
         )
 
     @property
@@ -116,18 +122,21 @@ def step(
     )
     state = state_in(situation)
     held_pa = _held_pa(memory, state, watch, sample)
+    small = _small_moves(memory, state, reference, sample, settings, applied, identification.estimates)
 
     if watch.fault is not Fault.NONE:
         wanted_pa = settings.safe_pa(settings.limits.action_on(watch.fault), held_pa)
     elif watch.mode is Mode.MANUAL and requests.manual_writes != spent.manual_writes:
         wanted_pa = requests.manual_pa
     else:
-        wanted_pa = _pressure_pa(state, held_pa, running, sample.now_s, reference, applied)
+        wanted_pa = _pressure_pa(state, held_pa, running, sample.now_s, reference, applied, small)
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
 
     why = refusal if refusal is not Why.NOTHING else why_not_the_law(situation)
     if why is Why.NOTHING and command_pa != wanted_pa:
         why = Why.LAW_BEYOND_LIMITS
+    if why is Why.NOTHING and small is not None:
+        why = small.why
     decision = Decision(
         command_pa=command_pa,
         state=state,
@@ -140,7 +149,7 @@ def step(
         estimates=identification.estimates,
         applied=applied,
     )
-    return Memory(command_pa, held_pa, watch, reference, applied, spent, state, running, identifying), decision
+    return Memory(command_pa, held_pa, watch, reference, applied, spent, state, running, identifying, small), decision
 
 
 def _spent(memory: Memory, mode: Mode, requests: Requests) -> Spent:
@@ -217,26 +226,65 @@ def _identify(
         return False, accept(memory.applied, identification.estimates) if memory.identifying else memory.applied
     if not memory.identifying or (running is not None and memory.running is None):
         identification.restart()
+    moves = identification.moves
     if usable(sample, settings.limits):
         identification.update(
-            sample.time_s, sample.position_m, sample.pressure_pa, parameters=parameters, friction=friction
+            sample.time_s,
+            sample.position_m,
+            sample.pressure_pa,
+            parameters=parameters,
+            friction=friction,
+            passive=requests.eta[0] == 1,
         )
-    return True, memory.applied
+    # No excitation ends, so what ordinary moves tell is applied move by move.
+    told = identification.moves != moves
+    return True, accept(memory.applied, identification.estimates) if told else memory.applied
 
 
 def _held_pa(memory: Memory, state: State, watch: Watch, sample: Sample) -> float:
-    """Return what to hold: the last command; over S3 the one before it; after a fault what a device came back with."""
+    """Return what to hold: the last command, for a push what follows it; over S3 the one before it.
+
+    After a fault what a device came back with.
+    """
     if sample.held_pa is not None and watch.fault is not Fault.NONE:
         return sample.held_pa
-    return memory.held_pa if State.S3_IDENTIFY in (memory.state, state) else memory.command_pa
+    if State.S3_IDENTIFY in (memory.state, state):
+        return memory.held_pa
+    return memory.command_pa if memory.breakaway is None else memory.breakaway.held_pa(memory.command_pa)
+
+
+def _small_moves(
+    memory: Memory,
+    state: State,
+    reference: Reference,
+    sample: Sample,
+    settings: Settings,
+    applied: Applied,
+    estimates: Estimates,
+) -> Breakaway | None:
+    """Return what the law for small moves remembers after this step, if it is the law."""
+    if memory.breakaway is None or settings.breakaway is None:
+        return None
+    seen = breakaway.Seen(sample.now_s, sample.position_m, sample.pressure_pa, usable(sample, settings.limits))
+    if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
+        return breakaway.step(memory.breakaway, seen, reference.value_m, applied.ratios, estimates, settings.breakaway)
+    return breakaway.watch(memory.breakaway, seen, memory.command_pa)
 
 
 def _pressure_pa(
-    state: State, held_pa: float, running: Running | None, now_s: float, reference: Reference, applied: Applied
+    state: State,
+    held_pa: float,
+    running: Running | None,
+    now_s: float,
+    reference: Reference,
+    applied: Applied,
+    small: Breakaway | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
     if state is State.S3_IDENTIFY and running is not None:
         return running.swing.pressure_pa(now_s - running.start_s)
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
+        if small is not None:
+            return small.level_pa
         return balance_pa(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
     return held_pa

@@ -30,3 +30,5 @@ class Requests:
     manual_writes: int = 0
     acknowledgements: int = 0
     heartbeats: int = 0
+    baseline_writes: int = 0
+    health_resets: int = 0

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from config.daemon import DaemonFile, Law
 from config.device import ActionName
+from positioner.control.breakaway import BreakawaySettings
 from positioner.control.supervision import Limits
 from positioner.estimation.applied import Applied, Ratios
 from positioner.estimation.identification import IdentificationSettings
@@ -21,6 +22,8 @@ class Settings:
     identification: IdentificationSettings
     applied: Applied
     """What the law may use before anything was identified."""
+    breakaway: BreakawaySettings | None
+    """Of the law for small moves; None: the seed's law."""
 
     @classmethod
     def of(cls, file: DaemonFile) -> "Settings":
@@ -46,16 +49,29 @@ class Settings:
                 pressure_pa=file.pressure.maximum_pa - file.pressure.minimum_pa,
                 noise_std_m=identification.noise_std_m,
                 pressure_noise_std_pa=identification.pressure_noise_std_pa,
+                pressure_held=identification.pressure_held,
                 window_s=identification.window_s,
                 minimum_window_s=identification.minimum_window_s,
                 derivative_window_s=identification.derivative_window_s,
             ),
             applied=Applied(_ratios(file.law) if file.law else None),
+            breakaway=_breakaway(file) if file.control.law == "breakaway" else None,
         )
 
     def safe_pa(self, action: ActionName, held_pa: float) -> float:
         """Return the pressure of a safe action: hold what is held, vent to the minimum, or fill to the maximum."""
         return {"hold": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa}[action]
+
+
+def _breakaway(file: DaemonFile) -> BreakawaySettings:
+    return BreakawaySettings(
+        stroke_m=file.valve.stroke_m,
+        dead_band_m=file.control.dead_band * file.valve.stroke_m,
+        minimum_pa=file.pressure.minimum_pa,
+        maximum_pa=file.pressure.maximum_pa,
+        breakaway_pa=file.valve.breakaway_pa,
+        push_limit_pa=file.control.push_limit_pa,
+    )
 
 
 def _ratios(law: Law) -> Ratios:

@@ -12,9 +12,11 @@ from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
+from positioner.daemon.health import Health, HealthSettings
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.snapshot import Snapshot
+from positioner.estimation.refiner import InPlace
 
 Script = Callable[[Snapshot, Requests], Requests]
 """A DCS: what it asks for after a snapshot, given what it asked for before."""
@@ -25,7 +27,9 @@ def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests) -> Cycl
     pace = DevicePace()
     link = Link(MemoryDriver(device), pace)
     held_pa, _ = link.open()
-    return Cycle(link, Controller(Settings.of(daemon), held_pa), pace, requests, recorder=None)
+    health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
+    controller = Controller(Settings.of(daemon), held_pa, InPlace())
+    return Cycle(link, controller, pace, requests, recorder=None, health=health)
 
 
 def played(cycle: Cycle, script: Script, until_s: float) -> Iterator[Snapshot]:

@@ -1,0 +1,259 @@
+"""Small moves: the seed's law and the law for small moves on the same random steps of the seed's valve, in one run.
+
+    python -m benchmarks.small_moves [--steps 400] [--rest-s 600] [--seed 0]
+
+Each row is a valve of its own: first the daemon's S3 identifies it under the row's noise, and nothing else is told to
+the controller; then come the steps, their sizes from 0.1 to 10 % of stroke, evenly in the logarithm (evenly in size
+for the second row), 0.5 s each, in a loop of 1 ms with one cycle of delay. All figures are of the true stem, in % of
+stroke: what the error is at the end of the step, and how far the stem was beyond the reference on the way. The last
+table leaves each loop alone at a fixed reference. Takes some minutes. The last column of the first is the processor
+time of one step of the control core, on average.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import inf, log
+from typing import Literal
+
+import numpy as np
+
+from config.daemon import DaemonFile
+from config.registers import Mode
+from config.slave import SlaveFile
+from config.valve import ValveFile, load_valve, shipped_valve
+from drivers.memory import MemoryDriver
+from positioner.control.controller import Controller, Decision
+from positioner.control.pulse import Pulse, unknown
+from positioner.control.requests import QUIET, Requests
+from positioner.control.sample import Sample
+from positioner.control.settings import Settings
+from positioner.daemon.cycle import Cycle
+from positioner.daemon.link import Link
+from positioner.daemon.pacing import DevicePace
+from sim.slave.device import Device
+from sim.valve import Valve
+
+SEED = load_valve(shipped_valve("seed")).valve
+STROKE_M = SEED.stroke_m
+STEP_S, S3_S = 0.5, 1.0
+LOWEST, HIGHEST = 0.4, 0.9
+"""Of the stroke: below, a spring without preload does not bring this valve down against its friction."""
+SMALLEST, LARGEST = 1e-3, 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A row: noise, effects that the law does not know, period of the loop, how the sizes are drawn."""
+
+    name: str
+    noise_pu: float = 1e-4
+    effects: tuple[dict[str, object], ...] = ()
+    period_s: float = 1e-3
+    even_in_size: bool = False
+
+
+CASES = (
+    Case("noise 1e-4 p.u."),
+    Case("1e-4, even in size", even_in_size=True),
+    Case("noise 1e-3 p.u.", 1e-3),
+    Case("1e-4, I/P lag 50 ms", effects=({"name": "ip_lag", "time_constant_s": 0.05},)),
+    Case("1e-4, backlash 0.3 %", effects=({"name": "backlash", "width_m": 3e-3 * STROKE_M},)),
+    Case("1e-4, packing asymmetry 15 %", effects=({"name": "asymmetric_friction", "asymmetry": 0.15},)),
+    Case("1e-4, loop of 5 ms", period_s=5e-3),
+)
+Law = Literal["seed", "breakaway"]
+LAWS: tuple[Law, ...] = ("seed", "breakaway")
+
+
+class Late:
+    """A device whose command comes into force one period late, as it does in real time."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._command_pa = device.command_pa
+        self._note()
+
+    def _note(self) -> None:
+        device = self._device
+        self.position_m, self.pressure_pa, self.command_pa = device.position_m, device.pressure_pa, self._command_pa
+
+    @property
+    def sample_counter(self) -> int:
+        return self._device.sample_counter
+
+    @property
+    def device_time_us(self) -> int:
+        return self._device.device_time_us
+
+    @property
+    def status(self) -> int:
+        return int(self._device.status)
+
+    def tick(self, command_pa: float) -> None:
+        self._device.check(command_pa)
+        self._device.tick(self._command_pa)
+        self._command_pa = command_pa
+        self._note()
+
+
+class Timed(Controller):
+    """The controller, and the processor time that its steps have taken."""
+
+    steps = busy_ns = 0
+
+    def step(self, sample: Sample, requests: Requests) -> Decision:
+        began_ns = time.thread_time_ns()
+        decision = super().step(sample, requests)
+        self.busy_ns += time.thread_time_ns() - began_ns
+        self.steps += 1
+        return decision
+
+
+class Loop:
+    """A valve, its device and the daemon's cycle, in virtual time; identified when it is made."""
+
+    def __init__(self, law: Law, case: "Case", seed: int) -> None:
+        self._period_s = case.period_s
+        daemon = {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}, "control": {"law": law}}
+        slave = {
+            "clock": {"mode": "lockstep", "period_s": case.period_s},
+            "sensor": {"noise_std_m": case.noise_pu * STROKE_M, "seed": seed},
+        }
+        self.valve = Valve.from_file(ValveFile.model_validate({"valve": SEED.model_dump(), "effect": case.effects}))
+        self.valve.rest_at(0.0, 0.0)
+        device = Device(self.valve, SlaveFile.model_validate(slave), {})
+        # Alpha above break-away, beta a third of the travel: the seed's own numbers.
+        first = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44126.0, beta_pa=13238.0)
+        pace = DevicePace()
+        link = Link(MemoryDriver(Late(device)), pace)
+        held_pa, _ = link.open()
+        self.controller = Timed(Settings.of(DaemonFile.model_validate(daemon)), held_pa)
+        self.cycle = Cycle(link, self.controller, pace, first, recorder=None)
+        self._ask(eta=(0, 0, 0))
+        self.path(S3_S)
+        self._ask(eta=QUIET)
+        self.path(case.period_s)
+        self.controller.steps = self.controller.busy_ns = 0
+
+    def _ask(self, **values: object) -> None:
+        self.cycle.requests = replace(self.cycle.requests, **values)  # type: ignore[arg-type]
+
+    def step_to(self, reference_m: float) -> None:
+        self._ask(reference_m=reference_m, reference_writes=self.cycle.requests.reference_writes + 1)
+
+    def path(self, duration_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Run; return the true stem's position, m, and the command, Pa, at every cycle."""
+        rows = []
+        for _ in range(round(duration_s / self._period_s)):
+            self.cycle.once()
+            rows.append((self.valve.position_m, self.cycle.snapshot.decision.command_pa))
+        position_m, command_pa = np.array(rows).T
+        return position_m, command_pa
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Of each step, of the stroke: error at the end, and the farthest beyond the reference."""
+
+    error: np.ndarray
+    overshoot: np.ndarray
+
+    @property
+    def said(self) -> str:
+        e = np.abs(self.error)
+        shares = "".join(f"{100 * np.mean(e <= limit):9.1f}" for limit in (1e-3, 2.5e-3))
+        figures = (np.sqrt(np.mean(e**2)), np.percentile(e, 95), e.max(), np.percentile(self.overshoot, 95))
+        return "".join(f"{100 * f:9.3f}" for f in figures) + f"{100 * self.overshoot.max():9.3f}" + shares
+
+
+HEAD = "".join(f"{name:>9}" for name in ("rms", "95 %", "worst", "ov. 95 %", "ov. max", "<= 0.1", "<= 0.25", "us/step"))
+
+
+def references(steps: int, seed: int, *, even_in_size: bool = False) -> Iterator[tuple[float, int]]:
+    """Yield references, m, and the direction of the step to each."""
+    rng = np.random.default_rng(seed)
+    at = 0.6
+    for _ in range(steps):
+        low, high = (SMALLEST, LARGEST) if even_in_size else np.log((SMALLEST, LARGEST))
+        drawn = rng.uniform(low, high)
+        size = drawn if even_in_size else np.exp(drawn)
+        direction = int(rng.choice((-1, 1)))
+        if not LOWEST <= at + direction * size <= HIGHEST:
+            direction = -direction
+        at += direction * size
+        yield at * STROKE_M, direction
+
+
+def stepped(loop: Loop, steps: Iterator[tuple[float, int]]) -> Outcome:
+    """Let a loop make the steps."""
+    loop.step_to(0.6 * STROKE_M)
+    loop.path(1.0)
+    errors, overshoots = [], []
+    for reference_m, direction in steps:
+        loop.step_to(reference_m)
+        position_m, _ = loop.path(STEP_S)
+        errors.append((position_m[-1] - reference_m) / STROKE_M)
+        overshoots.append(max(0.0, float((direction * (position_m - reference_m)).max())) / STROKE_M)
+    return Outcome(np.array(errors), np.array(overshoots))
+
+
+def rested(loop: Loop, rest_s: float) -> str:
+    """Say what a loop does that is left alone after a small step, the first two seconds apart."""
+    loop.step_to(0.6 * STROKE_M)
+    loop.path(2.0)
+    loop.step_to(0.603 * STROKE_M)
+    loop.path(2.0)
+    position_m, command_pa = loop.path(rest_s)
+    error = 100 * abs(position_m[-1] / STROKE_M - 0.603)
+    return f"{int(np.count_nonzero(np.diff(command_pa))):10}{100 * np.ptp(position_m) / STROKE_M:12.4f}{error:12.4f}"
+
+
+def shortest_lines() -> Iterator[str]:
+    """Yield what the shortest pulse does, by the true parameters: no law with this loop can make a smaller move."""
+    omega = (SEED.spring_n_per_m / SEED.mass_kg) ** 0.5
+    zeta = SEED.viscous_ns_per_m / (2 * SEED.mass_kg * omega)
+    known = replace(unknown(0.0), theta=(log(omega), log(zeta), 0.0, 0.0))
+    push_m = (SEED.static_n - SEED.coulomb_n) / SEED.spring_n_per_m
+    middle_m = -SEED.coulomb_n / SEED.spring_n_per_m
+    yield "shortest pulse, % of stroke: push of one period just above F_s, and 10 % of F_s - F_c more; then braked"
+    for period_s in (5e-4, 1e-3, 2e-3, 5e-3, 1e-2):
+        ends = (known.end(Pulse(f * push_m, middle_m, period_s, 1), inf).travel_m for f in (1.0, 1.1))
+        yield f"{1e3 * period_s:7g} ms" + "".join(f"{100 * end_m / STROKE_M:9.3f}" for end_m in ends)
+
+
+def report(steps: int = 400, rest_s: float = 600.0, seed: int = 0) -> Iterator[str]:
+    """Yield lines: the shortest pulses, the table of steps, the table of rests."""
+    yield from shortest_lines()
+    yield ""
+    yield f"{steps} steps, % of stroke; ov.: overshoot; then the share of steps that end so near, %"
+    yield f"{'':34}{'law':>10}{HEAD}"
+    for case in CASES:
+        for law in LAWS:
+            loop = Loop(law, case, seed)
+            outcome = stepped(loop, references(steps, seed + 1, even_in_size=case.even_in_size))
+            step_us = loop.controller.busy_ns / loop.controller.steps / 1e3
+            yield f"{case.name:34}{law:>10}{outcome.said}{step_us:9.1f}"
+    yield ""
+    yield f"left alone for {rest_s:g} s: changes of the command, travel of the stem, error, % of stroke"
+    for case in CASES:
+        if not case.even_in_size:
+            yield f"{case.name:34}{'breakaway':>10}{rested(Loop('breakaway', case, seed), rest_s)}"
+
+
+def main() -> None:
+    """Print the report."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--steps", type=int, default=400)
+    parser.add_argument("--rest-s", type=float, default=600.0)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    started_s = time.monotonic()
+    for line in report(arguments.steps, arguments.rest_s, arguments.seed):
+        print(line, flush=True)
+    print(f"{time.monotonic() - started_s:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
