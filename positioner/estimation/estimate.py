@@ -1,6 +1,6 @@
 """What the identification hands on: each value with its standard deviation, and valid or why not."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from math import nan
 
@@ -27,6 +27,8 @@ class Reason(IntEnum):
     K_OVER_C_NOT_NEGATIVE = 16
     IMPLAUSIBLE_CHANGE = 17
     COMMANDS_MISSED = 18
+    MASS_NOT_IDENTIFIABLE = 19
+    MODEL_DOES_NOT_FIT = 20
 
     @property
     def text(self) -> str:
@@ -54,6 +56,11 @@ _TEXTS = {
     Reason.K_OVER_C_NOT_NEGATIVE: "k/c did not come out negative: friction would drive the stem",
     Reason.IMPLAUSIBLE_CHANGE: "the value is too far from the one in use",
     Reason.COMMANDS_MISSED: "commands were missed in a gap of the samples: a, b and c singly hang on each of them",
+    Reason.MASS_NOT_IDENTIFIABLE: (
+        "the motion does not tell the mass: pressure changes, or samples follow, too slowly; "
+        "only b/c and k/c can be known"
+    ),
+    Reason.MODEL_DOES_NOT_FIT: "the motion is not that of the model: the residuals outweigh the sensor's noise",
 }
 
 
@@ -104,6 +111,14 @@ class Estimates:
     def law_ready(self) -> bool:
         """Whether both numbers of the control law are valid."""
         return self.b_over_c.valid and self.k_over_c.valid
+
+    def only(self, *, parameters: bool, friction: bool) -> "Estimates":
+        """Return what was asked for: a, b, c and b/c; k and k/c."""
+        unasked = none(Reason.NOT_ASKED)
+        kept = self
+        if not parameters:
+            kept = replace(kept, a=unasked, b=unasked, c=unasked, b_over_c=unasked)
+        return kept if friction else replace(kept, k=unasked, k_over_c=unasked)
 
     @property
     def acceptable(self) -> bool:

@@ -4,10 +4,17 @@ A record of the last N samples, one derivative window, goes ahead of the identif
 the record at its old end. So when motion is seen, its beginning is still to come and time zero is put exactly there;
 when the stem is found to have stopped, the samples of the standstill that were taken for motion are dropped unused.
 The estimates are one derivative window old for that, and say so by `time_s`.
+
+With a `Refiner`, the samples since the restart go out to be fitted by maximum likelihood when the window is complete,
+and the progress stays short of 1 until the result is back: it replaces the algebraic one if it is acceptable. With
+eta_1 = 1 (`passive`), no excitation will fill a window: each ordinary move goes out when the stem has come to rest,
+with what the moves before it told as the prior (`moves`).
 """
 
 from dataclasses import dataclass, replace
 from math import isfinite, nan
+
+import numpy as np
 
 from positioner.estimation.derivatives import Derivatives
 from positioner.estimation.estimate import Estimate, Estimates, Reason, no_estimates, none
@@ -15,11 +22,23 @@ from positioner.estimation.friction import RunningMeans
 from positioner.estimation.identifier import Identifier, Solution
 from positioner.estimation.judgement import Judge
 from positioner.estimation.motion import Motion, beginning
+from positioner.estimation.moves import Known, absorbed
 from positioner.estimation.noise import PositionNoise
 from positioner.estimation.record import Record
+from positioner.estimation.recorded import Recorded, RecordSettings
+from positioner.estimation.refiner import Job, Refiner
 
 READINGS = 40
 """Times per window at which (13) is solved."""
+ALMOST = 0.99
+"""Progress while the refinement is awaited."""
+PATIENCE_S = 2.0
+"""Time after which a refinement is no longer awaited."""
+MOST_KEPT = 200_000
+"""Samples kept for a refinement: a window at the seed's 10 us twice over."""
+MOVE_REST_S = 0.2
+"""Of the rest before a move, that goes out with it; and the longest time a move takes, below."""
+MOVE_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +87,18 @@ class Identification:
         estimates: what is known by now.
         velocity_m_per_s, acceleration_m_per_s2: (19), (21) at the latest sample; NaN until the filters are full.
         direction: of the motion seen, +1 up, -1 down, 0 none.
+        moves: ordinary moves that gave acceptable estimates, by passive identification.
     """
 
-    def __init__(self, settings: IdentificationSettings) -> None:
+    def __init__(self, settings: IdentificationSettings, refiner: Refiner | None = None) -> None:
         self._settings = settings
+        self._refiner = refiner
+        self._kept: list[tuple[float, float, float]] = []
+        self._awaited_since_s: float | None = None
+        self._known: Known | None = None
+        self._passive = False
+        self.moves = 0
+        self._rest_in: int | None = None  # samples until a move's rest is long enough
         self._identifier = Identifier(
             settings.window_s, settings.stroke_m, settings.pressure_pa, pressure_held=settings.pressure_held
         )
@@ -97,10 +124,19 @@ class Identification:
         self._clear_record()
         self._noise.restart()
         self._restart_window()
+        self._kept.clear()
+        self._awaited_since_s = self._rest_in = None
         self.estimates = no_estimates(Reason.WAITING_FOR_MOTION)
 
     def update(
-        self, time_s: float, position_m: float, pressure_pa: float, *, parameters: bool, friction: bool
+        self,
+        time_s: float,
+        position_m: float,
+        pressure_pa: float,
+        *,
+        parameters: bool,
+        friction: bool,
+        passive: bool = False,
     ) -> Estimates:
         """Take a fresh sample.
 
@@ -113,15 +149,20 @@ class Identification:
             pressure_pa: actuator pressure.
             parameters: whether to identify a, b, c.
             friction: whether to estimate k, from a, b, c of this identification or of the last one.
+            passive: whether the stem moves as the DCS asks, without excitation.
         """
         if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
             return self.estimates
         if (parameters, friction) != self._asked:
             self._ask(parameters, friction)
+        self._passive = passive and self._refiner is not None
         self._take(time_s, position_m, pressure_pa)
+        if self._refiner is not None:
+            self._refine(self._refiner, time_s, position_m, pressure_pa)
         if self._record.full:
             self._watch()
-            if self._motion.direction and self._age >= 0 and any(self._asked) and not self._complete:
+            wanted = any(self._asked) and not self._complete and not self._passive
+            if wanted and self._motion.direction and self._age >= 0:
                 self._collect()
         return self.estimates
 
@@ -129,6 +170,56 @@ class Identification:
     def _noise_std_m(self) -> float:
         known = self._settings.noise_std_m
         return self._noise.std_m if known is None else known
+
+    def _refine(self, refiner: Refiner, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Keep the sample, hand out what is complete, take what comes back."""
+        kept = self._kept
+        if kept and time_s <= kept[-1][0]:
+            kept.clear()
+        kept.append((time_s, position_m, pressure_pa))
+        if len(kept) > MOST_KEPT or (self._passive and time_s - kept[0][0] > 2 * MOVE_S):
+            del kept[: len(kept) // 2]
+        if self._rest_in is not None:
+            self._rest_in -= 1
+            if self._rest_in <= 0:
+                self._rest_in = None
+                self._hand_out(refiner, time_s)
+        result = refiner.collect()
+        if result is not None:
+            self._take_refined(result, time_s)
+        elif self._awaited_since_s is not None and (not refiner.pending or time_s - self._awaited_since_s > PATIENCE_S):
+            self._awaited_since_s = None
+            self.estimates = replace(self.estimates, progress=1.0)
+
+    def _hand_out(self, refiner: Refiner, time_s: float) -> None:
+        """Let what was kept be fitted."""
+        settings = self._settings
+        columns = np.array(self._kept).T
+        asked = RecordSettings(
+            noise_std_m=settings.noise_std_m,
+            pressure_noise_std_pa=settings.pressure_noise_std_pa,
+            pressure_held=settings.pressure_held,
+            moving_threshold_m_per_s=settings.moving_threshold_m_per_s,
+            largest_relative_std=settings.largest_relative_std,
+        )
+        prior = self._known.prior(time_s) if self._passive and self._known is not None else None
+        if refiner.submit(Job(columns[0], columns[1], columns[2], asked, prior)) and not self._passive:
+            self._awaited_since_s = time_s
+        if self._passive:
+            self._kept = [each for each in self._kept if each[0] > time_s - MOVE_REST_S]
+
+    def _take_refined(self, result: Recorded, time_s: float) -> None:
+        self._awaited_since_s = None
+        fits = result.fit is not None and result.estimates.b_over_c.reason is not Reason.MODEL_DOES_NOT_FIT
+        if result.fit is not None and fits:
+            self._known = absorbed(self._known if self._passive else None, result.fit, time_s)
+        parameters, friction = self._asked
+        refined = result.estimates.only(parameters=parameters, friction=friction)
+        if refined.acceptable:
+            self.estimates = refined
+            self.moves += self._passive
+        elif not self._passive:
+            self.estimates = replace(self.estimates, progress=1.0)
 
     def _ask(self, parameters: bool, friction: bool) -> None:
         self._asked = (parameters, friction)
@@ -144,6 +235,7 @@ class Identification:
         """Append a sample to the record, or begin a new one with it."""
         record = self._record
         if record.breaks(time_s):
+            self._kept.clear()
             self._clear_record()
             self._interrupt(Reason.RECORD_BROKEN)
         record.append(time_s, position_m, pressure_pa)
@@ -174,6 +266,8 @@ class Identification:
             return
         if before:
             self._interrupt(Reason.MOTION_ENDED)
+            if self._passive and any(self._asked):
+                self._rest_in = record.length
         if direction:
             self._age = -beginning(position_m, direction, noise_m)
 
@@ -200,6 +294,10 @@ class Identification:
         if self._elapsed_s >= self._next_reading_s or self._complete:
             self._next_reading_s += settings.window_s / READINGS
             self._publish(self._read(time_s))
+        if self._complete and self._refiner is not None and not self._passive:
+            self._hand_out(self._refiner, float(self._record.time_s[-1]))
+            if self._awaited_since_s is not None:
+                self.estimates = replace(self.estimates, progress=ALMOST)
 
     def _read(self, time_s: float) -> Estimates:
         """Return what the window says so far."""

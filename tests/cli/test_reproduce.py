@@ -9,7 +9,7 @@ import pytest
 
 from config.valve import load_valve, shipped_valve
 from positioner.cli.main import main
-from positioner.cli.seed import scenario
+from positioner.cli.seed import scenario, table
 from positioner.cli.seed.findings import CLAIMS, Findings, findings
 from positioner.cli.seed.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
 from positioner.cli.seed.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
@@ -143,13 +143,14 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
 ) -> None:
     """At a tenth of the seed's sample rate its trapezoidal solve misses a, b, c by 2 %, and the command says so."""
     monkeypatch.setattr(scenario, "SEED_PERIOD_S", PERIOD_S)
-    words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json")]
+    monkeypatch.setattr(table, "PERIODS_S", (1e-3,))
+    words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json"), "--seeds", "3"]
     assert main(words) == 1
     assert "DOES NOT HOLD: claim a, noise none: 0.019, limit 0.01" in capsys.readouterr().out
     names = {f"seed-{name}.png" for name in ("fig3", "fig4", "fig5", "fig6", "fig7", "derivatives")}
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == names
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == names | {"noise-table.txt"}
     numbers = json.loads((tmp_path / "numbers.json").read_text())
-    assert {"errata", "printed_static_friction_refused", "cases", "seconds"} == set(numbers)
+    assert {"errata", "printed_static_friction_refused", "cases", "noise_table", "seconds"} == set(numbers)
     assert {"where", "quantity", "unit", "printed", "corrected", "true"} == set(numbers["errata"][0])
     said = [(case["noise"], case["period_s"]) for case in numbers["cases"]]
     assert said == [(noise.name, PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE.name, 1e-3)]
@@ -158,6 +159,23 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
         assert {"noise", "solved", "k", "k_over_c", "kept", "identified", "steps"} < set(case)
         assert all(math.isfinite(claim["figure"]) for claim in case["claims"])
         assert all((one["value"] is None) == (one["error"] is None) for one in case["identified"])
+
+
+def test_the_noise_table_sets_ours_at_the_bound_and_the_seeds_far_off() -> None:
+    """40 runs scatter a standard deviation by 11 %: 1.2 times the bound, and three times that scatter."""
+    found = table.cell(FILE, table.motion(FILE, 1e-3), 1e-3, 1e-4, 40)
+    for at, std, bias, covered in zip(found.bound, found.std, found.bias, found.covered, strict=True):
+        assert 0.7 * at < std < 1.2 * 1.33 * at
+        assert abs(bias) < 0.5 * at
+        assert 0.5 < covered < 0.87
+    assert found.valid == (1.0,) * 6
+    assert found.bound[0] == pytest.approx(1.2e-3, rel=0.02)
+    assert all(abs(bias or 1) > 0.1 for bias in found.seed_bias[:3])
+
+
+def test_a_single_seed_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", "--seeds", "1"]) == 2
+    assert "--seeds: must be at least 2" in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,109 @@
+"""`positioner estimate`: identification from a recording, by the daemon's own estimators."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from config.recording import Recording
+    from positioner.estimation.recorded import Recorded, RecordSettings
+
+HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
+EXAMPLE = "positioner estimate rec.csv --json estimated.json"
+
+UNITS = {"a": "1/s", "b": "1/s^2", "c": "m/(Pa s^2)", "k": "m/s^2", "b_over_c": "Pa/m", "k_over_c": "Pa"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("recording", type=Path, metavar="REC", help="a recording, CSV or Parquet")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
+    parser.add_argument(
+        "--noise-m", type=float, metavar="M", help="standard deviation of the position's noise (else measured)"
+    )
+    parser.add_argument(
+        "--pressure", choices=("held", "linear"), help="how the pressure goes between the samples (else the likelier)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Estimate and print; 0 if the ratios that the law needs are valid, else 1."""
+    import json
+
+    from config.errors import InputError
+    from config.recording import Recording
+    from positioner.estimation.recorded import identify
+
+    if arguments.noise_m is not None and not arguments.noise_m > 0:
+        raise InputError("--noise-m", f"must be positive, it is {arguments.noise_m:g}")
+    recording = Recording.read(arguments.recording)
+    pressure_pa, settings = _pressure(recording, arguments)
+    found = identify(recording.time_s, recording.position_m, pressure_pa, settings)
+    print("\n".join(_lines(arguments.recording, found, len(recording))))
+    if arguments.json is not None:
+        try:
+            arguments.json.write_text(json.dumps(as_json(found), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--json {arguments.json}", f"cannot be written: {error.strerror}") from None
+    return 0 if found.estimates.law_ready else 1
+
+
+def _pressure(recording: "Recording", arguments: argparse.Namespace) -> tuple[Any, "RecordSettings"]:
+    """Return the measured pressure, or else the command: a row's is in force until the next row."""
+    import numpy as np
+
+    from positioner.estimation.recorded import RecordSettings
+
+    measured = recording.columns.get("pressure_pa")
+    held = None if arguments.pressure is None else arguments.pressure == "held"
+    if measured is not None and np.isfinite(measured).mean() > 0.5:
+        return measured, RecordSettings(noise_std_m=arguments.noise_m, pressure_held=held)
+    command = recording.command_pa
+    ahead = np.append(command[:1], command[:-1])
+    return ahead, RecordSettings(noise_std_m=arguments.noise_m, pressure_held=True if held is None else held)
+
+
+def _lines(path: Path, found: "Recorded", samples: int) -> list[str]:
+    lines = [f"{path}: {samples} samples, {found.stretches} motions fitted, {found.left_out} left out"]
+    lines.append(f"  noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples")
+    lines.append(f"  {'':10}{'value':>14}{'std':>12}  {'unit':12}")
+    for name, unit in UNITS.items():
+        each = getattr(found.estimates, name)
+        said = "" if each.valid else f"refused: {each.reason.text}"
+        lines.append(f"  {name:10}{each.value:14.6g}{each.std:12.3g}  {unit:12}{said}".rstrip())
+    each = found.breakaway
+    lines.append(f"  {'F_s/A':10}{each.value:14.6g}{each.std:12.3g}  {'Pa':12}{'' if each.valid else each.reason.text}")
+    if found.fit is not None:
+        lines.append(
+            f"  residuals {found.fit.residual_std_m:.3g} m; condition of the information {found.condition:.3g}"
+        )
+    return [line.rstrip() for line in lines]
+
+
+def as_json(found: "Recorded") -> dict[str, object]:
+    """Return the numbers: per name value, std, valid and reason; null where there is none."""
+    numbers: dict[str, object] = {name: _one(getattr(found.estimates, name)) for name in UNITS}
+    return numbers | {
+        "breakaway_pa": _one(found.breakaway),
+        "noise_std_m": found.noise_std_m,
+        "residual_std_m": found.fit.residual_std_m if found.fit is not None else None,
+        "condition": _finite(found.condition),
+        "pressure": found.pressure,
+        "motions": found.stretches,
+        "left_out": found.left_out,
+    }
+
+
+def _one(each: Any) -> dict[str, object]:
+    return {
+        "value": _finite(each.value),
+        "std": _finite(each.std),
+        "valid": each.valid,
+        "reason": "" if each.valid else each.reason.text,
+    }
+
+
+def _finite(value: float) -> float | None:
+    from math import isfinite
+
+    return value if isfinite(value) else None

@@ -1,0 +1,28 @@
+"""A stretch of motion of one direction, with the rest that it began from: what a fit takes."""
+
+from dataclasses import dataclass
+
+from positioner.estimation.identifier import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Samples of one motion, SI units, N of each.
+
+    Attributes:
+        direction: +1 up, -1 down.
+        time_s: increasing.
+        position_m: measured.
+        pressure_pa: held: of the interval before each sample; else at each sample.
+        begins: the sample after which the stem seems to have begun to move; 0: it moved already.
+        earliest: the first sample after which it may have begun; from it to `begins` the stem rests or has hardly left.
+        rests_from: the first sample of that rest.
+    """
+
+    direction: int
+    time_s: Array
+    position_m: Array
+    pressure_pa: Array
+    begins: int
+    earliest: int
+    rests_from: int
