@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
+from config.slave import SlaveFile
 from sim.slave.device import Device
 
 log = logging.getLogger(__name__)
@@ -32,6 +33,10 @@ class Clock(Protocol):
         """
         ...
 
+    def idle(self) -> None:
+        """Let the device pass by a command that is not for it: it goes on with its own."""
+        ...
+
 
 class Lockstep:
     """One period per command."""
@@ -45,6 +50,10 @@ class Lockstep:
     def command(self, command_pa: float) -> None:
         """Let one period pass under a command."""
         self._device.tick(command_pa)
+
+    def idle(self) -> None:
+        """Let one period pass under the command in force."""
+        self._device.tick(self._device.command_pa)
 
 
 class RealTime:
@@ -77,3 +86,12 @@ class RealTime:
         """Latch a command at the sample now due; it drives the valve from there on."""
         self.catch_up()
         self._device.command(command_pa)
+
+    def idle(self) -> None:
+        """Let the periods pass that are due; the silence goes on."""
+        self.catch_up()
+
+
+def clock_of(file: SlaveFile, device: Device) -> Clock:
+    """Return the clock that a slave file asks for."""
+    return Lockstep(device) if file.clock.mode == "lockstep" else RealTime(device, file.clock.period_us)

@@ -2,11 +2,15 @@
 
 from pathlib import Path
 
+from config.errors import InputError
 from config.modbus_server import RegisterServer
-from config.slave import SlaveFile, load_slave, valve_path
+from config.roles import Role
+from config.slave import ModbusRtuBus, ModbusTcpBus, SlaveFile, load_slave, valve_path
+from config.tls import Guard
 from config.valve import load_valve
-from sim.slave.clocks import Clock, Lockstep, RealTime
+from sim.slave.clocks import clock_of
 from sim.slave.device import Device
+from sim.slave.modbus_rtu import RtuServer
 from sim.slave.registers import DeviceRegisters
 from sim.valve import Valve
 
@@ -28,14 +32,11 @@ class ModbusSlave:
     def __init__(self, path: Path, port: int | None = None) -> None:
         file = load_slave(path)
         device = device_of(file, valve_path(file, path))
-        self._clock: Clock = (
-            Lockstep(device) if file.clock.mode == "lockstep" else RealTime(device, file.clock.period_us)
-        )
-        registers = DeviceRegisters(device, self._clock)
-        bus = file.bus
-        self._server = RegisterServer(registers, bus.host, bus.port if port is None else port, bus.unit)
+        self._clock = clock_of(file, device)
+        assert isinstance(file.bus, ModbusTcpBus | ModbusRtuBus)
+        self._server = _server(DeviceRegisters(device, self._clock), file.bus, port)
         self._server.start()
-        self.address = f"{bus.host}:{self._server.port}"
+        self.address = self._server.address
 
     def catch_up(self) -> None:
         """Let the time pass that is due; call it often enough that no request has much to catch up."""
@@ -45,6 +46,18 @@ class ModbusSlave:
     def stop(self) -> None:
         """Close the port and the connections."""
         self._server.stop()
+
+
+def _server(
+    registers: DeviceRegisters, bus: ModbusTcpBus | ModbusRtuBus, port: int | None
+) -> RegisterServer | RtuServer:
+    if isinstance(bus, ModbusRtuBus):
+        if port is not None:
+            raise InputError("--port", "is of Modbus TCP; the slave is on a serial line")
+        return RtuServer(registers, bus.serial, bus.unit)
+    # As a device has it: what an observer may not, an operator may.
+    guard = Guard(bus.tls, lambda _: Role.OPERATOR) if bus.tls else None
+    return RegisterServer(registers, bus.host, bus.port if port is None else port, bus.unit, guard)
 
 
 def device_of(file: SlaveFile, valve_file: Path) -> Device:

@@ -1,0 +1,191 @@
+"""Daemon and slave as processes on a CAN bus: the node killed and back, a second node on the bus, probe and doctor."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from config.can_bus import free_channel
+from config.registers import Fault, Mode
+from positioner.cli.main import main
+from positioner.cli.parts.children import port_in, running
+from positioner.dcs import Dcs, DcsError
+from tests.cli.test_daemon_process import LAW, until
+
+NODE = 5
+KILLS = 2
+DETECTED_WITHIN_S = 0.15
+
+
+def slave_file(folder: Path, channel: str, node: int = NODE, more: str = "") -> Path:
+    path = folder / f"slave{node}.toml"
+    path.write_text(
+        f'[bus]\nkind = "canopen"\nchannel = "{channel}"\nnode = {node}\n'
+        f"[sensor]\nnoise_std_m = 1e-5\n[initial]\nposition_m = 0.03\npressure_pa = 24000.0\n{more}"
+    )
+    return path
+
+
+def daemon_file(folder: Path, channel: str, node: int = NODE, more: str = "") -> Path:
+    path = folder / f"daemon{node}.toml"
+    path.write_text(
+        f"[valve]\nname = 'FV-{node}'\nstroke_m = 0.1016\n"
+        f'[device]\nbus = "canopen"\nchannel = "{channel}"\nnode = {node}\n{more}'
+        f"[cycle]\nperiod_s = 4e-3\n[supervisory]\nport = 0\n{LAW}"
+    )
+    return path
+
+
+@contextmanager
+def slave(config: Path) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "positioner.cli", "sim", str(config)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline().startswith("listening on loopback node")
+            yield process
+        finally:
+            process.kill()
+
+
+def automatic(dcs: Dcs) -> None:
+    """Give the valve to the controller, also when a busy machine made it let go before."""
+
+    def accepted() -> bool:
+        dcs.set("acknowledge", 1)
+        try:
+            dcs.set("mode", Mode.AUTOMATIC)
+        except DcsError:
+            return False
+        return True
+
+    until(accepted, "automatic mode")
+
+
+def events(log: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def faulted_s(log: Path, fault: str) -> list[float]:
+    """Return when decisions named a fault, as seconds of the wall clock."""
+    return [
+        datetime.fromisoformat(str(event["time"])).timestamp()
+        for event in events(log)
+        if event["event"] == "decision" and event["fault"] == fault
+    ]
+
+
+def test_a_node_killed_while_the_stem_moves_is_detected_in_time_and_taken_up_again(tmp_path: Path) -> None:
+    channel = free_channel()
+    node, config, log = slave_file(tmp_path, channel), daemon_file(tmp_path, channel), tmp_path / f"daemon{NODE}.log"
+    took_s = []
+    with ExitStack() as slaves:
+        process = slaves.enter_context(slave(node))
+        with running("run", config) as daemon, Dcs("127.0.0.1", port_in(daemon)) as dcs:
+            for kill in range(KILLS):
+                automatic(dcs)
+                dcs.set("reference", 0.6 + 0.05 * kill)
+                until(lambda: dcs.get("state") == 1, "S1")
+                before, killed_s = len(faulted_s(log, "NO_REPLY")), time.time()
+                os.kill(process.pid, signal.SIGKILL)
+                until(lambda n=before: len(faulted_s(log, "NO_REPLY")) > n, "the fault")  # type: ignore[misc]
+                took_s.append(faulted_s(log, "NO_REPLY")[before] - killed_s)
+                assert dcs.get("mode") == Mode.HOLD
+                process.wait()
+                process = slaves.enter_context(slave(node))
+                until(lambda: dcs.get("fault") == Fault.RESTARTED, "the node, powered up anew")
+                assert dcs.get("command") == pytest.approx(24000.0), "its pressure is held, it is not moved"
+                dcs.set("acknowledge", 1)
+                until(lambda: dcs.get("fault") == Fault.NONE, "acknowledgement")
+                cycles = dcs.get("cycles")
+                until(lambda n=cycles: dcs.get("cycles") > n + 20, "cycles")  # type: ignore[misc]
+    print("detected after, s:", took_s)
+    assert min(took_s) < DETECTED_WITHIN_S, took_s
+    assert max(took_s) < 10 * DETECTED_WITHIN_S, took_s
+    reasons = {str(event["reason"]) for event in events(log) if event["event"] == "no good reply"}
+    assert all("SYNC not answered" in reason or "heartbeat lost" in reason for reason in reasons), reasons
+
+
+def test_two_nodes_on_one_bus_each_have_their_daemon(tmp_path: Path) -> None:
+    channel = free_channel()
+    with ExitStack() as stack:
+        ports = {}
+        for node in (NODE, NODE + 1):
+            stack.enter_context(slave(slave_file(tmp_path, channel, node)))
+            own_sync = f"sync_cob_id = {0x60 + node}\nreply_timeout_s = 0.2\n"
+            ports[node] = port_in(stack.enter_context(running("run", daemon_file(tmp_path, channel, node, own_sync))))
+        one, other = (stack.enter_context(Dcs("127.0.0.1", port)) for port in ports.values())
+        automatic(one)
+        one.set("reference", 0.6)
+        until(lambda: abs(one.get("position") - 0.6) < 0.01, "the stem of one at its reference")
+        assert other.get("position") == pytest.approx(0.03 / 0.1016, abs=0.01), "the other has not moved"
+        until(lambda: other.get("cycles") > 100, "cycles of the other")
+        assert (one.get("fault"), other.get("fault")) == (Fault.NONE, Fault.NONE)
+
+
+def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    channel = free_channel()
+    config = daemon_file(tmp_path, channel, more="reply_timeout_s = 0.2\n")
+    with (
+        slave(slave_file(tmp_path, channel)),
+        running("run", config) as daemon,
+        Dcs("127.0.0.1", port_in(daemon)) as dcs,
+    ):
+        assert main(["probe", str(config), "--count", "2"]) == 0
+        assert capsys.readouterr().out.count("plausible") == 2
+        main(["doctor", str(config)])
+        (bus,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("bus"))
+        assert bus.split()[1] == "ok", bus
+        assert dcs.get("fault") == Fault.NONE
+        assert dcs.get("lost_replies") == 0, "the watcher did not touch the daemon's bus"
+
+
+def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(tmp_path: Path) -> None:
+    channel = free_channel()
+    first = slave_file(tmp_path, channel)
+    (tmp_path / "sheet.eds").write_text("not a data sheet")
+    (tmp_path / "bad.toml").write_text('[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\neds = "sheet.eds"\n')
+    (tmp_path / "none.toml").write_text('[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\neds = "none.eds"\n')
+    (tmp_path / "gone.toml").write_text(f'[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\nchannel = "{channel}"\n')
+    (tmp_path / "face.toml").write_text('[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\ninterface = "nosuch"\n')
+    said = {
+        ("sim", first): "bus.node: 5 is taken",
+        ("run", tmp_path / "bad.toml"): "is not an electronic data sheet",
+        ("run", tmp_path / "none.toml"): "none.eds: cannot be read: No such file",
+        ("run", tmp_path / "gone.toml"): "node 1: no node answers",
+        ("run", tmp_path / "face.toml"): "nosuch",
+    }
+    with slave(first):
+        for (command, config), line in said.items():
+            words = [sys.executable, "-m", "positioner.cli", command, str(config)]
+            ended = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+            assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1), ended.stderr
+            assert line in ended.stderr
+
+
+def test_without_the_packages_a_gateway_runs_and_says_in_one_line_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "daemon.toml").write_text('[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\n')
+    (tmp_path / "modbus.toml").write_text("[valve]\nstroke_m = 0.1\n[device]\nport = 1\n")
+    (tmp_path / "slave.toml").write_text('[bus]\nkind = "canopen"\n')
+    code = (
+        "import sys\nsys.modules['can'] = sys.modules['canopen'] = None\n"
+        "from positioner.cli.main import main\nsys.exit(main(sys.argv[1:]))"
+    )
+    said = {
+        ("run", "daemon.toml"): "pip install 'positioner[canopen]'",
+        ("sim", "slave.toml"): "needs canopen and python-can: pip install 'positioner[canopen]'",
+        ("run", "modbus.toml"): "127.0.0.1:1 unit 1: nobody accepts a connection",
+    }
+    for (command, name), line in said.items():
+        words = [sys.executable, "-c", code, command, str(tmp_path / name)]
+        ended = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+        assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1), ended.stderr
+        assert line in ended.stderr

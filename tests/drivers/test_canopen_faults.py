@@ -1,0 +1,351 @@
+"""What the CANopen driver makes of a node or a bus that fails: each a named event, and recovery by `open` alone.
+
+The node below is the simulated one, honest until it is given a fault: what becomes of each frame it sends.
+"""
+
+import logging
+import struct
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from config.can_bus import free_channel
+from config.canopen import SHIPPED_EDS, SIMULATED_OBJECTS, STATUS_WORD, CanBus, CanopenDevice, Entry, NodeState
+from config.device import DeviceStatus
+from config.errors import InputError
+from config.slave import SlaveFile
+from config.valve import shipped_valve
+from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.canopen import CanopenDriver, NodeEvent, cause_of
+from sim.slave.canopen import NodeServer
+from sim.slave.clocks import Clock, Lockstep, RealTime
+from sim.slave.modbus import device_of
+
+NODE, HELD_PA, PUSH_PA = 5, 17e3, 60e3
+FILE = SlaveFile.model_validate({"initial": {"position_m": 0.02, "pressure_pa": HELD_PA}})
+TPDO_1, HEARTBEAT, ANSWER = 0x180 + NODE, 0x700 + NODE, 0x580 + NODE
+
+Fault = Callable[[int, bytes], list[tuple[int, bytes]]]
+"""From the arbitration id and data of a frame that the node sends to the frames that leave."""
+
+
+def honest(identity: int, data: bytes) -> list[tuple[int, bytes]]:
+    return [(identity, data)]
+
+
+def without(*identities: int) -> Fault:
+    return lambda identity, data: [] if identity in identities else [(identity, data)]
+
+
+class Scripted(NodeServer):
+    """A node whose frames a fault may change. Its time is given where it is not in lockstep."""
+
+    def __init__(self, channel: str, clock: str = "lockstep") -> None:
+        self.fault: Fault = honest
+        self.now_ns = 0
+        self.device = device_of(FILE, shipped_valve("seed"))
+        clocks: dict[str, Callable[[], Clock]] = {
+            "lockstep": lambda: Lockstep(self.device),
+            "given": lambda: RealTime(self.device, 1000, lambda: self.now_ns),
+        }
+        super().__init__(CanBus(channel=channel, node=NODE), self.device, clocks[clock](), "test")
+
+    def _send(self, identity: int, data: bytes) -> None:
+        for each in self.fault(identity, data):
+            super()._send(*each)
+
+
+def config(channel: str, **more: object) -> CanopenDevice:
+    return CanopenDevice.model_validate({"channel": channel, "node": NODE, "reply_timeout_s": 0.3, **more})
+
+
+@pytest.fixture
+def channel() -> str:
+    return free_channel()
+
+
+@pytest.fixture
+def node(channel: str) -> Iterator[Scripted]:
+    node = Scripted(channel)
+    node.start()
+    yield node
+    node.stop()
+
+
+@pytest.fixture
+def driver(node: Scripted, channel: str) -> Iterator[CanopenDriver]:
+    driver = CanopenDriver(config(channel, heartbeat_s=0.5))
+    driver.open()
+    assert driver.exchange(PUSH_PA).sample_counter == 1
+    yield driver
+    driver.close()
+
+
+@pytest.fixture
+def third(channel: str) -> Iterator[can.BusABC]:
+    """Another end of the bus."""
+    with can.Bus(interface="loopback", channel=channel, ignore_config=True) as bus:
+        yield bus
+
+
+def frame(identity: int, data: bytes) -> can.Message:
+    return can.Message(arbitration_id=identity, data=data, is_extended_id=False)
+
+
+def fails(kind: type[DriverError], event: NodeEvent, act: Callable[[], object]) -> str:
+    """Return the one line that is said, which names the node and then the event."""
+    with pytest.raises(DriverError) as caught:
+        act()
+    assert type(caught.value) is kind, caught.value
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.split(f"node {NODE}: ")[1].startswith(event), text
+    return text
+
+
+def recovers(driver: CanopenDriver, node: Scripted) -> None:
+    """No call works until `open`, and then the newest measurement comes."""
+    for act in (driver.read, lambda: driver.write(PUSH_PA), lambda: driver.exchange(PUSH_PA)):
+        with pytest.raises(NoConnection):
+            act()
+    node.fault = honest
+    driver.open()
+    reading = driver.exchange(PUSH_PA)
+    assert reading.sample_counter == node.device.sample_counter
+    assert reading.position_m == pytest.approx(node.device.position_m, rel=1e-6)
+    assert reading.status == 0
+
+
+def in_time(holds: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + 5
+    while not holds():
+        assert time.monotonic() < end_s
+        time.sleep(1e-3)
+
+
+def test_sync_that_nobody_answers(driver: CanopenDriver, node: Scripted) -> None:
+    node.fault = without(TPDO_1)
+    text = fails(NoReply, NodeEvent.SYNC_LOST, lambda: driver.exchange(PUSH_PA))
+    assert "1 of 3 TPDOs missing 300 ms after SYNC" in text
+    recovers(driver, node)
+
+
+def test_a_heartbeat_that_stops_while_samples_come(node: Scripted, channel: str) -> None:
+    driver = CanopenDriver(config(channel, heartbeat_s=0.02))
+    driver.open()
+    node.fault = without(HEARTBEAT)
+
+    def cycle_on() -> None:
+        end_s = time.monotonic() + 5
+        while time.monotonic() < end_s:
+            driver.exchange(PUSH_PA)
+
+    fails(NoReply, NodeEvent.HEARTBEAT_LOST, cycle_on)
+    recovers(driver, node)
+    driver.close()
+
+
+def test_a_pdo_too_short_is_never_a_measurement(driver: CanopenDriver, node: Scripted) -> None:
+    node.fault = lambda identity, data: [(identity, data[:5] if identity == TPDO_1 else data)]
+    assert "TPDO 1 has 5 bytes, mapped are 8" in fails(
+        BadReply, NodeEvent.PDO_TOO_SHORT, lambda: driver.exchange(PUSH_PA)
+    )
+    recovers(driver, node)
+
+
+def test_a_measurement_that_is_no_number_is_refused_and_the_next_taken(driver: CanopenDriver, node: Scripted) -> None:
+    node.fault = lambda identity, data: [
+        (identity, struct.pack("<ff", float("nan"), 0) if identity == TPDO_1 else data)
+    ]
+    with pytest.raises(BadReply, match="no number: position_m nan"):
+        driver.exchange(PUSH_PA)
+    node.fault = honest
+    assert driver.exchange(PUSH_PA).sample_counter == 3
+
+
+def test_an_sdo_abort_names_the_object_and_the_reason(driver: CanopenDriver, node: Scripted) -> None:
+    def abort_mapping(identity: int, data: bytes) -> list[tuple[int, bytes]]:
+        aborted = identity == ANSWER and data[1:4] == b"\x01\x1a\x02"
+        return [(identity, b"\x80\x01\x1a\x02" + struct.pack("<I", 0x06040041) if aborted else data)]
+
+    node.fault = abort_mapping
+    text = fails(Refused, NodeEvent.SDO_ABORT, driver.open)
+    assert "0x1a01 sub 2: Code 0x06040041, Object cannot be mapped to the PDO" in text
+    recovers(driver, node)
+
+
+def test_an_sdo_request_that_is_not_answered(driver: CanopenDriver, node: Scripted) -> None:
+    node.fault = lambda identity, data: [] if identity == ANSWER and data[1:3] == b"\x17\x10" else [(identity, data)]
+    assert "0x1017 sub 0" in fails(NoReply, NodeEvent.SDO_TIMEOUT, driver.open)
+    recovers(driver, node)
+
+
+def test_a_late_sdo_answer_is_never_taken_for_another(driver: CanopenDriver, node: Scripted) -> None:
+    """A pressure held long ago comes before every answer: it is told apart, and counted."""
+    stale = b"\x43\x05\x20\x00" + struct.pack("<f", 99e3)
+    late = [0]
+
+    def once(identity: int, data: bytes) -> list[tuple[int, bytes]]:
+        late[0] += identity == ANSWER
+        return [(ANSWER, stale), (identity, data)] if late[0] == 1 else [(identity, data)]
+
+    node.fault = once
+    assert "answers to" in fails(BadReply, NodeEvent.NODE_ID_TAKEN, driver.open), (
+        "a held pressure of 99 kPa was not taken"
+    )
+    recovers(driver, node)
+
+
+def test_a_data_sheet_of_another_device(node: Scripted, channel: str, tmp_path: Path) -> None:
+    other = tmp_path / "other.eds"
+    other.write_text(SHIPPED_EDS.read_text().replace("0x49505054", "0x00000408"))
+    driver = CanopenDriver(config(channel, eds=other))
+    text = fails(BadReply, NodeEvent.WRONG_EDS, driver.open)
+    assert "it says product 0x49505054, other.eds is of 0x00000408" in text
+    assert node.device.samples == 0, "and nothing was moved"
+
+
+def test_a_data_sheet_that_lacks_what_the_map_names(channel: str, tmp_path: Path) -> None:
+    lacking = SIMULATED_OBJECTS.model_copy(update={"pressure_pa": Entry(index=0x2FFF)})
+    with pytest.raises(
+        InputError, match=r"positioner.eds: device.map.pressure_pa: the data sheet has no number at 0x2fff"
+    ):
+        CanopenDriver(config(channel, map=lacking))
+
+
+def test_scale_and_offset_of_the_map_hold_both_ways(node: Scripted, channel: str) -> None:
+    halved = SIMULATED_OBJECTS.model_copy(
+        update={"command_pa": Entry(index=0x2005, scale=0.5), "position_m": Entry(index=0x2000, scale=2.0, offset=1.0)}
+    )
+    driver = CanopenDriver(config(channel, map=halved))
+    assert driver.open() == 0.5 * HELD_PA
+    assert driver.exchange(20e3).position_m == pytest.approx(1.0 + 2.0 * node.device.position_m)
+    assert node.device.command_pa == 40e3
+    driver.close()
+
+
+def test_two_nodes_of_one_id_are_told_and_one_is_enough(driver: CanopenDriver, node: Scripted, channel: str) -> None:
+    twin = Scripted(channel)
+    with pytest.raises(InputError, match=r"bus\.node: 5 is taken by another node"):
+        twin.start()
+    forced = Scripted(channel)
+    forced.node.boot()  # without listening first
+    forced.node.receive(0, bytes((1, NODE)))
+    forced._thread.start()
+    with pytest.raises(DriverError):  # its boot-up, then twice the TPDOs
+        _ = [driver.exchange(PUSH_PA) for _ in range(10)]
+    assert "answers to" in fails(BadReply, NodeEvent.NODE_ID_TAKEN, driver.open)
+    forced.stop()
+    recovers(driver, node)
+
+
+def test_samples_of_two_nodes_are_told_apart(driver: CanopenDriver, node: Scripted) -> None:
+    node.fault = lambda identity, data: [(identity, data)] * (2 if identity == TPDO_1 else 1)
+    fails(BadReply, NodeEvent.NODE_ID_TAKEN, lambda: [driver.exchange(PUSH_PA) for _ in range(3)])
+    recovers(driver, node)
+
+
+def test_bus_off(driver: CanopenDriver, node: Scripted, third: can.BusABC) -> None:
+    third.send(can.Message(arbitration_id=0x40, is_error_frame=True, data=bytes(8), is_extended_id=False))
+    fails(NoConnection, NodeEvent.BUS_OFF, lambda: driver.exchange(PUSH_PA))
+    recovers(driver, node)
+
+
+def test_an_interface_that_is_not_there() -> None:
+    driver = CanopenDriver(config("nowhere0", interface="socketcan"))
+    fails(NoConnection, NodeEvent.BUS_OFF, driver.open)
+    driver = CanopenDriver(config("x", interface="nosuch"))
+    assert "'nosuch' not supported" in fails(NoConnection, NodeEvent.BUS_OFF, driver.open)
+
+
+@pytest.mark.parametrize(
+    ("command", "event"),
+    [(129, NodeEvent.NODE_RESTARTED), (130, NodeEvent.NODE_RESTARTED), (2, NodeEvent.NOT_OPERATIONAL)],
+)
+def test_a_node_that_another_master_resets_or_stops(
+    driver: CanopenDriver, node: Scripted, third: can.BusABC, command: int, event: NodeEvent
+) -> None:
+    node.node.send_message(HEARTBEAT, bytes((5,)))
+    third.send(frame(0, bytes((command, NODE))))
+    in_time(lambda: node.node.state != 5)
+    if command == 2:
+        node.node.send_message(HEARTBEAT, bytes((4,)))
+    fails(NoConnection, event, lambda: driver.exchange(PUSH_PA))
+    recovers(driver, node)
+
+
+def test_a_heartbeat_from_before_the_start_is_not_taken_for_a_stop(driver: CanopenDriver, node: Scripted) -> None:
+    node.node.send_message(HEARTBEAT, bytes((127,)))
+    assert driver.exchange(PUSH_PA).sample_counter == 2
+
+
+def test_a_node_operated_locally_is_no_actuator_and_says_why(
+    driver: CanopenDriver, node: Scripted, third: can.BusABC, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    before_pa = node.device.command_pa
+    third.send(frame(0x600 + NODE, b"\x2f\x42\x60\x00\x02\0\0\0"))
+    in_time(lambda: node.node.machine.mode == 2)
+    reading = driver.exchange(PUSH_PA + 1e3)
+    assert reading.status == DeviceStatus.NOT_READY
+    assert node.device.command_pa == before_pa, "it did not obey"
+    third.send(frame(0x600 + NODE, b"\x2f\x42\x60\x00\x01\0\0\0"))
+    in_time(lambda: node.node.machine.mode == 1)
+    driver.exchange(PUSH_PA + 1e3)
+    assert driver.exchange(PUSH_PA + 1e3).status == 0
+    assert node.device.command_pa == PUSH_PA + 1e3
+    told = [
+        (each.message, each.__dict__["fields"].get("why")) for each in caplog.records if each.name == "drivers.canopen"
+    ]
+    assert told == [(NodeEvent.NOT_ACTIVE, "it is operated locally"), (NodeEvent.ACTIVE, None)]
+
+
+def test_silence_makes_the_node_act_and_its_fault_is_reset_when_the_master_is_back(
+    channel: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    node = Scripted(channel, "given")
+    node.start()
+    driver = CanopenDriver(config(channel, communication_timeout_s=0.5, communication_action="vent", heartbeat_s=5))
+    driver.open()
+    node.now_ns += 10_000_000
+    assert (driver.exchange(PUSH_PA).status, node.device.command_pa) == (0, PUSH_PA)
+    node.now_ns += 600_000_000
+    silent = driver.read()
+    assert (silent.status, node.device.command_pa) == (DeviceStatus.COMMUNICATION_LOST | DeviceStatus.NOT_READY, 0.0)
+    assert node.node.machine.state is NodeState.FAULT_HOLD
+    readings = [driver.exchange(PUSH_PA) for _ in range(4)]
+    assert readings[0].status & DeviceStatus.NOT_READY
+    assert (readings[-1].status, node.device.command_pa) == (0, PUSH_PA)
+    emergencies = [each.__dict__["fields"] for each in caplog.records if each.message == NodeEvent.EMERGENCY]
+    assert (emergencies[0]["code"], emergencies[0]["register"]) == (0x8250, 0b10001)
+    assert emergencies[0]["cause"] == "no RPDO within the communication time-out"
+    driver.close()
+    node.stop()
+
+
+def test_a_fault_of_the_node_is_reset_by_open(driver: CanopenDriver, node: Scripted) -> None:
+    node.node.machine.fail()
+    driver.open()
+    assert driver.exchange(PUSH_PA).status == 0
+
+
+def test_a_status_word_that_is_no_state_is_no_actuator(driver: CanopenDriver, node: Scripted) -> None:
+    node.node._reads[STATUS_WORD] = lambda: 0b0000
+    assert driver.exchange(PUSH_PA).status == DeviceStatus.NOT_READY
+
+
+@pytest.mark.parametrize(
+    ("code", "cause"),
+    [
+        (0x8130, "life guard or heartbeat error"),
+        (0x8199, "communication"),
+        (0x2310, "current"),
+        (0xFF42, "specific to the device"),
+        (0x0300, "not in CiA 301"),
+    ],
+)
+def test_an_emergency_is_told_by_its_cause(code: int, cause: str) -> None:
+    assert cause_of(code) == cause
