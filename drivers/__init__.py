@@ -1,15 +1,25 @@
 """The buses: one narrow boundary to a device, one file a bus.
 
 `boundary` says what every driver does; `modbus_tcp` talks to a device on Modbus TCP, `memory` to a valve in the
-same process and virtual time. A driver knows registers and time-outs, and nothing of control.
+same process and virtual time. A driver knows registers and time-outs, and nothing of control. `driver_for` finds
+drivers by the name of their bus, those of other packages too (`config.buses`).
 """
 
-from config.device import ModbusTcpDevice
+from config.buses import DRIVERS, loaded, offered
+from config.device import Device
+from config.errors import InputError
 from drivers.boundary import Driver
 
 
-def driver_for(device: ModbusTcpDevice) -> Driver:
-    """Return the driver of a device's bus, not yet open."""
-    from drivers.modbus_tcp import ModbusTcpDriver
+def driver_for(device: Device) -> Driver:
+    """Return the driver of a device's bus, not yet open.
 
-    return ModbusTcpDriver(device)
+    Raises:
+        InputError: no installed package has one, or it cannot be loaded.
+    """
+    drivers = offered(DRIVERS)
+    if device.bus not in drivers:
+        known = ", ".join(sorted(drivers))
+        raise InputError("device.bus", f"{device.bus}: no installed package has its driver; there are: {known}")
+    driver: Driver = loaded(drivers[device.bus])(device)
+    return driver

@@ -6,13 +6,16 @@ The device itself (its counter, its held command, what it measures) judges what 
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from typing import Protocol
 
 import pytest
 
 from config.device import SIMULATED_MAP, CommunicationAction, ModbusMap, ModbusTcpDevice, Place
 from config.modbus_server import ExceptionCode, RegisterServer
 from config.slave import SlaveFile
+from config.tls import Guard, Tls
 from config.valve import shipped_valve
 from drivers.boundary import Driver, NoConnection, NoReply, Reading, Refused
 from drivers.memory import MemoryDriver
@@ -41,11 +44,27 @@ class Bench:
     driver: Driver
 
 
+class Server(Protocol):
+    """What puts a device on a wire."""
+
+    @property
+    def lock(self) -> AbstractContextManager[object]:
+        """Held, it keeps the device from answering."""
+        ...
+
+    @property
+    def address(self) -> str:
+        """Where it is."""
+        ...
+
+    def stop(self) -> None: ...
+
+
 @dataclass
 class WireBench(Bench):
     """The server between them, too."""
 
-    server: RegisterServer
+    server: Server
 
 
 class DriverContract:
@@ -166,8 +185,8 @@ class WireContract(DriverContract):
         assert isinstance(bench, WireBench)
         return bench
 
-    def serve(self, device: Device, port: int) -> RegisterServer:
-        """Put a device on the wire."""
+    def serve(self, device: Device, address: str | None) -> Server:
+        """Put a device on the wire; where it was before, if that is given."""
         raise NotImplementedError
 
     def test_a_device_that_is_gone_is_reported_at_once_and_nothing_stale_comes_after_its_return(
@@ -175,7 +194,7 @@ class WireContract(DriverContract):
     ) -> None:
         bench.driver.open()
         bench.driver.exchange(PUSH_PA)
-        port = bench.server.port
+        address = bench.server.address
         bench.server.stop()
         for _ in range(3):
             with pytest.raises((NoConnection, NoReply)):
@@ -183,7 +202,7 @@ class WireContract(DriverContract):
         with pytest.raises(NoConnection):
             bench.driver.open()
         bench.device.tick(60e3)
-        bench.server = self.serve(bench.device, port)
+        bench.server = self.serve(bench.device, address)
         assert bench.driver.open() == 60e3
         reading = bench.driver.exchange(PUSH_PA)
         assert reading.sample_counter == 3
@@ -229,6 +248,8 @@ class Without23(RegisterServer):
 class TestModbusTcp(WireContract):
     registers: ModbusMap = SIMULATED_MAP
     server_type: type[RegisterServer] = RegisterServer
+    driver_tls: Tls | None = None
+    guard: Guard | None = None
 
     @pytest.fixture
     def make(self) -> Iterator[Callable[[], Bench]]:
@@ -236,13 +257,14 @@ class TestModbusTcp(WireContract):
 
         def make() -> WireBench:
             device = device_of(FILE, shipped_valve("seed"))
-            server = self.serve(device, 0)
+            server = self.serve(device, None)
             config = ModbusTcpDevice(
                 port=server.port,
                 map=self.registers,
                 reply_timeout_s=self.reply_timeout_s,
                 communication_timeout_s=1.5,
                 communication_action="vent",
+                tls=self.driver_tls,
             )
             benches.append(WireBench(device, ModbusTcpDriver(config), server))
             return benches[-1]
@@ -252,9 +274,10 @@ class TestModbusTcp(WireContract):
             bench.driver.close()
             bench.server.stop()
 
-    def serve(self, device: Device, port: int) -> RegisterServer:
+    def serve(self, device: Device, address: str | None) -> RegisterServer:
         registers = DeviceRegisters(device, Lockstep(device), self.registers)
-        server = self.server_type(registers, "127.0.0.1", port, 1)
+        port = int(address.rpartition(":")[2]) if address else 0
+        server = self.server_type(registers, "127.0.0.1", port, 1, self.guard)
         server.start()
         return server
 

@@ -1,0 +1,12 @@
+"""Who may do what on a secured connection: each role may also do what those below it may."""
+
+from enum import IntEnum
+
+
+class Role(IntEnum):
+    """What a certificate makes of its owner; NONE is a certificate that names no role, or one that is not known."""
+
+    NONE = 0
+    OBSERVER = 1
+    OPERATOR = 2
+    ENGINEER = 3

@@ -1,0 +1,101 @@
+"""A device on a serial line, on Modbus RTU.
+
+A reply on a serial line does not say whose it is: one that comes after its time-out would be taken for the answer to
+the next request, and every later one be shifted by one. So the line is let go after whatever is not one whole fitting
+reply, and `open` first asks for an echo (function 8) of a number that changes each time. A device answers in order:
+once that echo is back, or is refused as an unknown function, everything asked before has been answered or never will
+be, however late it is. What comes before it is thrown away.
+"""
+
+from config.device import ModbusRtuDevice
+from config.rtu import ECHO, framed, is_whole
+from config.serial_line import SerialLine
+from drivers.boundary import BadReply, DriverError, NoConnection, NoReply
+from drivers.modbus import ModbusDriver
+
+EXCEPTION = 0x80
+EXCEPTION_FRAME = 5
+ROUND_FRAME = 3
+"""Bytes of a frame round its PDU: unit and check sum."""
+
+
+class ModbusRtuDriver(ModbusDriver):
+    """Drives a device on Modbus RTU; the line is its own.
+
+    Args:
+        config: the line, how long the device may take, what its registers hold.
+    """
+
+    def __init__(self, config: ModbusRtuDevice) -> None:
+        super().__init__(config, f"{config.serial.path} unit {config.unit}")
+        self._unit = config.unit
+        self._reply_timeout_s = config.reply_timeout_s
+        self._line = SerialLine(config.serial)
+        self._echoes = 0
+
+    def close(self) -> None:
+        """Let go of the line; the device keeps its last command until its own time-out."""
+        self._line.close()
+
+    def _connect(self) -> None:
+        try:
+            self._line.open()
+            self._await_echo()
+        except OSError as error:
+            self.close()
+            raise NoConnection(f"{self._who}: {error.strerror}") from None
+
+    def _await_echo(self) -> None:
+        """Make sure that no earlier request is still to be answered."""
+        self._echoes = (self._echoes + 1) & 0xFFFF
+        echo = framed(self._unit, ECHO + self._echoes.to_bytes(2))
+        refusal = bytes((self._unit, ECHO[0] | EXCEPTION))
+        until_s = self._line.send(echo, self._reply_timeout_s) + self._reply_timeout_s
+        heard = b""
+        while data := self._line.receive(until_s):
+            heard = (heard + data)[-2 * len(echo) :]
+            last = heard[-EXCEPTION_FRAME:]
+            if heard.endswith(echo) or (last.startswith(refusal) and is_whole(last)):
+                return
+        said = f" (but {heard.hex(' ')})" if heard else ""
+        raise NoConnection(f"{self._who}: nobody answers within {1e3 * self._reply_timeout_s:g} ms{said}")
+
+    def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
+        if not self._line.is_open:
+            raise NoConnection(f"{self._about(request)}: the line is closed")
+        try:
+            frame = self._answered(framed(self._unit, request), request[0], length + ROUND_FRAME)
+        except OSError as error:
+            self.close()
+            raise NoConnection(f"{self._about(request)}: {error.strerror}") from None
+        if len(frame) == length + ROUND_FRAME and frame[1:].startswith(head) and self._is_ours(frame):
+            return frame[1:-2]
+        raise self._fault(request, frame)
+
+    def _answered(self, frame: bytes, function: int, size: int) -> bytes:
+        """Send a request; return what came before its time-out, as far as it can be the reply of that size."""
+        until_s = self._line.send(frame, self._reply_timeout_s) + self._reply_timeout_s
+        reply = b""
+        while len(reply) < size and (data := self._line.receive(until_s)):
+            reply += data
+            if len(reply) > 1 and reply[1] != function:
+                size = EXCEPTION_FRAME
+        return reply
+
+    def _fault(self, request: bytes, frame: bytes) -> DriverError:
+        """Return what a transaction that did not succeed means; let go of the line unless it can be trusted."""
+        if len(frame) == EXCEPTION_FRAME and frame[1] == request[0] | EXCEPTION and self._is_ours(frame):
+            return self._refused(request, frame[2])
+        self.close()
+        about = self._about(request)
+        if not frame:
+            return NoReply(f"{about}: no reply within {1e3 * self._reply_timeout_s:g} ms")
+        return BadReply(f"{about}: {self._misfit(frame)}: {frame.hex(' ')}")
+
+    def _is_ours(self, frame: bytes) -> bool:
+        return frame[0] == self._unit and is_whole(frame)
+
+    def _misfit(self, frame: bytes) -> str:
+        if not is_whole(frame):
+            return "noise, or a broken reply"
+        return "the reply does not fit" if frame[0] == self._unit else f"a reply of unit {frame[0]}"

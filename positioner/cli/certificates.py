@@ -1,0 +1,71 @@
+"""`positioner certificates`: an authority and certificates to try Modbus/TCP Security with."""
+
+import argparse
+from pathlib import Path
+
+HELP = "make a test certificate authority and certificates for Modbus/TCP Security, one per end and role"
+EXAMPLE = "positioner certificates -o certificates --host gateway-7 --host 10.0.0.7"
+
+HERE = ("localhost", "127.0.0.1")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="DIR", help="a new or empty folder")
+    parser.add_argument(
+        "--host",
+        action="append",
+        metavar="NAME",
+        help=f"a host name or address under which device and daemon are called (without any: {', '.join(HERE)})",
+    )
+    parser.add_argument("--days", type=_days, default=365, help="how long they are valid (365)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make them, and say what each is for.
+
+    Raises:
+        InputError: a host name that is none; a folder that is not empty, or cannot be written.
+    """
+    from pyModbusTCP.utils import valid_host
+
+    from config.errors import InputError
+    from config.roles import Role
+    from positioner.cli.parts.authority import Authority, Owner
+
+    hosts = tuple(arguments.host or HERE)
+    for host in hosts:
+        if not valid_host(host):
+            raise InputError("--host", f"must be a host name or an IP address, got {host!r}")
+    owners = {
+        Owner("device", hosts): "the device: [bus.tls] of a simulated one",
+        Owner("daemon", hosts, Role.OPERATOR): "the daemon: [supervisory.tls], and [device.tls] as an operator",
+        Owner("observer", (), Role.OBSERVER): "a DCS that may read",
+        Owner("operator", (), Role.OPERATOR): "a DCS that may write reference, acknowledge and heartbeat, too",
+        Owner("engineer", (), Role.ENGINEER): "a DCS that may write everything",
+    }
+    folder: Path = arguments.out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InputError(f"-o {folder}", "must be a new or empty folder: keys are never written over")
+        authority = Authority(folder, arguments.days)
+        for owner in owners:
+            authority.sign(owner)
+    except OSError as error:
+        raise InputError(f"-o {folder}", f"cannot be written: {error.strerror}") from None
+    print(f"{folder / 'authority.pem'}  signs all of these for {arguments.days:g} days")
+    for owner, purpose in owners.items():
+        print(f"{folder / (owner.name + '.pem')}, .key  {purpose}")
+    print("For trials only: the authority's key lies beside what it signs.")
+    return 0
+
+
+def _days(text: str) -> float:
+    try:
+        days = float(text)
+    except ValueError:
+        days = 0.0
+    if not 0 < days <= 36500:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of days, above 0 to 36500")
+    return days

@@ -1,0 +1,284 @@
+"""Modbus/TCP Security between driver and device: the contract of every driver, and every way not to get in."""
+
+import logging
+import re
+import socket
+import ssl
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from config.device import ModbusTcpDevice
+from config.errors import InputError
+from config.modbus_server import RegisterServer
+from config.roles import Role
+from config.slave import SlaveFile
+from config.tls import Guard, Tls, client_context, identity_in
+from config.valve import shipped_valve
+from drivers.boundary import NoConnection, Refused
+from drivers.modbus_tcp import ModbusTcpDriver
+from sim.slave.clocks import Lockstep
+from sim.slave.device import Device
+from sim.slave.modbus import device_of
+from sim.slave.registers import DeviceRegisters
+from tests.certificates import folder, tls
+from tests.drivers import test_driver_contract as contract
+
+PUSH_PA = 80e3
+READ_ONE = bytes.fromhex("0001 0000 0006 01 03 0000 0001")
+
+
+def guarded(name: str = "device", authority: str = "authority", handshake_timeout_s: float = 5.0) -> Guard:
+    return Guard(tls(name, authority, handshake_timeout_s), lambda _: Role.OPERATOR)
+
+
+class TestModbusTls(contract.TestModbusTcp):
+    @pytest.fixture(autouse=True)
+    def _secured(self) -> None:
+        self.guard = guarded()
+        self.driver_tls = tls("daemon")
+
+
+@contextmanager
+def device_with(guard: Guard | None) -> Iterator[tuple[Device, RegisterServer]]:
+    device = device_of(SlaveFile(), shipped_valve("seed"))
+    server = RegisterServer(DeviceRegisters(device, Lockstep(device)), "127.0.0.1", 0, 1, guard)
+    server.start()
+    try:
+        yield device, server
+    finally:
+        server.stop()
+
+
+def driver_to(server: RegisterServer, table: Tls | None, host: str = "127.0.0.1") -> ModbusTcpDriver:
+    return ModbusTcpDriver(ModbusTcpDevice(host=host, port=server.port, reply_timeout_s=2.0, tls=table))
+
+
+def turned_away(server: RegisterServer, table: Tls | None) -> str:
+    """Return why the driver does not get in: one line."""
+    driver = driver_to(server, table)
+    with pytest.raises(NoConnection) as caught:
+        driver.open()
+    with pytest.raises(NoConnection):
+        driver.exchange(PUSH_PA)
+    driver.close()
+    assert "\n" not in str(caught.value)
+    return str(caught.value).removeprefix(f"127.0.0.1:{server.port} unit 1: ")
+
+
+def refusals(caplog: pytest.LogCaptureFixture, number: int = 1) -> list[str]:
+    """Return what the server logged of refused clients: a line each, some time after they noticed."""
+    end_s = time.monotonic() + 10
+    while len(lines := [each.getMessage() for each in caplog.records if "refused" in each.getMessage()]) < number:
+        assert time.monotonic() < end_s, lines
+        time.sleep(5e-3)
+    assert all(re.match(r"(\w+ \(\w+\) at )?127\.0\.0\.1:\d+ refused: ", each) for each in lines), lines
+    assert all(each.levelno == logging.WARNING and not each.exc_info for each in caplog.records)
+    return [each.partition("refused: ")[2] for each in lines]
+
+
+@pytest.mark.parametrize(
+    ("shown", "trusted", "why"),
+    [
+        ("device", "other/authority", "its certificate is not accepted: self-signed certificate in certificate chain"),
+        ("outdated", "authority", "its certificate is not accepted: certificate has expired"),
+        (
+            "elsewhere",
+            "authority",
+            "its certificate is not accepted: IP address mismatch, certificate is not valid for '127.0.0.1'",
+        ),
+        ("operator", "authority", "its certificate is not accepted: unsuitable certificate purpose"),
+    ],
+    ids=["of another authority", "expired", "of another host", "of no server"],
+)
+def test_a_device_with_a_wrong_certificate_is_not_trusted(
+    shown: str, trusted: str, why: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with device_with(guarded(shown)) as (device, server):
+        assert turned_away(server, tls("daemon", trusted)) == why
+        assert len(refusals(caplog)) == 1
+        assert device.samples == 0
+
+
+def test_the_host_name_is_checked_as_it_was_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`valve-8` is this machine today; only a certificate for that name will do."""
+    found = socket.getaddrinfo
+    monkeypatch.setattr(
+        socket, "getaddrinfo", lambda host, *rest: found("127.0.0.1" if host.startswith("valve-") else host, *rest)
+    )
+    with device_with(guarded("elsewhere")) as (_, server):
+        driver_to(server, tls("daemon"), "valve-8").open()
+        with pytest.raises(NoConnection, match="Hostname mismatch, certificate is not valid for 'valve-9'"):
+            driver_to(server, tls("daemon"), "valve-9").open()
+
+
+@pytest.mark.parametrize(
+    ("shown", "trusted", "told", "logged"),
+    [
+        ("other/daemon", "authority", "alert unknown ca", "unable to get local issuer certificate"),
+        ("outdated", "authority", "alert certificate expired", "certificate has expired"),
+        ("device", "authority", "alert unsupported certificate", "unsuitable certificate purpose"),
+    ],
+    ids=["of another authority", "expired", "of no client"],
+)
+def test_a_client_with_a_wrong_certificate_is_turned_away_and_told_why(
+    shown: str, trusted: str, told: str, logged: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with device_with(guarded()) as (device, server):
+        assert told in turned_away(server, tls(shown, trusted))
+        assert refusals(caplog) == [f"its certificate is not accepted: {logged}"]
+        assert device.samples == 0
+
+
+def raw(server: RegisterServer, context: ssl.SSLContext) -> bytes:
+    """Return what a client without our care for errors gets for a request."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as line:
+        try:
+            with context.wrap_socket(line, server_hostname="127.0.0.1") as secured:
+                secured.sendall(READ_ONE)
+                return secured.recv(100)
+        except OSError:
+            return b""
+
+
+def test_a_client_without_certificate_is_turned_away(caplog: pytest.LogCaptureFixture) -> None:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.load_verify_locations(folder() / "authority.pem")
+    with device_with(guarded()) as (_, server):
+        assert raw(server, context) == b""
+        assert refusals(caplog) == ["TLS: peer did not return a certificate"]
+        context.load_cert_chain(folder() / "observer.pem", folder() / "observer.key")
+        assert raw(server, context) == bytes.fromhex("0001 0000 0005 01 03 02 0000"), "it was the certificate"
+
+
+def test_tls_1_1_is_too_old(caplog: pytest.LogCaptureFixture) -> None:
+    context = client_context(tls("daemon"))
+    context.set_ciphers("ALL:@SECLEVEL=0")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        context.minimum_version = context.maximum_version = ssl.TLSVersion.TLSv1_1
+    with device_with(guarded()) as (_, server):
+        assert raw(server, context) == b""
+        assert refusals(caplog) == ["TLS: unsupported protocol"]
+
+
+def test_tls_1_2_will_do() -> None:
+    context = client_context(tls("daemon"))
+    context.maximum_version = ssl.TLSVersion.TLSv1_2
+    with device_with(guarded()) as (_, server):
+        assert raw(server, context) != b""
+
+
+def test_a_plain_driver_at_a_secured_device_does_not_get_in(caplog: pytest.LogCaptureFixture) -> None:
+    with device_with(guarded()) as (device, server):
+        assert turned_away(server, None) == "function 3, read 2 at 11: the connection is closed"
+        assert device.samples == 0
+        assert refusals(caplog) == ["TLS: wrong version number"]
+
+
+def test_a_secured_driver_at_a_plain_device_is_told_so() -> None:
+    with device_with(None) as (device, server):
+        assert turned_away(server, tls("daemon")) in ("hung up in the TLS handshake", "Connection reset by peer")
+        assert device.samples == 0
+        driver_to(server, None).open()
+
+
+def test_an_observer_reads_and_moves_nothing(caplog: pytest.LogCaptureFixture) -> None:
+    with device_with(guarded()) as (device, server):
+        file = ModbusTcpDevice(port=server.port, reply_timeout_s=2.0, tls=tls("observer"))
+        driver = ModbusTcpDriver(file.untouched())
+        driver.open()
+        assert driver.read().sample_counter == 0
+        for act in (driver.exchange, driver.write):
+            with pytest.raises(Refused, match="exception 1"):
+                act(PUSH_PA)
+        assert set(refusals(caplog, 3)) == {f"function {each} needs the role operator" for each in (16, 23)}
+        assert "observer (observer) at 127.0.0.1:" in caplog.text
+        assert device.samples == 0
+        assert driver.read().sample_counter == 0, "and the connection holds"
+        driver.close()
+
+
+def test_a_certificate_without_role_may_not_even_read(caplog: pytest.LogCaptureFixture) -> None:
+    without = ssl.PEM_cert_to_DER_cert((folder() / "device.pem").read_text())
+    assert identity_in(without).role is Role.NONE
+    guard = guarded()
+    assert guard.objection(identity_in(without), READ_ONE[7:]) == "function 3 needs the role observer"
+
+
+@pytest.mark.parametrize("text", [b"Engineer", b"engineer ", b"", b"none", b"engineer\0", b"admin"])
+def test_a_role_that_is_not_known_to_the_letter_is_none(text: bytes) -> None:
+    from cryptography import x509
+    from cryptography.hazmat.primitives import serialization
+
+    from config.tls import ROLE_OID, _role
+
+    assert _role(b"\x0c" + bytes((len(text),)) + text) is Role.NONE
+    parsed = x509.load_pem_x509_certificate((folder() / "engineer.pem").read_bytes())
+    value = parsed.extensions.get_extension_for_oid(x509.ObjectIdentifier(ROLE_OID)).value
+    assert value == x509.UnrecognizedExtension(x509.ObjectIdentifier(ROLE_OID), b"\x0c\x08engineer")
+    assert identity_in(parsed.public_bytes(serialization.Encoding.DER)).role is Role.ENGINEER
+
+
+def test_handshakes_that_never_come_hold_up_nobody_and_end(caplog: pytest.LogCaptureFixture) -> None:
+    with device_with(guarded(handshake_timeout_s=3.0)) as (_, server), ExitStack() as silent:
+        lines = [silent.enter_context(socket.create_connection(("127.0.0.1", server.port))) for _ in range(20)]
+        lines[0].sendall(b"\x16\x03\x01")  # one begins, and stops
+        start_s = time.monotonic()
+        driver = driver_to(server, tls("daemon"))
+        driver.open()
+        for _ in range(20):
+            driver.exchange(PUSH_PA)
+        assert time.monotonic() - start_s < 2.7, "it did not wait for them"
+        for line in lines:
+            line.settimeout(10)
+            assert line.recv(1) == b""
+        assert refusals(caplog, 20) == 20 * ["no TLS handshake in time"]
+        driver.exchange(PUSH_PA)
+        driver.close()
+
+
+def test_a_device_that_accepts_and_says_nothing_costs_one_handshake_timeout() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        config = ModbusTcpDevice(port=deaf.getsockname()[1], tls=tls("daemon", handshake_timeout_s=0.1))
+        start_s = time.monotonic()
+        with pytest.raises(NoConnection, match="no TLS handshake in time"):
+            ModbusTcpDriver(config).open()
+        assert time.monotonic() - start_s < 2
+
+
+@pytest.mark.parametrize(
+    ("name", "update", "said"),
+    [
+        ("gone.pem", {"authority": "gone.pem"}, "cannot be read: No such file"),
+        ("text.pem", {"authority": "text.pem"}, "holds no certificate in PEM form"),
+        ("text.pem", {"certificate": "text.pem"}, "are no PEM pair without password"),
+        ("daemon.pem", {"key": "observer.key"}, "is not the certificate of "),
+        ("daemon.pem", {"key": "locked.key"}, "are no PEM pair without password"),
+    ],
+)
+def test_files_that_do_not_fit_are_one_line_that_names_them(
+    tmp_path: Path, name: str, update: dict[str, str], said: str
+) -> None:
+    from cryptography.hazmat.primitives import serialization
+
+    (tmp_path / "text.pem").write_text("hello\n")
+    key = serialization.load_pem_private_key((folder() / "daemon.key").read_bytes(), None)
+    locked = key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.BestAvailableEncryption(b"secret")
+    )
+    (tmp_path / "locked.key").write_bytes(locked)
+    for each in ("authority.pem", "daemon.pem", "daemon.key", "observer.key"):
+        (tmp_path / each).write_bytes((folder() / each).read_bytes())
+    table = tls("daemon").model_dump() | {"authority": tmp_path / "authority.pem", "key": tmp_path / "daemon.key"}
+    table |= {"certificate": tmp_path / "daemon.pem"} | {kind: tmp_path / file for kind, file in update.items()}
+    for use in (client_context, lambda tls: Guard(tls, lambda _: Role.OPERATOR)):
+        with pytest.raises(InputError) as caught:
+            use(Tls(**table))
+        assert str(caught.value).startswith(f"{tmp_path / name}: ")
+        assert said in str(caught.value)
+        assert "\n" not in str(caught.value)
