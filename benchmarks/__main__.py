@@ -1,12 +1,15 @@
 """`python -m benchmarks`: every benchmark that takes seconds; `benchmarks.memory` takes minutes and runs alone."""
 
-from benchmarks import bus, cycle, estimation, physics, startup
+from benchmarks import bus, can, cycle, estimation, physics, rtu, startup, tls
 
 for name, benchmark in {
     "physics": physics.report,
     "estimation": estimation.report,
     "bus": bus.report,
     "cycle": cycle.report,
+    "can": can.report,
+    "rtu": rtu.report,
+    "tls": tls.report,
     "start-up": startup.report,
 }.items():
     print(f"== {name}", *benchmark(), "", sep="\n", flush=True)

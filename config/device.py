@@ -15,6 +15,8 @@ from pydantic import AfterValidator, Field, model_validator
 from pyModbusTCP.utils import valid_host
 
 from config.loading import Port, Schema
+from config.rtu import RtuUnit, SerialPort
+from config.tls import Tls
 from config.wire import Format, Layout, WireType, WordOrder
 
 MOST_REGISTERS = 125
@@ -186,17 +188,38 @@ def _host(host: str) -> str:
     return host
 
 
-class ModbusTcpDevice(Schema):
-    """Table `[device]` of the daemon: a device on Modbus TCP."""
+class Device(Schema):
+    """What table `[device]` says of a device on any bus: a bus's own schema adds how to reach it."""
 
-    bus: Literal["modbus"] = "modbus"
-    host: Annotated[str, AfterValidator(_host)] = "127.0.0.1"
-    port: Port = 5020
-    unit: Annotated[int, Field(ge=0, le=255)] = 1
+    bus: str
+
+    @property
+    def line(self) -> str | None:
+        """The line that only one may use at a time, if the device hangs on one; devices of one line take turns."""
+        return None
+
+    @property
+    def turn_s(self) -> float:
+        """The longest that it may keep others from the line: until a reply that does not come is given up."""
+        return 0.0
+
+    def untouched(self) -> Self:
+        """Return the same device as one who only watches wants it: opening it sets nothing in it."""
+        return self
+
+
+class ModbusDevice(Device):
+    """What table `[device]` says of a device on any Modbus."""
+
     reply_timeout_s: Annotated[float, Field(gt=0, le=60)] = 0.05
     communication_timeout_s: Annotated[float, Field(ge=0)] = 1.0
     communication_action: ActionName = "hold"
     map: ModbusMap = SIMULATED_MAP
+
+    def untouched(self) -> Self:
+        """Return the device without the places of its communication time-out, which a watcher leaves alone."""
+        places = self.map.model_copy(update={"communication_timeout_s": None, "communication_action": None})
+        return self.model_copy(update={"map": places})
 
     @model_validator(mode="after")
     def _timeout_survives_the_registers(self) -> Self:
@@ -209,5 +232,46 @@ class ModbusTcpDevice(Schema):
             raise ValueError(
                 f"communication_timeout_s: {self.communication_timeout_s} s becomes {place.value(raw):g} s "
                 f"in the device's {place.type} of scale {place.scale:g}"
+            )
+        return self
+
+
+class ModbusTcpDevice(ModbusDevice):
+    """Table `[device]` of the daemon: a device on Modbus TCP."""
+
+    bus: Literal["modbus"] = "modbus"
+    host: Annotated[str, AfterValidator(_host)] = "127.0.0.1"
+    port: Port = 5020
+    unit: Annotated[int, Field(ge=0, le=255)] = 1
+    tls: Tls | None = None
+    """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
+
+
+class ModbusRtuDevice(ModbusDevice):
+    """Table `[device]` of the daemon: a device on a serial line, on Modbus RTU."""
+
+    bus: Literal["rtu"] = "rtu"
+    serial: SerialPort
+    unit: RtuUnit = 1
+
+    @property
+    def line(self) -> str:
+        """The serial line."""
+        return self.serial.path
+
+    @property
+    def turn_s(self) -> float:
+        """Silence, the longest request (function 23: 13 bytes and the command), and the reply's time-out."""
+        request = 13 + 2 * self.map.command_pa.format.words
+        return self.serial.silence_s + request * self.serial.character_s + self.reply_timeout_s
+
+    @model_validator(mode="after")
+    def _a_reply_fits_into_its_timeout(self) -> Self:
+        words = layout(self.map.sampled.values()).words
+        least_s = self.serial.silence_s + (2 * words + 5) * self.serial.character_s
+        if self.reply_timeout_s <= least_s:
+            raise ValueError(
+                f"reply_timeout_s must be more than {least_s:.4f} s, which a measurement takes "
+                f"at {self.serial.baud} baud, it is {self.reply_timeout_s:g} s"
             )
         return self

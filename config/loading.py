@@ -5,7 +5,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+)
 
 from config.errors import InputError
 
@@ -24,7 +33,25 @@ NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 
+
+def _beside(path: Path, info: ValidationInfo) -> Path:
+    return Path((info.context or {}).get("folder", ""), path)
+
+
+NearFile = Annotated[Path, AfterValidator(_beside)]
+"""A path that counts from the folder of the file it is written in."""
+
 S = TypeVar("S", bound=Schema)
+
+
+def chosen_by(key: str, default: str) -> Discriminator:
+    """Let a key of a table choose among schemas, each annotated with its `Tag`; without the key, the default."""
+
+    def chosen(table: Any) -> Any:
+        return table.get(key, default) if isinstance(table, dict) else getattr(table, key, default)
+
+    chosen.__name__ = key
+    return Discriminator(chosen)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -44,14 +71,14 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from None
 
 
-def validated(schema: type[S], tables: dict[str, Any], source: str) -> S:
-    """Hold tables against a schema.
+def validated(schema: type[S], tables: dict[str, Any], source: str, folder: Path | None = None) -> S:
+    """Hold tables against a schema; paths in them count from the folder, if one is given.
 
     Raises:
         InputError: the first fault, by key, value and what is allowed; how many more there are.
     """
     try:
-        return schema.model_validate(tables)
+        return schema.model_validate(tables, context={"folder": folder} if folder else None)
     except ValidationError as error:
         raise InputError(source, _one_line(schema, error)) from None
 
@@ -62,34 +89,76 @@ def load(schema: type[S], path: Path) -> S:
     Raises:
         InputError: as `read_toml` and `validated`.
     """
-    return validated(schema, read_toml(path), str(path))
+    return validated(schema, read_toml(path), str(path), path.parent)
 
 
 def _one_line(schema: type[BaseModel], error: ValidationError) -> str:
     faults = error.errors(include_url=False, include_context=False)
     # An unknown key is most often the cause of the missing one beside it: name it first.
     fault = min(faults, key=lambda each: each["type"] != "extra_forbidden")
-    key = ".".join(str(part) for part in fault["loc"]) or "file"
+    path = _keys(schema, fault["loc"])
+    key = ".".join(path) or "file"
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     if fault["type"] == "extra_forbidden":
         allowed = ", ".join(_keys_beside(schema, fault["loc"]))
         return f"{key}: unknown key; allowed here: {allowed}{more}"
     if fault["type"] == "missing":
         return f"{key}: is required and missing{more}"
+    if fault["type"] == "union_tag_invalid":
+        return f"{key}.{_choice(error, fault['loc'])}{more}"
     message = fault["msg"].removeprefix("Value error, ")
     # A fault of a whole table says itself what is wrong in it.
     got = "" if isinstance(fault["input"], dict) else f", got {fault['input']!r}"
     return f"{key}: {message}{got}{more}"
 
 
+def _choice(error: ValidationError, location: tuple[int | str, ...]) -> str:
+    """Say which key chose a schema that is none, and what is allowed."""
+    context = next(each["ctx"] for each in error.errors(include_url=False) if each["loc"] == location)
+    return f"{context['discriminator'].rstrip('()')}: allowed are {context['expected_tags']}, got {context['tag']!r}"
+
+
+def _keys(schema: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Return a location as the keys in the file: without the tags that say which of several schemas was chosen."""
+    here: Any = schema
+    keys = []
+    for part in location:
+        if part in (choices := _choices(here)):
+            here = choices[part]
+            continue
+        keys.append(str(part))
+        if isinstance(part, str):
+            here = _within(here, part)
+    return keys
+
+
 def _keys_beside(schema: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
     """Return the keys allowed in the table in which an unknown key stands."""
     here: Any = schema
     for part in location[:-1]:
-        fields = getattr(here, "model_fields", {})
-        if isinstance(part, str) and part in fields:
-            here = _table_type(fields[part].annotation)
+        if part in (choices := _choices(here)):
+            here = choices[part]
+        elif isinstance(part, str):
+            here = _within(here, part)
     return sorted(getattr(here, "model_fields", {}))
+
+
+def _within(here: Any, key: str) -> Any:
+    """Return what stands at a key of a schema: a schema, several to choose from, or something else."""
+    field = getattr(here, "model_fields", {}).get(key)
+    if field is None:
+        return None
+    return field.annotation if _choices(field.annotation) else _table_type(field.annotation)
+
+
+def _choices(annotation: Any) -> dict[Any, Any]:
+    """Return the schemas to choose from, by tag; none where there is no choice."""
+    return {
+        tag.tag: each.__origin__
+        for each in getattr(annotation, "__args__", ())
+        for tag in getattr(each, "__metadata__", ())
+        if isinstance(tag, Tag)
+    }
 
 
 def _table_type(annotation: Any) -> Any:

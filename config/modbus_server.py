@@ -1,7 +1,7 @@
 """A Modbus TCP server of 16-bit registers, for both towers: the simulated slave and the supervisory registers.
 
-pyModbusTCP keeps the connections and their frames (a thread per client, so that a slow or dropped one holds up
-nobody); what a request means is answered here, as the Modbus Application Protocol V1.1b3 says:
+Each client has a thread, so that a slow or dropped one holds up nobody (`config.modbus_connection` has the frames);
+what a request means is answered here, as the Modbus Application Protocol V1.1b3 says:
 
     function                  count        refused, and nothing changed
     3, 4   read               1 to 125     1 other functions
@@ -11,32 +11,44 @@ nobody); what a request means is answered here, as the Modbus Application Protoc
                               1 to 125     6 a value that cannot be taken now
                                            11 another unit (see below)
 
-One request at a time holds the lock: it is all or nothing, and what it reads is of one moment. A client may read
+One request at a time holds a unit's lock: it is all or nothing, and what it reads is of one moment. A client may read
 any part of a value; only both words from one request belong together.
 
 On TCP the address of the device is its IP address: unit 0 and 255 mean "this device", as does its own number.
-Any other unit is a device behind a gateway that is not there: exception 11, so that a wrong number shows at once.
+Any other unit is a device behind a gateway that is not there: exception 11, so that a wrong number shows at once. So
+are 0 and 255 where several units are behind the port: there is no one device that they could mean.
+
+When `MOST_CLIENTS` are connected, a new one takes the place of the one that has asked for nothing for longest, if that
+is at least `UNUSED_S`; otherwise it is turned away. So clients that vanished without a word lock out nobody.
 """
 
 import logging
 import socket
 import struct
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from enum import IntEnum
 from socketserver import BaseServer, ThreadingTCPServer
-from threading import Event, Lock, Thread
+from threading import Lock, Thread
 from typing import Any, Literal, Protocol
-
-from pyModbusTCP.server import ModbusServer
 
 from config.device import MOST_REGISTERS
 from config.errors import InputError
+from config.modbus_connection import Connection, place
+from config.tls import NOBODY, Guard, Identity, why
 
 log = logging.getLogger(__name__)
 
 Table = Literal["holding", "input"]
-MOST_CLIENTS = 32
+MOST_CLIENTS = 64
+UNUSED_S = 60.0
+SEND_BUFFER_BYTES = 1 << 15
+"""Answers that wait for a client that does not read; the system would keep megabytes for each."""
+KEEPALIVE = {"TCP_KEEPIDLE": 30, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 60_000}
+"""Options by which a client that vanished is noticed within a minute, not two hours; s, s, 1, ms."""
+HEARING_S, MOST_LAST_WORDS = 0.5, 8
+"""How long, and for how many pieces, a client that is turned away is still listened to."""
 THIS_DEVICE = frozenset((0, 255))
 """Unit numbers that mean the device at this address, besides its own."""
 
@@ -80,23 +92,17 @@ class Registers(Protocol):
         ...
 
 
-class RegisterServer:
-    """Serves registers on Modbus TCP (IPv4) from `start` to `stop`.
+class RegisterAnswers:
+    """What a request for registers means, whatever it travels in.
 
     Args:
         registers: what is served.
-        host: the address to listen on.
-        port: the TCP port; 0 takes any free one, `port` says which.
-        unit: the server's own unit number.
     """
 
-    def __init__(self, registers: Registers, host: str, port: int, unit: int) -> None:
+    def __init__(self, registers: Registers) -> None:
         self.lock = Lock()
-        """Held while a request is answered; hold it to change the registers from outside."""
+        """Held while a request is answered; hold it to change the registers from outside. Each unit has its own."""
         self._registers = registers
-        self._address = (host, port)
-        self._units = THIS_DEVICE | {unit}
-        self._listener: _Listener | None = None
         self._functions: dict[int, Callable[[bytes, str], bytes]] = {
             3: self._read,
             4: self._read,
@@ -104,30 +110,6 @@ class RegisterServer:
             16: self._write,
             23: self._write_then_read,
         }
-
-    def start(self) -> None:
-        """Listen, and answer from threads of its own.
-
-        Raises:
-            InputError: the address or the port cannot be had.
-        """
-        try:
-            self._listener = _Listener(self._address, self._serve)
-        except (OSError, OverflowError) as error:
-            reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise InputError("{}:{}".format(*self._address), f"cannot listen there: {reason}") from None
-        Thread(target=self._listener.serve_forever, args=(0.05,), daemon=True, name="modbus listener").start()
-
-    @property
-    def port(self) -> int:
-        """The TCP port it listens on."""
-        return self._listener.port if self._listener else self._address[1]
-
-    def stop(self) -> None:
-        """Close the port and every connection."""
-        if self._listener:
-            self._listener.stop()
-            self._listener = None
 
     def answer(self, pdu: bytes, peer: str) -> bytes:
         """Return the answer to one request, without the frame round either. Never raises."""
@@ -143,15 +125,6 @@ class RegisterServer:
             log.exception("request %s of %s failed", pdu.hex(), peer)
             code = ExceptionCode.DEVICE_FAILURE
         return bytes((function | 0x80, code))
-
-    def _serve(self, session: Any) -> None:
-        """Answer the request of a pyModbusTCP session."""
-        request = session.request
-        if request.mbap.unit_id in self._units:
-            peer = f"{session.client.address}:{session.client.port}"
-            session.response.pdu.raw = self.answer(request.pdu.raw, peer)
-        else:
-            session.response.pdu.raw = bytes((request.pdu.raw[0] | 0x80, ExceptionCode.NO_SUCH_UNIT))
 
     def _read(self, pdu: bytes, _peer: str) -> bytes:
         function, address, count = _unpack(">BHH", pdu)
@@ -183,29 +156,106 @@ class RegisterServer:
         return struct.pack(f">BB{count}H", function, 2 * count, *words)
 
 
-class _Listener(ThreadingTCPServer):
-    """The listening socket and its connections, each handled by pyModbusTCP.
+class RegisterServer(RegisterAnswers):
+    """Serves registers on Modbus TCP from `start` to `stop`.
 
-    Its handler asks the server it is given for two things: `evt_running`, and `engine` that answers a session.
+    Args:
+        registers: what is served.
+        host: the address to listen on; an IPv6 address where that is meant.
+        port: the TCP port; 0 takes any free one, `port` says which.
+        unit: the server's own unit number.
+        guard: secures every connection with TLS, and says what each client may do; None serves all in the clear.
+        others: the registers of other units behind the same port. With them "this device" is nobody's number.
     """
+
+    def __init__(
+        self,
+        registers: Registers,
+        host: str,
+        port: int,
+        unit: int,
+        guard: Guard | None = None,
+        others: Mapping[int, Registers] | None = None,
+    ) -> None:
+        super().__init__(registers)
+        self._address = (host, port)
+        self._units: dict[int, RegisterAnswers] = {unit: self}
+        if others:
+            self._units |= {number: RegisterAnswers(each) for number, each in others.items()}
+        else:
+            self._units |= dict.fromkeys(THIS_DEVICE, self)
+        self._guard = guard
+        self._listener: _Listener | None = None
+
+    def start(self) -> None:
+        """Listen, and answer from threads of its own.
+
+        Raises:
+            InputError: the address or the port cannot be had.
+        """
+        try:
+            self._listener = _Listener(self._address, self._reply, self._guard)
+        except (OSError, OverflowError) as error:
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            raise InputError(place(self._address), f"cannot listen there: {reason}") from None
+        Thread(target=self._listener.serve_forever, args=(0.05,), daemon=True, name="modbus listener").start()
+
+    @property
+    def port(self) -> int:
+        """The TCP port it listens on."""
+        return self._listener.port if self._listener else self._address[1]
+
+    @property
+    def address(self) -> str:
+        """Where it listens, `host:port`."""
+        return place((self._address[0], self.port))
+
+    def stop(self) -> None:
+        """Close the port and every connection."""
+        if self._listener:
+            self._listener.stop()
+            self._listener = None
+
+    def _reply(self, number: int, pdu: bytes, peer: str) -> bytes:
+        """Return what a unit answers to a client's request."""
+        unit = self._units.get(number)
+        if unit is None:
+            return bytes((pdu[0] | 0x80, ExceptionCode.NO_SUCH_UNIT))
+        return unit.answer(pdu, peer) if self._guard is None else self._permitted(self._guard, unit, pdu, peer)
+
+    def _permitted(self, guard: Guard, unit: RegisterAnswers, pdu: bytes, peer: str) -> bytes:
+        """Answer what the client's role permits; refuse the rest, as Modbus/TCP Security has it."""
+        identity = self._listener.identities[peer] if self._listener else NOBODY
+        if objection := guard.objection(identity, pdu):
+            log.warning("%s at %s refused: %s", identity, peer, objection)
+            return bytes((pdu[0] | 0x80, ExceptionCode.ILLEGAL_FUNCTION))
+        return unit.answer(pdu, f"{identity} at {peer}")
+
+
+class _Listener(ThreadingTCPServer):
+    """The listening socket and its connections, of which it is the `Host`."""
 
     allow_reuse_address = True
     daemon_threads = True
     request_queue_size = 128
 
-    def __init__(self, address: tuple[str, int], engine: Callable[[Any], None]) -> None:
-        self.engine = engine
-        self.evt_running = Event()
+    def __init__(
+        self, address: tuple[str, int], answer: Callable[[int, bytes, str], bytes], guard: Guard | None
+    ) -> None:
+        self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+        self.answer = answer
+        self.identities: dict[str, Identity] = {}
+        """Who is at the other end of each secured connection, by its `host:port`."""
+        self._guard = guard
         self._connections: dict[Any, str] = {}
-        super().__init__(address, ModbusServer.ModbusService)
-        self.evt_running.set()
+        self._used_s: dict[str, float] = {}
+        super().__init__(address, Connection)
 
     @property
     def port(self) -> int:
         return int(self.server_address[1])
 
     def stop(self) -> None:
-        self.evt_running.clear()
         self.shutdown()
         self.server_close()
         for connection in list(self._connections):
@@ -214,19 +264,60 @@ class _Listener(ThreadingTCPServer):
     def get_request(self) -> tuple[socket.socket, Any]:
         connection, address = super().get_request()
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for option, value in KEEPALIVE.items():
+            if hasattr(socket, option):  # not every system has all of them
+                connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
         return connection, address
 
     def verify_request(self, _request: Any, client_address: Any) -> bool:
-        room = len(self._connections) < MOST_CLIENTS
+        room = len(self._connections) < MOST_CLIENTS or self._make_room()
         if not room:
-            log.warning("%s:%s refused: %d clients are connected already", *client_address, MOST_CLIENTS)
+            log.warning("%s refused: %d clients are connected already", place(client_address), MOST_CLIENTS)
         return room
 
+    def is_used(self, peer: str) -> None:
+        """Note when a client last asked for something."""
+        self._used_s[peer] = time.monotonic()
+
+    def is_gone(self, peer: str) -> None:
+        """Forget a client."""
+        self._used_s.pop(peer, None)
+
+    def _make_room(self) -> bool:
+        """End the connection that is unused for longest, if any is for long enough; return whether."""
+        now_s = time.monotonic()
+        unused_s = {each: now_s - self._used_s.get(peer, now_s) for each, peer in list(self._connections.items())}
+        idlest = max(unused_s, key=unused_s.__getitem__)
+        if unused_s[idlest] < UNUSED_S:
+            return False
+        log.warning("%s gives way: it asked for nothing for %.0f s", self._connections.get(idlest), unused_s[idlest])
+        _hang_up(idlest)
+        return True
+
     def process_request(self, request: Any, client_address: Any) -> None:
-        self._connections[request] = "{}:{}".format(*client_address)
+        self._connections[request] = place(client_address)
         log.debug("%s connected", self._connections[request])
         super().process_request(request, client_address)
+
+    def finish_request(self, request: Any, client_address: Any) -> None:
+        """Handle a connection in its own thread, secured if that is asked for: its handshake holds up nobody."""
+        if self._guard is None:
+            super().finish_request(request, client_address)
+            return
+        peer = self._connections.pop(request)
+        with self._guard.wrapped(request) as secured:
+            self._connections[secured] = peer  # from here on the other is an empty shell
+            try:
+                self.identities[peer] = self._guard.shaken(secured)
+                super().finish_request(secured, client_address)
+            except OSError as error:
+                log.warning("%s refused: %s", peer, why(error))
+                _let_hear(secured)
+            finally:
+                self.identities.pop(peer, None)
+                del self._connections[secured]
 
     def shutdown_request(self, request: Any) -> None:
         if peer := self._connections.pop(request, None):
@@ -237,10 +328,21 @@ class _Listener(ThreadingTCPServer):
         log.exception("connection of %s failed", client_address)
 
 
+def _let_hear(connection: socket.socket) -> None:
+    """Let the other end read why, before the close that would drop it: its own words still under way reset the line."""
+    with suppress(OSError):
+        socket.socket.shutdown(connection, socket.SHUT_WR)
+        connection.settimeout(HEARING_S)
+        for _ in range(MOST_LAST_WORDS):
+            if not socket.socket.recv(connection, 4096):
+                break
+
+
 def _hang_up(connection: socket.socket) -> None:
     """End a connection that another thread waits on."""
     with suppress(OSError):  # it may be gone already
-        connection.shutdown(socket.SHUT_RDWR)
+        # Of the plain socket: that of a secured one drops its TLS state under the thread that waits on it.
+        socket.socket.shutdown(connection, socket.SHUT_RDWR)
 
 
 def _unpack(layout: str, head: bytes) -> tuple[int, ...]:

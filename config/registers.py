@@ -10,6 +10,7 @@ from enum import IntEnum
 from typing import Literal
 
 from config.errors import InputError
+from config.roles import Role
 from config.wire import Format, WireType
 
 MAP_VERSION = 1
@@ -58,6 +59,36 @@ class Why(IntEnum):
     EXCITATION_TOO_LONG = 6
     AMPLITUDE_ZERO = 7
     LAW_BEYOND_LIMITS = 8
+    STUCK = 9
+    TRIM_ENDED = 10
+
+
+class Namur(IntEnum):
+    """Status of a device by NAMUR NE 107, best first."""
+
+    GOOD = 0
+    MAINTENANCE_REQUIRED = 1
+    OUT_OF_SPECIFICATION = 2
+    FUNCTION_CHECK = 3
+    FAILURE = 4
+
+
+class HealthCause(IntEnum):
+    """What a valve's NE 107 status rests on."""
+
+    NONE = 0
+    FAULT = 1
+    NOT_AUTOMATIC = 2
+    EXCITED = 3
+    NOT_IDENTIFIED = 4
+    DCS_SILENT = 5
+    BEYOND_LIMITS = 6
+    STUCK = 7
+    FRICTION_HIGH = 8
+    FRICTION_LOW = 9
+    STICTION = 10
+    TRAVEL = 11
+    REVERSALS = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +103,8 @@ class Register:
     access: Literal["r", "rw"] = "r"
     minimum: float | None = None
     maximum: float | None = None
+    writer: Role = Role.ENGINEER
+    """Who may write it on a secured connection."""
 
     @property
     def format(self) -> Format:
@@ -95,21 +128,35 @@ class Register:
         return f"{self.name}: allowed is {self.minimum:g} to {self.maximum:g} {self.unit}, got {value:g}"
 
 
-def _writable(name: str, address: int, type_: WireType, unit: str, low: float, high: float, text: str) -> Register:
-    return Register(name, address, type_, unit, text, "rw", low, high)
+def _writable(
+    name: str,
+    address: int,
+    type_: WireType,
+    unit: str,
+    low: float,
+    high: float,
+    text: str,
+    writer: Role = Role.ENGINEER,
+) -> Register:
+    return Register(name, address, type_, unit, text, "rw", low, high, writer)
+
+
+def _operable(name: str, address: int, type_: WireType, unit: str, low: float, high: float, text: str) -> Register:
+    """Return a register that operators write, too."""
+    return _writable(name, address, type_, unit, low, high, text, Role.OPERATOR)
 
 
 _LARGEST_PA = 2e6
 
 COMMANDS = (
-    _writable("reference", 0, "float32", "p.u.", 0.0, 1.0, "stem position asked for"),
-    _writable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
+    _operable("reference", 0, "float32", "p.u.", 0.0, 1.0, "stem position asked for"),
+    _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
     _writable("mode", 3, "uint16", "1", 0, 2, "0 hold, 1 manual, 2 automatic; falls to hold on a fault"),
     _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3)"),
     _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
     _writable("eta_3", 6, "uint16", "1", 0, 1, "0 switches the friction estimator on"),
-    _writable("acknowledge", 7, "uint16", "1", 0, 1, "write 1: acknowledges a fault whose cause is gone; reads 0"),
-    _writable("heartbeat", 8, "uint16", "1", 0, 65535, "the DCS writes it to show that it lives"),
+    _operable("acknowledge", 7, "uint16", "1", 0, 1, "write 1: acknowledges a fault whose cause is gone; reads 0"),
+    _operable("heartbeat", 8, "uint16", "1", 0, 65535, "the DCS writes it to show that it lives"),
     _writable("manual_pressure", 9, "float32", "Pa", 0.0, _LARGEST_PA, "the command in manual mode"),
     _writable("alpha", 11, "float32", "Pa", 0.0, _LARGEST_PA, "excitation, constant; 0: what keeps the stem"),
     _writable("beta", 13, "float32", "Pa", 0.0, _LARGEST_PA, "excitation, amplitude of the sine"),
@@ -133,7 +180,8 @@ STATUS = (
         "1",
         "why not as asked: 0 it is, 1 not automatic, 2 no estimates, 3 no move asked, 4 alpha below break-away, "
         "5 excitation beyond pressure limits, 6 excitation too long, 7 amplitude is zero, "
-        "8 the law asks for a pressure beyond the limits",
+        "8 the law asks for a pressure beyond the limits, 9 stuck: the strongest pulse allowed does not move the stem, "
+        "10 the trim ended outside its dead band",
     ),
     Register("position", 104, "float32", "p.u.", "stem position"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
@@ -204,9 +252,47 @@ IDENTITY = (
     Register("float_test", 408, "float32", "1", f"constant {FLOAT_TEST:g}: tells the word order"),
 )
 
-REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY)
+HEALTH = (
+    _writable(
+        "health_baseline", 500, "uint16", "1", 0, 1, "write 1: the friction now is the baseline from now on; reads 0"
+    ),
+    _writable(
+        "health_reset", 501, "uint16", "1", 0, 1, "write 1: travel, reversals and stiction index start anew; reads 0"
+    ),
+    Register(
+        "ne107", 502, "uint16", "1", "NAMUR NE 107: 0 good, 1 M maintenance, 2 S specification, 3 C check, 4 F failure"
+    ),
+    Register(
+        "ne107_cause",
+        503,
+        "uint16",
+        "1",
+        "what decides ne107: 0 nothing, 1 fault (see there), 2 not automatic, 3 excited, 4 not identified, "
+        "5 DCS silent, 6 the law asks for a pressure beyond the limits, 7 stuck, 8 friction high: packing tight, "
+        "9 friction low: packing leaks, 10 stiction, 11 travel, 12 reversals",
+    ),
+    Register("ne107_causes", 504, "uint16", "1", "all causes that hold: bit n - 1 is cause n of ne107_cause"),
+    Register("friction", 506, "float32", "Pa", "Coulomb friction F_c / A as the law uses it; NaN: none yet"),
+    Register("friction_baseline", 508, "float32", "Pa", "what it was when it was called normal; NaN: never"),
+    Register("friction_ratio", 510, "float32", "1", "friction over its baseline; NaN: one is missing"),
+    Register("travel", 512, "float32", "p.u.", "travel accumulated, in strokes"),
+    Register("stem_cycles", 514, "uint32", "1", "full strokes up and down that the travel amounts to"),
+    Register("reversals", 516, "uint32", "1", "how often the stem turned round"),
+    Register("stiction_index", 518, "float32", "1", "part of the last moves asked for that the stem did not make"),
+    Register("moves_judged", 520, "uint32", "1", "moves behind the stiction index"),
+)
+
+REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH)
 
 BY_NAME = {register.name: register for register in REGISTERS}
+
+WRITER_AT = {
+    address: register.writer
+    for register in REGISTERS
+    if register.access == "rw"
+    for address in range(register.address, register.end)
+}
+"""Who may write each word that may be written."""
 
 SIZE = max(register.end for register in REGISTERS)
 """Addresses from 0 to here (exclusive) may be read; those that hold nothing read 0."""

@@ -3,21 +3,49 @@
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, Tag, model_validator
 
+from config.canopen import CanBus
 from config.device import ActionName
 from config.errors import InputError
-from config.loading import NonNegative, Port, Positive, Schema, load
+from config.loading import NonNegative, Port, Positive, Schema, chosen_by, load
+from config.rtu import RtuUnit, SerialPort
+from config.tls import Tls
 from config.valve import shipped_valve
 
 
-class SlaveBus(Schema):
-    """Table `[bus]`: where the slave listens."""
+class ModbusTcpBus(Schema):
+    """Table `[bus]`: where the slave listens on Modbus TCP."""
 
     kind: Literal["modbus"] = "modbus"
     host: str = "127.0.0.1"
     port: Port = 5020
     unit: Annotated[int, Field(ge=1, le=247)] = 1
+    tls: Tls | None = None
+    """Modbus/TCP Security in place of Modbus TCP; an operator may write, an observer read."""
+
+
+class ModbusRtuBus(Schema):
+    """Table `[bus]`: the serial line that the slave is on, on Modbus RTU."""
+
+    kind: Literal["rtu"] = "rtu"
+    serial: SerialPort
+    unit: RtuUnit = 1
+
+
+class CanopenBus(CanBus):
+    """Table `[bus]`: the CAN bus on which the slave is a CANopen node."""
+
+    kind: Literal["canopen"] = "canopen"
+
+
+AnyBus = Annotated[
+    Annotated[ModbusTcpBus, Tag("modbus")]
+    | Annotated[ModbusRtuBus, Tag("rtu")]
+    | Annotated[CanopenBus, Tag("canopen")],
+    chosen_by("kind", "modbus"),
+]
+"""A slave's place on any bus; `kind` says which."""
 
 
 class SlaveClock(Schema):
@@ -92,7 +120,7 @@ class SlaveFile(Schema):
     """A whole slave file. `valve` is a path from this file's folder, or the name of a shipped valve."""
 
     valve: str = "seed"
-    bus: SlaveBus = SlaveBus()
+    bus: AnyBus = ModbusTcpBus()
     clock: SlaveClock = SlaveClock()
     sensor: Sensor = Sensor()
     initial: Initial = Initial()

@@ -70,12 +70,13 @@ class ValveFile(Schema):
     effect: tuple[EffectTable, ...] = ()
 
 
-def load_valve(path: Path) -> ValveFile:
+def load_valve(path: Path | str) -> ValveFile:
     """Read a valve file; the paths of own effects in it become absolute.
 
     Raises:
         InputError: names file, key, value and what is allowed.
     """
+    path = Path(path)
     file = load(ValveFile, path)
     return file.model_copy(update={"effect": tuple(each.seen_from(path.parent) for each in file.effect)})
 

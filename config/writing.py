@@ -1,10 +1,27 @@
 """Writes a valve file, the inverse of `config.valve.load_valve`."""
 
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from config.valve import ValveFile
+from config.errors import InputError
+from config.valve import EffectTable, ValveFile
+
+
+def write_valve(path: Path, file: ValveFile, remarks: Sequence[str] = ()) -> None:
+    """Write a valve file, own effects named by their paths as seen from its folder; remarks become comments.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    beside = file.model_copy(update={"effect": tuple(_seen_from(path.parent, each) for each in file.effect)})
+    text = "".join(f"# {remark}\n" for remark in remarks) + valve_toml(beside)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 
 
 def valve_toml(file: ValveFile) -> str:
@@ -17,3 +34,10 @@ def valve_toml(file: ValveFile) -> str:
 def _lines(table: Mapping[str, Any]) -> str:
     # A JSON string or number is a TOML one.
     return "".join(f"{key} = {json.dumps(value)}\n" for key, value in table.items())
+
+
+def _seen_from(folder: Path, table: EffectTable) -> EffectTable:
+    """Return the table with an own effect's path, as seen from here, as seen from a folder."""
+    if not table.name.endswith(".py"):
+        return table
+    return table.model_copy(update={"name": Path(os.path.relpath(table.name, folder)).as_posix()})

@@ -8,15 +8,16 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
-from pyModbusTCP.client import ModbusClient
-
 from config.device import MOST_REGISTERS
 from config.errors import InputError, Unfulfilled
+from config.modbus_client import modbus_client, reason
 from config.registers import Fault, Register, Why, register_named
+from config.tls import Tls
 from positioner.control.states import State
 from positioner.estimation.estimate import Reason
 
 POLL_S = 0.05
+CYCLES_WRAP = 1 << 32
 
 REFUSALS = (
     Why.NOT_AUTOMATIC,
@@ -33,15 +34,20 @@ class DcsError(Unfulfilled):
 
 
 class Dcs:
-    """A connection to a daemon's supervisory server; used as a context."""
+    """A connection to a daemon's supervisory server, on TLS where that is given; used as a context.
 
-    def __init__(self, host: str, port: int, unit: int = 1, timeout_s: float = 2.0) -> None:
+    Raises:
+        InputError: a file of `tls` that is not there or does not fit.
+    """
+
+    def __init__(self, host: str, port: int, unit: int = 1, timeout_s: float = 2.0, tls: Tls | None = None) -> None:
         self._where = f"{host}:{port}"
-        self._client = ModbusClient(host=host, port=port, unit_id=unit, timeout=timeout_s, auto_open=False)
+        self._client = modbus_client(host, port, unit, timeout_s, tls)
 
     def __enter__(self) -> Self:
         if not self._client.open():
-            raise DcsError(f"{self._where}: no daemon answers there (is `positioner run` running?)")
+            nobody = "no daemon answers there (is `positioner run` running?)"
+            raise DcsError(f"{self._where}: {reason(self._client) or nobody}")
         return self
 
     def __exit__(
@@ -126,7 +132,11 @@ class Dcs:
         """Wait until the estimates the law needs are there; return what went wrong, or None."""
         due_s = time.monotonic() + timeout_s
         begun = False
+        asked = self.get("cycles")
         while time.monotonic() < due_s:
+            if (self.get("cycles") - asked) % CYCLES_WRAP < 2:  # what is served was decided before the asking
+                time.sleep(POLL_S)
+                continue
             now = self.get_all("state", "fault", "why", "progress", "b_over_c_valid", "k_over_c_valid")
             begun = begun or now["state"] == State.S3_IDENTIFY
             show(now["progress"])
@@ -152,7 +162,7 @@ class Dcs:
     def _reason(self) -> str:
         if self._client.last_except:
             return f"exception {self._client.last_except}, {self._client.last_except_as_txt.lower()} (see its log)"
-        return str(self._client.last_error_as_txt)
+        return reason(self._client) or str(self._client.last_error_as_txt)
 
 
 def _neighbours(registers: Sequence[Register]) -> list[Register]:

@@ -128,6 +128,11 @@ class Effect:
         """Where it acts."""
         return tuple(place for place in PLACES if place in self.functions)
 
+    @property
+    def written(self) -> str:
+        """How a valve file names it: an own effect by its path."""
+        return self.name if self.path.parent == SHIPPED else str(self.path)
+
     def off(self, valve: ValveParameters) -> tuple[float, ...]:
         """Return the parameters with which it vanishes from the valve.
 

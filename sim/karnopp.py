@@ -39,7 +39,7 @@ STUCK = 0
 BREAKING = 1
 SLIP = 2
 
-TOLERANCE = 1e-6
+TOLERANCE = 1e-5
 """Of one sub-step on the velocity, relative to |v| + v_s."""
 SHORTEST = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""

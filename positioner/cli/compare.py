@@ -26,20 +26,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
     import json
 
-    from config.errors import InputError
     from config.valve import find_valve, load_valve
+    from positioner.cli.parts.naming import naming
     from workbench.comparison import as_json, compare
 
     valve = load_valve(find_valve(arguments.valve))
-    recording = read_any(arguments, valve.valve.stroke_m)
-    try:
+    recording = read_any(arguments.recording, arguments, valve.valve.stroke_m)
+    with naming({"recording": str(arguments.recording), "valve file": arguments.valve}):
         compared = compare(recording, valve)
-    except InputError as error:
-        if error.source == "recording":
-            raise InputError(str(arguments.recording), error.problem) from None
-        if error.source == "valve file":
-            raise InputError(arguments.valve, error.problem) from None
-        raise
     print("\n".join(_lines(arguments, compared)))
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
@@ -52,6 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(arguments: argparse.Namespace, compared: "Comparison") -> list[str]:
+    from workbench.sentences import shortened
+
     verdict = "adequate" if compared.adequate else "not adequate"
     repeated = "" if compared.repeatability_m is None else f", repeatability {_mm(compared.repeatability_m)}"
     lines = [
@@ -81,7 +77,7 @@ def _lines(arguments: argparse.Namespace, compared: "Comparison") -> list[str]:
             f"  measured pressure: the model's is off by {side.pressure_rms_pa:.4g} Pa rms; run from the measured one, "
             f"the error is {_mm(side.stem_rms_m)} rms"
         )
-    return lines + [f"  recording: {note}" for note in compared.notes]
+    return lines + [f"  recording: {note}" for note in shortened(compared.notes)]
 
 
 def _mm(value_m: float) -> str:

@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from positioner.cli.export import add_export_arguments, read_any
+
 if TYPE_CHECKING:
     from workbench.diagnosis import Diagnosis
     from workbench.preview import Suspect
@@ -19,7 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
-    parser.add_argument("--effects", nargs="+", metavar="NAME", help="what is tried (all that come with the package)")
+    parser.add_argument(
+        "--effects",
+        nargs="+",
+        metavar="NAME",
+        help="what is tried (all that come with the package); an own effect by its .py file",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
     parser.add_argument(
@@ -30,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the input goes that would tell apart what the recordings do not (experiment.csv)",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    add_export_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -37,20 +45,26 @@ def run(arguments: argparse.Namespace) -> int:
     import json
     import time
 
-    from config.recording import Recording
     from config.valve import find_valve, load_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import show
+    from workbench.confounding import untold
     from workbench.diagnosis import diagnose
     from workbench.diagnosis_json import as_json
+    from workbench.imposed import is_imposed
     from workbench.report import Subject, report_diagnosis, require_plotly
 
+    if not arguments.column and all(map(is_imposed, arguments.recordings)):
+        from positioner.cli.parts.forces import run_forces
+
+        return run_forces(arguments)
     if arguments.report is not None:
         require_plotly(arguments.report)
     began_s = time.monotonic()
     valve = load_valve(find_valve(arguments.valve))
-    recordings = [Recording.read(path) for path in arguments.recordings]
-    test = Recording.read(arguments.test) if arguments.test else None
+    stroke_m = valve.valve.stroke_m
+    recordings = [read_any(path, arguments, stroke_m) for path in arguments.recordings]
+    test = read_any(arguments.test, arguments, stroke_m) if arguments.test else None
     named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
     with naming(named):
         diagnosis = diagnose(
@@ -65,6 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
     if diagnosis.experiment:
         diagnosis.experiment.write(arguments.experiment)
     print("\n".join(_lines(diagnosis, arguments.experiment)))
+    for each in untold(diagnosis.split, diagnosis.best.fit.valve):
+        print(f"\nnot told: {each.sentence}")
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
@@ -89,7 +105,7 @@ def _lines(diagnosis: "Diagnosis", path: Path) -> list[str]:
             "",
             f"step {number}: error {1e3 * base.train_rmse_m:.4f} mm rms fitted, {1e3 * base.test_rmse_m:.4f} held out, "
             f"floor {1e3 * diagnosis.split.floor_m:.4f}",
-            f"  {'effect':<20}{'fitted mm':>11}{'held out mm':>13}{'evidence':>10}{'gain':>7}{'std errors':>12}",
+            f"  {'effect':<20}{'fitted mm':>11}{'held out mm':>13}{'typical mm':>12}{'evidence':>10}{'std errors':>12}",
         ]
         for each in step.candidates:
             if each.model is None or each.gain is None:
@@ -99,7 +115,7 @@ def _lines(diagnosis: "Diagnosis", path: Path) -> list[str]:
             said = "accepted" if each.accepted else each.why_not
             lines.append(
                 f"  {each.name:<20}{1e3 * errors.train_rmse_m:>11.4f}{1e3 * errors.test_rmse_m:>13.4f}"
-                f"{found.bic:>10.1f}{found.held_out:>7.0%}{found.standard_errors:>12.1f}  {said}"
+                f"{1e3 * errors.test_block_m:>12.4f}{found.bic:>10.1f}{found.standard_errors:>12.1f}  {said}"
             )
     if diagnosis.experiment:
         lines += [

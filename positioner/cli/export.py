@@ -1,6 +1,7 @@
-"""The arguments with which a command takes a historian's export in place of a recording."""
+"""The arguments with which a command takes a historian's exports in place of recordings."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -9,7 +10,7 @@ if TYPE_CHECKING:
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare them."""
-    export = parser.add_argument_group("a historian's export in place of a recording")
+    export = parser.add_argument_group("historian's exports in place of recordings")
     export.add_argument(
         "--column",
         action="append",
@@ -23,8 +24,8 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read_any(arguments: argparse.Namespace, stroke_m: float) -> "Recording":
-    """Read the recording, or the export if columns are mapped.
+def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float) -> "Recording":
+    """Read a recording, or an export if columns are mapped: all of a command's by the same mapping.
 
     Raises:
         InputError: as `Recording.read` and `read_export`; a range without columns to apply it to.
@@ -37,7 +38,7 @@ def read_any(arguments: argparse.Namespace, stroke_m: float) -> "Recording":
         for name in ("stroke_m", "range_pa"):
             if getattr(arguments, name) is not None:
                 raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
-        return Recording.read(arguments.recording)
+        return Recording.read(path)
     sources = read_mapping(arguments.column)
     range_pa = RANGE_PA if arguments.range_pa is None else tuple(arguments.range_pa)
-    return read_export(arguments.recording, sources, arguments.stroke_m or stroke_m, range_pa)
+    return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa)

@@ -22,12 +22,18 @@ COMMANDS = (
     "map",
     "simulate",
     "play",
+    "estimate",
+    "response",
     "compare",
     "diagnose",
     "extend",
     "reproduce",
     "hide",
+    "certificates",
 )
+
+EXTRAS = {"numba": "sim,plot", "scipy": "sim,plot", "matplotlib": "sim,plot", "cryptography": "tls"}
+"""Which extras of the package bring what a command may miss."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -42,11 +48,11 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:
-        if error.name not in ("numba", "scipy", "matplotlib"):
+        if error.name not in EXTRAS:
             raise
         print(
             f"positioner {arguments.command}: needs {error.name}, which is not installed: "
-            f"pip install 'positioner[sim,plot]'",
+            f"pip install 'positioner[{EXTRAS[error.name]}]'",
             file=sys.stderr,
         )
         return 2

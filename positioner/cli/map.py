@@ -9,7 +9,10 @@ if TYPE_CHECKING:
 HELP = "print the supervisory register map"
 EXAMPLE = "positioner map --format md"
 
-COLUMNS = ("name", "address", "address_from_1", "type", "word_order", "unit", "minimum", "maximum", "access", "text")
+COLUMNS = (
+    *("name", "address", "address_from_1", "type", "word_order", "unit", "minimum", "maximum", "access"),
+    *("writer", "text"),  # the role that may write it on a secured connection
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,6 +46,7 @@ def _row(register: "Register") -> dict[str, object]:
         register.minimum,
         register.maximum,
         register.access,
+        register.writer.name.lower() if register.access == "rw" else "",
         register.text,
     )
     return dict(zip(COLUMNS, values, strict=True))

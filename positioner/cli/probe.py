@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from config.daemon import DaemonFile
     from drivers.boundary import Driver, Reading
 
 HELP = "read the valve once a second: bus rate, age, plausibility; moves nothing"
@@ -17,6 +18,7 @@ BURST = 50
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the daemon's file")
+    parser.add_argument("--valve", help="which of the file's valves, by its name")
     parser.add_argument("--count", type=int, default=0, help="stop after this many lines (0: at Ctrl-C)")
 
 
@@ -29,12 +31,12 @@ def run(arguments: argparse.Namespace) -> int:
     from drivers.boundary import DriverError
     from positioner.control.settings import Settings
 
-    file = load_daemon(arguments.config)
+    file = load_daemon(arguments.config, arguments.valve)
     limits = Settings.of(file).limits
-    driver = watching_driver(arguments.config)
+    driver = watching_driver(file)
     good = False
     try:
-        print(f"holds {driver.open():.1f} Pa; {driver.capabilities}")
+        print(f"{file.valve.name} holds {driver.open():.1f} Pa; {driver.capabilities}")
         for count in itertools.count(1):
             readings, took_s = _burst(driver)
             last = readings[-1]
@@ -44,21 +46,18 @@ def run(arguments: argparse.Namespace) -> int:
                 break
             time.sleep(max(0.0, 1.0 - took_s))
     except DriverError as error:
-        print(f"no reading: {error}")
+        print(f"no reading of {file.valve.name}: {error}")
         return 1
     finally:
         driver.close()
     return 0 if good else 1
 
 
-def watching_driver(config: Path) -> "Driver":
-    """Return a driver that leaves the device's communication time-out as it is: a watcher sends no commands."""
-    from config.daemon import load_daemon
+def watching_driver(file: "DaemonFile") -> "Driver":
+    """Return a driver that leaves the device as it is: a watcher sends no commands."""
     from drivers import driver_for
 
-    device = load_daemon(config).device
-    untouched = device.map.model_copy(update={"communication_timeout_s": None, "communication_action": None})
-    return driver_for(device.model_copy(update={"map": untouched}))
+    return driver_for(file.device.untouched())
 
 
 def _burst(driver: "Driver") -> tuple[list["Reading"], float]:

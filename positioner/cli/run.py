@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "run the daemon: position the valve of CONFIG.toml and serve its supervisory registers"
+HELP = "run the daemon: position the valves of CONFIG.toml and serve their supervisory registers"
 EXAMPLE = "positioner run daemon.toml"
 
 
@@ -13,8 +13,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run until SIGTERM or Ctrl-C, which leave the valve in its configured safe state."""
-    from config.daemon import load_daemon
+    """Run until SIGTERM or Ctrl-C, which leave each valve in its configured safe state."""
+    from config.daemon import load_valves
     from positioner.daemon.service import serve
 
-    return serve(load_daemon(arguments.config), arguments.config)
+    return serve(load_valves(arguments.config), arguments.config)

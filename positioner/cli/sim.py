@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-HELP = "the simulated valve slave alone, on Modbus TCP, until SIGTERM or Ctrl-C; says HOST:PORT when it listens"
+HELP = "the simulated valve slave alone, until SIGTERM or Ctrl-C; says where (HOST:PORT) when it listens"
 EXAMPLE = "positioner sim config/profiles/slave.toml --port 0"
 CATCH_UP_EVERY_S = 0.02
 
@@ -13,7 +13,9 @@ CATCH_UP_EVERY_S = 0.02
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the slave file")
-    parser.add_argument("--port", type=_port, help="TCP port in place of the file's; 0 takes any free one")
+    parser.add_argument(
+        "--port", type=_port, help="port or loopback CAN channel in place of the file's; 0: any free one"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -22,12 +24,12 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a fault in a file, or the port is in use.
     """
-    from sim.slave.modbus import ModbusSlave
+    from sim.slave.slave import slave_of
 
     ended: list[int] = []  # not an Event: a handler that sets one may deadlock with the wait it interrupts
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda number, _frame: ended.append(number))
-    slave = ModbusSlave(arguments.config, arguments.port)
+    slave = slave_of(arguments.config, arguments.port)
     print(f"listening on {slave.address}", flush=True)
     while not ended:
         time.sleep(CATCH_UP_EVERY_S)

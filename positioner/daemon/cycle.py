@@ -10,14 +10,16 @@ answers with the sample at the end of the period for which it has obeyed command
 
 import logging
 import time
+from collections.abc import Sequence
 from threading import Event
 
 from config.registers import Quality
 from positioner.control.controller import Controller, Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
+from positioner.daemon.health import Health
 from positioner.daemon.link import Link
-from positioner.daemon.logs import say
+from positioner.daemon.logs import about, say
 from positioner.daemon.pacing import Pace
 from positioner.daemon.recorder import Recorder, Row
 from positioner.daemon.snapshot import Snapshot
@@ -27,26 +29,39 @@ log = logging.getLogger(__name__)
 
 
 class Cycle:
-    """Runs the controller on a device. One thread calls `run`; others read `snapshot` and replace `requests`.
+    """Runs the controller on a device. One thread calls `turn`; others read `snapshot` and replace `requests`.
 
-    The first cycle runs at once: it commands what the device holds, so it moves nothing.
+    The first cycle runs at once: it commands what the device holds, so it moves nothing. `valve` names it in the log.
     """
 
     def __init__(
-        self, link: Link, controller: Controller, pace: Pace, requests: Requests, recorder: Recorder | None
+        self,
+        link: Link,
+        controller: Controller,
+        pace: Pace,
+        requests: Requests,
+        recorder: Recorder | None,
+        valve: str | None = None,
+        health: Health | None = None,
     ) -> None:
         self.requests = requests
         self.statistics = CycleStatistics()
         self.link = link
         self.recorder = recorder
+        self.health = health
         self._controller = controller
         self._pace = pace
+        self._valve = valve
         self.snapshot = self._decide()
 
-    def run(self, stop: Event) -> None:
-        """Cycle until told to stop."""
-        self._pace.prepare()
-        while not stop.is_set():
+    def prepare(self) -> None:
+        """Make the calling thread, which takes the turns, as punctual as can be."""
+        with about(self._valve):
+            self._pace.prepare()
+
+    def turn(self) -> None:
+        """Wait until the next cycle is due and run it."""
+        with about(self._valve):
             missed = self._pace.wait()
             started_s = time.monotonic()
             self.once()
@@ -65,7 +80,18 @@ class Cycle:
         if self.recorder is not None and sample.quality is Quality.GOOD:
             in_force_pa = self._pace.in_force_pa(sent_pa, decision.command_pa)
             self.recorder.offer(_row(sample, decision, in_force_pa, self.link.counts.lost_samples))
+        if self.health is not None:
+            self.health.enter(sample, decision, self.requests)
         return Snapshot(sample, decision)
+
+
+def run_in_turn(cycles: Sequence[Cycle], stop: Event) -> None:
+    """Run cycles, those of one line, one after another until told to stop."""
+    for cycle in cycles:
+        cycle.prepare()
+    while not stop.is_set():
+        for cycle in cycles:
+            cycle.turn()
 
 
 def _told(decision: Decision) -> tuple[object, ...]:
@@ -84,6 +110,7 @@ def _tell(decision: Decision) -> None:
         command_pa=decision.command_pa,
         identifications=decision.applied.count,
         refusal=decision.applied.refused.name,
+        singly=decision.estimates.b.reason.name,
     )
 
 

@@ -7,8 +7,23 @@ import json
 import logging
 import queue
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from datetime import UTC, datetime
 from logging.handlers import QueueHandler, QueueListener
+
+_VALVE: ContextVar[str | None] = ContextVar("valve", default=None)
+
+
+@contextmanager
+def about(valve: str | None) -> Iterator[None]:
+    """Have every line that this thread logs in the meantime name a valve."""
+    token = _VALVE.set(valve)
+    try:
+        yield
+    finally:
+        _VALVE.reset(token)
 
 
 def say(log: logging.Logger, level: int, event: str, **fields: object) -> None:
@@ -18,7 +33,7 @@ def say(log: logging.Logger, level: int, event: str, **fields: object) -> None:
 
 
 class JsonLines(logging.Formatter):
-    """`{"time": ..., "level": ..., "source": ..., "event": ..., fields...}`."""
+    """`{"time": ..., "level": ..., "source": ..., "valve": ..., "event": ..., fields...}`."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return one line."""
@@ -26,6 +41,7 @@ class JsonLines(logging.Formatter):
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
             "source": record.name,
+            **({"valve": valve} if (valve := getattr(record, "valve", None)) else {}),
             "event": record.getMessage(),
             **getattr(record, "fields", {}),
         }
@@ -35,9 +51,10 @@ class JsonLines(logging.Formatter):
 
 
 class _Unformatted(QueueHandler):
-    """Hands records over as they are, so that the thread that logs does no formatting."""
+    """Hands records over as they are, so that the thread that logs does no formatting; notes the valve in them."""
 
     def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
+        record.valve = _VALVE.get()
         return record
 
 

@@ -21,6 +21,8 @@ FIFO_PRIORITY = 40
 MOST_SPIN_S = 200e-6
 SPIN_SHARE = 0.2
 """Of a period at the most: the kernel stalls a FIFO thread that takes 95 % of a core."""
+SILENCE_S = 2e-3
+"""A device in lockstep that does not answer is asked again after this."""
 
 PR_SET_TIMERSLACK = 29
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
@@ -47,23 +49,32 @@ class Pace(Protocol):
 
 
 class RealTime:
-    """Absolute deadlines on the gateway's monotonic clock."""
+    """Absolute deadlines on the gateway's monotonic clock.
 
-    def __init__(self, period_s: float) -> None:
+    Args:
+        period_s: from one deadline to the next.
+        phase_s: deadlines are whole periods on that clock, and this; None begins with the first call of `wait`.
+        may_spin: whether the last part of the wait may be spun. Where several cycles run, each that spins keeps the
+            interpreter from the others.
+    """
+
+    def __init__(self, period_s: float, phase_s: float | None = None, may_spin: bool = True) -> None:
         self._period_s = period_s
+        self._phase_s = phase_s
+        self._may_spin = may_spin
         self._spin_s = 0.0
         self._due_s: float | None = None
 
     def prepare(self) -> None:
         """Ask the system for priority; spin only with it."""
-        if raise_priority():
+        if raise_priority() and self._may_spin:
             self._spin_s = min(MOST_SPIN_S, SPIN_SHARE * self._period_s)
 
     def wait(self) -> int:
         """Sleep, then spin, until the next deadline. A missed one is not made up for."""
         now_s = time.monotonic()
         if self._due_s is None:
-            self._due_s = now_s
+            self._due_s = now_s if self._phase_s is None else now_s - (now_s - self._phase_s) % self._period_s
         due_s = self._due_s + self._period_s
         missed = 0
         if now_s > due_s:
@@ -91,16 +102,20 @@ class DevicePace:
 
     def __init__(self) -> None:
         self._now_s = 0.0
+        self._is_silent = False
 
     def prepare(self) -> None:
         """Need nothing."""
 
     def wait(self) -> int:
-        """Return at once."""
+        """Return at once; after a while if the device does not answer: asking again leaves time to others."""
+        if self._is_silent:
+            time.sleep(SILENCE_S)
         return 0
 
     def now_s(self, device_time_s: float | None) -> float:
         """Return the device's time; it stands still while the device does not answer."""
+        self._is_silent = device_time_s is None
         if device_time_s is not None:
             self._now_s = device_time_s
         return self._now_s

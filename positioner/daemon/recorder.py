@@ -123,13 +123,16 @@ class Recorder:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def _open_next(self) -> None:
-        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+        now = datetime.now(UTC)
+        stamp = now.strftime("%Y%m%dT%H%M%SZ")
         self._number += 1
         path = self._folder / f"{self._stem}-{stamp}-{self._number:04d}.csv"
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
-        header = f"# valve: {self._stem}\n# started: {stamp}\n{','.join(COLUMNS)}\n".encode()
+        header = f"# valve: {self._stem}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{','.join(COLUMNS)}\n".encode()
         self._room = self._file_bytes - os.write(self._file, header)
-        for old in sorted(self._folder.glob(f"{self._stem}-*Z-*.csv"))[: -self._keep_files]:
+        # By its whole name: a valve FV-1 must not delete what belongs to a valve FV-1-A.
+        mine = re.compile(re.escape(self._stem) + r"-\d{8}T\d{6}Z-\d+\.csv")
+        for old in sorted(each for each in self._folder.iterdir() if mine.fullmatch(each.name))[: -self._keep_files]:
             old.unlink()
         say(log, logging.INFO, "recording", file=str(path))
 

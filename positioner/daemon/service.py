@@ -1,28 +1,35 @@
 """The daemon, assembled: `positioner run`.
 
 Start: connect, hold the pressure the device has, look whether its measurement can be true, then serve. End (SIGTERM,
-Ctrl-C, or a cycle that failed): leave the valve in the configured safe state, finish the recording, stop serving.
+Ctrl-C, or a cycle that failed): leave each valve in its configured safe state, finish the recordings, stop serving.
 """
 
 import logging
 import signal
+from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Thread
 
 from config.daemon import DaemonFile
 from config.errors import InputError
 from config.modbus_server import RegisterServer
+from config.registers import WRITER_AT
+from config.roles import Role
+from config.tls import Guard
 from drivers import driver_for
 from drivers.boundary import DriverError, Reading
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
-from positioner.daemon.cycle import Cycle
+from positioner.daemon.cycle import Cycle, run_in_turn
+from positioner.daemon.health import Health, HealthKeeper, HealthSettings, Kept
 from positioner.daemon.link import Link
-from positioner.daemon.logs import say, start_logging
+from positioner.daemon.logs import about, say, start_logging
 from positioner.daemon.pacing import DevicePace, Pace, RealTime
 from positioner.daemon.recorder import Recorder
+from positioner.daemon.refinement import RefinementProcess
 from positioner.daemon.supervisory import SupervisoryRegisters
 
 log = logging.getLogger(__name__)
@@ -31,61 +38,179 @@ LOOK_EVERY_S = 0.05
 """How often the main thread looks whether a signal came."""
 
 
-def serve(file: DaemonFile, source: Path) -> int:
-    """Run the daemon until it is told to stop; return the exit status.
+@dataclass(frozen=True, slots=True)
+class Valve:
+    """One valve of the daemon, put together from its file."""
+
+    file: DaemonFile
+    settings: Settings
+    link: Link
+    controller: Controller
+    cycle: Cycle
+    recorder: Recorder | None
+    keeper: HealthKeeper
+    absence: str | None
+    """Why its device could not be reached at the start; the cycle goes on asking."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.file.valve.name
+
+    def served(self) -> SupervisoryRegisters:
+        """Make what the DCS sees of it."""
+        settings = self.settings
+        return SupervisoryRegisters(
+            self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name
+        )
+
+    def leave(self) -> None:
+        """Give the device the command of the safe action."""
+        with about(self.name):
+            self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.command_pa))
+
+
+def serve(files: Sequence[DaemonFile], source: Path) -> int:
+    """Run the daemon of these valves until it is told to stop; return the exit status.
+
+    The only valve's device must be there. Of several, one that is not there is a fault of that valve alone.
 
     Raises:
-        InputError: the device is not there or not as described, a port is taken, recordings cannot be written.
+        InputError: a device is not there or not as described, a port is taken, recordings cannot be written.
     """
     ended: list[int] = []  # not an Event: a handler that sets one may deadlock with the wait it interrupts
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda number, _frame: ended.append(number))
-    settings = Settings.of(file)
     with ExitStack() as on_exit:
-        pace = _pace(file)
-        link = Link(driver_for(file.device), pace)
-        on_exit.callback(link.release)
-        controller = Controller(settings, _connect(link, settings, source))
-        recorder = _recorder(file, source)
-        cycle = Cycle(link, controller, pace, _first_requests(file), recorder)
-        registers = SupervisoryRegisters(cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa)
-        server = RegisterServer(registers, file.supervisory.host, file.supervisory.port, file.supervisory.unit)
+        refinement = RefinementProcess()
+        on_exit.callback(refinement.stop)
+        paced = zip(files, _paces(files), strict=True)
+        valves = [_assembled(file, pace, source, len(files) == 1, on_exit, refinement) for file, pace in paced]
+        server = _server(valves)
         server.start()
         on_exit.callback(server.stop)
-        if recorder is not None:
+        for recorder in [valve.recorder for valve in valves if valve.recorder is not None]:
             recorder.start()
             on_exit.callback(recorder.stop)
-        on_exit.callback(start_logging(file.log.level).stop)
-        say(log, logging.INFO, "serving", valve=file.valve.name, host=file.supervisory.host, port=server.port)
-        print(f"serving {file.valve.name} on {file.supervisory.host}:{server.port}", flush=True)
-        status = _run(cycle, ended)
-        link.leave(settings.safe_pa(file.safety.action, controller.command_pa))
-        say(log, logging.INFO, "stopped", safe_action=file.safety.action, status=status)
+        on_exit.callback(start_logging(files[0].log.level).stop)
+        for valve in valves:
+            _announce(valve, server.port)
+            valve.keeper.start()
+            on_exit.callback(valve.keeper.stop)
+        print(f"serving {', '.join(valve.name for valve in valves)} on {server.address}", flush=True)
+        status = _run(valves, ended)
+        for valve in valves:
+            valve.leave()
+        say(log, logging.INFO, "stopped", status=status)
     return status
 
 
-def _run(cycle: Cycle, ended: list[int]) -> int:
-    """Run the cycle in its own thread until a signal ends it, or until it fails; return the exit status."""
-    stop, failures = Event(), []
+def _assembled(
+    file: DaemonFile, pace: Pace, source: Path, is_alone: bool, on_exit: ExitStack, refinement: RefinementProcess
+) -> Valve:
+    settings = Settings.of(file)
+    link = Link(driver_for(file.device), pace)
+    on_exit.callback(link.release)
+    where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
+    absence = None
+    try:
+        held_pa, reading = link.open()
+    except DriverError as error:
+        if is_alone:
+            raise InputError(where, f"device: {error}") from None
+        held_pa, absence = settings.minimum_pa, str(error)
+    else:
+        _require_plausible(reading, held_pa, settings, where)
+    recorder = _recorder(file, source)
+    controller = Controller(settings, held_pa, refinement.refiner(patient=file.cycle.pace == "device"))
+    kept = None if file.health.folder is None else Kept.in_folder(source.parent / file.health.folder, file.valve.name)
+    health = Health(HealthSettings.of(file.health, file.valve.stroke_m), kept.record if kept else None)
+    with about(file.valve.name):
+        cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health)
+    keeper = HealthKeeper(health, lambda: cycle.snapshot.decision, file.valve.name, kept)
+    return Valve(file, settings, link, controller, cycle, recorder, keeper, absence)
 
-    def work() -> None:
+
+def _announce(valve: Valve, port: int) -> None:
+    with about(valve.name):
+        where = valve.file.supervisory
+        say(log, logging.INFO, "serving", host=where.host, port=port, unit=where.unit)
+        if valve.absence is not None:
+            say(log, logging.WARNING, "device is not there", reason=valve.absence)
+
+
+def _run(valves: Sequence[Valve], ended: list[int]) -> int:
+    """Run the cycles until a signal ends them, or until one fails; return the exit status.
+
+    Each has a thread of its own, save that valves on one line share that line's.
+    """
+    stop, failures = Event(), list[Exception]()
+
+    def work(cycles: Sequence[Cycle]) -> None:
         try:
-            cycle.run(stop)
+            run_in_turn(cycles, stop)
         except Exception as error:
             log.exception("the cycle failed")
             failures.append(error)
 
-    thread = Thread(target=work, name="cycle")
-    thread.start()
-    while thread.is_alive() and not ended:
-        thread.join(LOOK_EVERY_S)
+    threads = [
+        Thread(target=work, args=([valve.cycle for valve in together],), name=f"cycle of {together[0].name}")
+        for together in _by_line(valves)
+    ]
+    for thread in threads:
+        thread.start()
+    while not (ended or failures):
+        threads[0].join(LOOK_EVERY_S)
     stop.set()
-    thread.join()
+    for thread in threads:
+        thread.join()
     return 1 if failures else 0
 
 
-def _pace(file: DaemonFile) -> Pace:
-    return DevicePace() if file.cycle.pace == "device" else RealTime(file.cycle.period_s)
+def _by_line(valves: Sequence[Valve]) -> list[list[Valve]]:
+    """Return the valves of each line together, each valve with a connection of its own alone."""
+    lines: dict[object, list[Valve]] = {}
+    for valve in valves:
+        lines.setdefault(valve.file.device.line or valve.name, []).append(valve)
+    return list(lines.values())
+
+
+def _paces(files: Sequence[DaemonFile]) -> list[Pace]:
+    """Return when each valve's cycle begins: in real time, each of several has its own slot of the period.
+
+    On a line that keeps one that does not answer from taking the others' time; elsewhere it keeps them from asking for
+    the interpreter at once.
+    """
+    if len(files) == 1:
+        (file,) = files
+        return [DevicePace() if file.cycle.pace == "device" else RealTime(file.cycle.period_s)]
+    lines = [file.device.line for file in files]
+    return [
+        DevicePace()
+        if file.cycle.pace == "device"
+        else RealTime(
+            file.cycle.period_s, file.cycle.period_s * lines[:index].count(line) / lines.count(line), may_spin=False
+        )
+        for index, (file, line) in enumerate(zip(files, lines, strict=True))
+    ]
+
+
+def _server(valves: Sequence[Valve]) -> RegisterServer:
+    first, *others = valves
+    where = first.file.supervisory
+    return RegisterServer(
+        first.served(),
+        where.host,
+        where.port,
+        where.unit,
+        _guard(first.file),
+        {valve.file.supervisory.unit: valve.served() for valve in others},
+    )
+
+
+def _guard(file: DaemonFile) -> Guard | None:
+    # What nobody may write, the registers themselves refuse, and say so.
+    return Guard(tls, lambda at: WRITER_AT.get(at, Role.OBSERVER)) if (tls := file.supervisory.tls) else None
 
 
 def _first_requests(file: DaemonFile) -> Requests:
@@ -96,27 +221,18 @@ def _first_requests(file: DaemonFile) -> Requests:
     )
 
 
-def _connect(link: Link, settings: Settings, source: Path) -> float:
-    try:
-        held_pa, reading = link.open()
-    except DriverError as error:
-        raise InputError(str(source), f"device: {error}") from None
-    _require_plausible(reading, held_pa, settings, source)
-    return held_pa
-
-
-def _require_plausible(reading: Reading, held_pa: float, settings: Settings, source: Path) -> None:
+def _require_plausible(reading: Reading, held_pa: float, settings: Settings, where: str) -> None:
     limits = settings.limits
     if not limits.plausible(reading.position_m):
         margin_m = limits.travel_margin * limits.stroke_m
         raise InputError(
-            str(source),
+            where,
             f"device.map.position_m: the device says {reading.position_m:g} m, allowed is {-margin_m:g} to "
             f"{limits.stroke_m + margin_m:g} m (valve.stroke_m and safety.travel_margin); check the map",
         )
     if not settings.minimum_pa <= held_pa <= settings.maximum_pa:
         raise InputError(
-            str(source),
+            where,
             f"device.map.command_pa: the device holds {held_pa:g} Pa, allowed is {settings.minimum_pa:g} to "
             f"{settings.maximum_pa:g} Pa ([pressure]); check the map",
         )

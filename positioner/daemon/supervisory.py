@@ -33,7 +33,8 @@ from config.registers import (
 )
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
-from positioner.daemon.logs import say
+from positioner.daemon.health import Health, condition
+from positioner.daemon.logs import about, say
 from positioner.daemon.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
@@ -46,10 +47,13 @@ SCALE = 10_000
 
 
 class SupervisoryRegisters:
-    """The registers of one valve. `maximum_pa` and `minimum_pa` bound the manual pressure."""
+    """The registers of one valve, by its name in the log. `maximum_pa` and `minimum_pa` bound the manual pressure."""
 
-    def __init__(self, cycle: Cycle, stroke_m: float, minimum_pa: float, maximum_pa: float) -> None:
+    def __init__(
+        self, cycle: Cycle, stroke_m: float, minimum_pa: float, maximum_pa: float, valve: str | None = None
+    ) -> None:
         self._cycle = cycle
+        self._valve = valve
         self._stroke_m = stroke_m
         self._minimum_pa = minimum_pa
         self._maximum_pa = maximum_pa
@@ -79,14 +83,15 @@ class SupervisoryRegisters:
         Raises:
             RegisterError: see the head of this module.
         """
-        try:
-            values = self._decoded(address, words)
-            self._cycle.requests = self._asked(values)
-        except _Refusal as refusal:
-            say(log, logging.WARNING, "write refused", peer=peer, address=address, reason=refusal.reason)
-            raise RegisterError(refusal.code) from None
-        level = logging.DEBUG if values.keys() <= {"reference", "reference_scaled", "heartbeat"} else logging.INFO
-        say(log, level, "write", peer=peer, **values)
+        with about(self._valve):
+            try:
+                values = self._decoded(address, words)
+                self._cycle.requests = self._asked(values)
+            except _Refusal as refusal:
+                say(log, logging.WARNING, "write refused", peer=peer, address=address, reason=refusal.reason)
+                raise RegisterError(refusal.code) from None
+            level = logging.DEBUG if values.keys() <= {"reference", "reference_scaled", "heartbeat"} else logging.INFO
+            say(log, level, "write", peer=peer, **values)
 
     def _encoded(self, register: Register, snapshot: Snapshot, requests: Requests) -> list[int]:
         if register.name == "heartbeat":
@@ -138,6 +143,11 @@ class SupervisoryRegisters:
             )
         if values.get("acknowledge") == 1:
             requests = replace(requests, acknowledgements=requests.acknowledgements + 1)
+        if values.get("health_baseline") == 1:
+            self._require_friction()
+            requests = replace(requests, baseline_writes=requests.baseline_writes + 1)
+        if values.get("health_reset") == 1:
+            requests = replace(requests, health_resets=requests.health_resets + 1)
         if "heartbeat" in values:
             self._heartbeat = int(values["heartbeat"])
             requests = replace(requests, heartbeats=requests.heartbeats + 1)
@@ -160,6 +170,10 @@ class SupervisoryRegisters:
         if mode is not Mode.HOLD and fault is not Fault.NONE:
             raise _Refusal(ExceptionCode.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
         return mode
+
+    def _require_friction(self) -> None:
+        if self._cycle.snapshot.decision.applied.ratios is None:
+            raise _Refusal(ExceptionCode.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
 
     def _manual_pa(self, value: float) -> float:
         if not self._minimum_pa <= value <= self._maximum_pa:
@@ -185,6 +199,7 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         **_estimate_getters(),
         **_statistics_getters(cycle),
         **_identity_getters(),
+        **_health_getters(cycle, stroke_m),
     }
     assert getters.keys() == BY_NAME.keys() - {"heartbeat"}, getters.keys() ^ BY_NAME.keys()
     return getters
@@ -263,6 +278,25 @@ def _statistics_getters(cycle: Cycle) -> dict[str, Getter]:
         "jitter_99": lambda _s, _r: statistics.jitter_99_s(),
         "cycle_time": lambda _s, _r: statistics.cycle_time_s(),
         "unrecorded": lambda _s, _r: cycle.recorder.unrecorded if cycle.recorder else 0,
+    }
+
+
+def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
+    health = cycle.health or Health.idle(stroke_m)
+    return {
+        "health_baseline": lambda _s, _r: 0,
+        "health_reset": lambda _s, _r: 0,
+        "ne107": lambda s, _: condition(s.decision, health).status,
+        "ne107_cause": lambda s, _: condition(s.decision, health).cause,
+        "ne107_causes": lambda s, _: condition(s.decision, health).bits,
+        "friction": lambda _s, _r: health.friction_pa,
+        "friction_baseline": lambda _s, _r: health.baseline_pa,
+        "friction_ratio": lambda _s, _r: health.friction_ratio,
+        "travel": lambda _s, _r: health.record.travel_m / stroke_m,
+        "stem_cycles": lambda _s, _r: int(health.record.travel_m / (2 * stroke_m)),
+        "reversals": lambda _s, _r: health.record.reversals,
+        "stiction_index": lambda _s, _r: health.record.stiction_index,
+        "moves_judged": lambda _s, _r: health.record.moves_judged,
     }
 
 

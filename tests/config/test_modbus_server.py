@@ -190,7 +190,6 @@ def test_a_request_in_pieces_is_one_request(line: socket.socket) -> None:
 @pytest.mark.parametrize(
     "garbage",
     [
-        struct.pack(">HHHB", 1, 1, 6, 7),  # another protocol
         struct.pack(">HHHB", 1, 0, 300, 7),  # longer than a frame can be
         struct.pack(">HHHB", 1, 0, 0, 7),
         b"GET / HTTP/1.1\r\n\r\n",

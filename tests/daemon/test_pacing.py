@@ -57,3 +57,23 @@ def test_which_command_acts_from_a_sample_on() -> None:
 def test_the_devices_clock_is_the_time_in_lockstep() -> None:
     pace = DevicePace()
     assert [pace.now_s(each) for each in (0.5, None, 0.6)] == [0.5, 0.5, 0.6]
+
+
+def test_a_device_in_lockstep_that_does_not_answer_is_not_asked_without_a_pause(clock: Clock) -> None:
+    pace = DevicePace()
+    pace.now_s(0.5)
+    before_s = clock.now_s
+    assert (pace.wait(), clock.now_s) == (0, before_s), "it answers: no pause"
+    pace.now_s(None)
+    assert (pace.wait(), clock.now_s) == (0, before_s + pacing.SILENCE_S)
+
+
+def test_with_a_phase_the_deadlines_are_those_of_the_clock(clock: Clock) -> None:
+    """So cycles that begin at different times keep their places in the period."""
+    pace = RealTime(0.25, 0.0625)
+    for _ in range(3):
+        assert pace.wait() == 0
+        assert clock.now_s % 0.25 == pytest.approx(0.0625, abs=2e-6)
+        clock.now_s += 0.1
+    clock.now_s += 0.45
+    assert pace.wait() == 1, "one deadline went by"

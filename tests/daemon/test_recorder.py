@@ -1,6 +1,7 @@
 """The recorder: every row, whole lines, bounded in files and in memory."""
 
 import os
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 
 from config.errors import InputError
 from config.recording import read_recording
+from config.valve import load_valve, shipped_valve
 from positioner.daemon import recorder as room
 from positioner.daemon.recorder import Recorder, Row
+from workbench.report import Subject
 
 
 def row(index: int) -> Row:
@@ -32,6 +35,14 @@ def test_what_is_offered_is_what_is_read_bit_by_bit(tmp_path: Path) -> None:
     recording = read_recording(path)
     np.testing.assert_array_equal(recording.time_s, [index * 1e-3 for index in range(1000)])
     np.testing.assert_array_equal(recording.command_pa, [44e3 + index / 3 for index in range(1000)])
+
+
+def test_a_file_says_when_it_was_recorded_as_a_report_shows_it(tmp_path: Path) -> None:
+    before = datetime.now(UTC).replace(microsecond=0)
+    recorded(tmp_path, 1)
+    (path,) = tmp_path.iterdir()
+    said = Subject(load_valve(shipped_valve("seed")), (), read_recording(path).metadata).recorded
+    assert before <= datetime.fromisoformat(said) <= datetime.now(UTC)
 
 
 def test_full_files_are_followed_and_the_oldest_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

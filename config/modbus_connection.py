@@ -1,0 +1,92 @@
+"""One client's connection to a Modbus TCP server: frames out of a stream of bytes, and an answer to each in turn.
+
+    transaction  2 bytes, given back with the answer
+    protocol     2 bytes, 0
+    length       2 bytes: of unit and PDU, 2 to 254
+    unit         1 byte
+    PDU          1 to 253 bytes
+
+By the MODBUS Messaging on TCP/IP Implementation Guide V1.0b: a frame of another protocol is discarded; frames may come
+in pieces, and several at once. A length that no frame has leaves unknown where the next begins, so the connection
+ends; so it does when a client does not read its answers for `SEND_TIMEOUT_S`, since what was sent of one is no frame.
+"""
+
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import suppress
+from socketserver import BaseRequestHandler
+from typing import Protocol
+
+HEADER = struct.Struct(">HHHB")
+SHORTEST, LONGEST = 2, 254
+"""What the length of a frame can be."""
+CHUNK = 4096
+SEND_TIMEOUT_S = 1.0
+
+
+class Host(Protocol):
+    """What a connection asks of the server that accepted it."""
+
+    def answer(self, unit: int, pdu: bytes, peer: str) -> bytes:
+        """Return the PDU that answers one."""
+        ...
+
+    def is_used(self, peer: str) -> None:
+        """Take note that a client has asked for something (or has just come)."""
+        ...
+
+    def is_gone(self, peer: str) -> None:
+        """Take note that a client has gone."""
+        ...
+
+
+class Connection(BaseRequestHandler):
+    """Serves one client in the thread that makes it, until either side ends it."""
+
+    request: socket.socket
+    server: Host  # type: ignore[assignment]
+
+    def handle(self) -> None:
+        """Answer the client's requests."""
+        peer = place(self.client_address)
+        self.request.settimeout(SEND_TIMEOUT_S)
+        self.server.is_used(peer)
+        with suppress(OSError):  # it is gone, or does not read
+            for transaction, unit, pdu in self._requests():
+                self.server.is_used(peer)
+                answer = self.server.answer(unit, pdu, peer)
+                self.request.sendall(HEADER.pack(transaction, 0, len(answer) + 1, unit) + answer)
+        self.server.is_gone(peer)
+
+    def _requests(self) -> Iterator[tuple[int, int, bytes]]:
+        """Yield transaction, unit and PDU of each frame, until the client has no more to say or makes no sense."""
+        stream = b""
+        while True:
+            while len(stream) < HEADER.size:
+                if not (more := self._more()):
+                    return
+                stream += more
+            transaction, protocol, length, unit = HEADER.unpack_from(stream)
+            if not SHORTEST <= length <= LONGEST:
+                return
+            end = HEADER.size - 1 + length
+            while len(stream) < end:
+                if not (more := self._more()):
+                    return
+                stream += more
+            if protocol == 0:
+                yield transaction, unit, stream[HEADER.size : end]
+            stream = stream[end:]
+
+    def _more(self) -> bytes:
+        """Return what comes next; b"" when the client has no more to say."""
+        while True:
+            with suppress(TimeoutError):  # that one is for sending: a client may be silent for as long as it likes
+                return self.request.recv(CHUNK)
+
+
+def place(address: tuple[object, ...]) -> str:
+    """Return `host:port` of a socket's address, an IPv6 host in brackets."""
+    host, port, *_ = address
+    return f"[{host}]:{port}" if ":" in str(host) else f"{host}:{port}"

@@ -1,0 +1,223 @@
+"""Health of a virtual valve, as the DCS sees it: baseline, ageing friction, wear, NE 107 with its cause."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from config.daemon import DaemonFile
+from config.modbus_server import ExceptionCode, RegisterError
+from config.registers import BY_NAME, Fault, HealthCause, Mode, Namur, Why
+from config.slave import SlaveFile
+from config.valve import load_valve, shipped_valve
+from positioner.cli.parts.virtual import virtual_cycle
+from positioner.control.requests import Requests
+from positioner.daemon.health import Health, condition
+from positioner.daemon.supervisory import SupervisoryRegisters
+from positioner.estimation.applied import Applied, Ratios
+from sim.slave.modbus import device_of
+
+STROKE_M = 0.1016
+LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
+NOISE_M = 1e-5
+
+
+class Panel:
+    """A daemon on a virtual valve, and its registers by name."""
+
+    def __init__(
+        self, law: dict[str, float] | None = None, change: tuple[dict[str, float], ...] = (), **health: float
+    ) -> None:
+        rest = {"position_m": 0.05, "pressure_pa": 40.7e3}
+        tables = {"valve": {"stroke_m": STROKE_M}, "health": health} | ({"law": law} if law else {})
+        slave = {"clock": {"mode": "lockstep"}, "initial": rest, "sensor": {"noise_std_m": NOISE_M}, "change": change}
+        device = device_of(SlaveFile.model_validate(slave), shipped_valve("seed"))
+        self.cycle = virtual_cycle(DaemonFile.model_validate(tables), device, Requests(alpha_pa=70e3, beta_pa=13238.0))
+        self.registers = SupervisoryRegisters(self.cycle, STROKE_M, 0.0, 420e3)
+        assert self.cycle.health is not None
+        self.health = self.cycle.health
+
+    def get(self, name: str) -> float:
+        register = BY_NAME[name]
+        return register.format.decode(self.registers.read("holding", register.address, register.format.words))
+
+    def set(self, name: str, value: float) -> None:
+        register = BY_NAME[name]
+        self.registers.write(register.address, register.format.encode(value), "test")
+
+    def run(self, for_s: float) -> None:
+        for _ in range(round(for_s / 1e-3)):
+            self.cycle.once()
+
+    def identify(self) -> None:
+        for name in ("eta_1", "eta_2", "eta_3"):
+            self.set(name, 0)
+        self.run(1.5)
+        for name in ("eta_1", "eta_2", "eta_3"):
+            self.set(name, 1)
+        self.run(0.1)
+
+    @property
+    def status(self) -> tuple[Namur, HealthCause]:
+        return Namur(int(self.get("ne107"))), HealthCause(int(self.get("ne107_cause")))
+
+
+def test_from_start_through_identification_to_good() -> None:
+    """C while it does not follow the DCS, then good; the first applied identification is the baseline."""
+    panel = Panel()
+    assert panel.status == (Namur.FUNCTION_CHECK, HealthCause.NOT_AUTOMATIC)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(0.1)
+    assert panel.status == (Namur.FUNCTION_CHECK, HealthCause.NOT_IDENTIFIED)
+    for name in ("eta_1", "eta_2", "eta_3"):
+        panel.set(name, 0)
+    panel.run(0.1)
+    assert panel.status == (Namur.FUNCTION_CHECK, HealthCause.EXCITED)
+    panel.identify()
+    assert panel.get("identifications") == 1
+    assert panel.status == (Namur.GOOD, HealthCause.NONE)
+    seed = load_valve(shipped_valve("seed")).valve
+    assert panel.get("friction_baseline") == pytest.approx(seed.coulomb_n / seed.diaphragm_area_m2, rel=0.05)
+    assert panel.get("friction_ratio") == 1.0
+
+
+def test_noise_at_rest_wears_nothing_for_a_minute() -> None:
+    panel = Panel(LAW)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(60.0)
+    assert {name: panel.get(name) for name in ("travel", "reversals", "stem_cycles", "moves_judged")} == {
+        "travel": 0.0,
+        "reversals": 0.0,
+        "stem_cycles": 0.0,
+        "moves_judged": 0.0,
+    }
+
+
+def test_moves_add_up_to_travel_reversals_and_stiction() -> None:
+    """The seed's law makes large moves and none of 1 % from rest."""
+    panel = Panel(LAW, settle_s=0.3)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(2.0)
+    for reference in (0.8, 0.3, 0.8, 0.3):
+        panel.set("reference", reference)
+        panel.run(0.5)
+    assert panel.get("travel") == pytest.approx((0.8 - 0.05 / STROKE_M) + 3 * 0.5, abs=0.05)
+    assert panel.get("reversals") == 3
+    assert panel.get("stem_cycles") == int(panel.get("travel") / 2)
+    assert (panel.get("stiction_index"), panel.get("moves_judged")) == (0.0, 4)
+    for small in range(6):
+        panel.set("reference", 0.31 + 0.01 * (small % 2) * 1.2 + 0.0)
+        panel.run(0.5)
+    assert panel.get("stiction_index") == pytest.approx(6 / 10, abs=0.01)
+    assert panel.status == (Namur.MAINTENANCE_REQUIRED, HealthCause.STICTION)
+    panel.set("health_reset", 1)
+    panel.run(0.01)
+    assert [panel.get(name) for name in ("travel", "reversals", "stiction_index", "moves_judged")] == [0, 0, 0, 0]
+    assert panel.status == (Namur.GOOD, HealthCause.NONE)
+
+
+@pytest.mark.parametrize(
+    ("factor", "alpha_pa", "cause"),
+    [
+        (1.7, 100e3, HealthCause.FRICTION_HIGH),
+        (0.4, 70e3, HealthCause.FRICTION_LOW),
+        (1.2, 90e3, HealthCause.NONE),
+    ],
+)
+def test_a_packing_that_ages_is_found_by_the_next_identification(
+    factor: float, alpha_pa: float, cause: HealthCause
+) -> None:
+    seed = load_valve(shipped_valve("seed")).valve
+    aged = {"at_s": 2.0, "coulomb_n": factor * seed.coulomb_n, "static_n": factor * seed.static_n}
+    panel = Panel(change=(aged,))
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.identify()
+    assert panel.status == (Namur.GOOD, HealthCause.NONE)
+    panel.run(1.0)
+    panel.set("alpha", alpha_pa)
+    panel.identify()
+    assert panel.get("identifications") == 2
+    assert panel.get("friction_ratio") == pytest.approx(factor, rel=0.1)
+    assert panel.status[1] is cause
+
+
+def test_the_engineer_sets_the_baseline_and_not_before_there_is_friction() -> None:
+    panel = Panel()
+    with pytest.raises(RegisterError) as refused:
+        panel.set("health_baseline", 1)
+    assert refused.value.code is ExceptionCode.DEVICE_BUSY
+    panel = Panel(LAW)
+    panel.run(0.01)
+    assert panel.get("friction_baseline") != panel.get("friction_baseline"), "a number from a file is no baseline"
+    panel.set("health_baseline", 1)
+    panel.run(0.01)
+    assert panel.get("friction_baseline") == pytest.approx(22e3)
+
+
+Change = Callable[[Requests], Requests]
+
+
+def with_friction(panel: Panel, ratio: float) -> Health:
+    """The panel's health once an identification has found friction of so many times the baseline."""
+    decision = panel.cycle.snapshot.decision
+    for count, factor in enumerate((1.0, ratio), start=1):
+        applied = Applied(Ratios(-814e3, -22e3 * factor), count)
+        panel.health.enter(panel.cycle.snapshot.sample, replace(decision, applied=applied), panel.cycle.requests)
+    return panel.health
+
+
+@pytest.mark.parametrize(
+    ("ratio", "causes"),
+    [
+        (1.49, ()),
+        (1.51, (HealthCause.FRICTION_HIGH,)),
+        (0.51, ()),
+        (0.49, (HealthCause.FRICTION_LOW,)),
+    ],
+)
+def test_friction_far_from_its_baseline_asks_for_maintenance(ratio: float, causes: tuple[HealthCause, ...]) -> None:
+    panel = Panel(LAW)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(0.01)
+    decision = replace(panel.cycle.snapshot.decision, why=Why.NO_MOVE_ASKED)
+    assert condition(decision, with_friction(panel, ratio)).causes == causes
+
+
+def test_the_worst_class_decides_and_every_cause_is_told() -> None:
+    panel = Panel(LAW)
+    health = with_friction(panel, 2.0)
+    decision = replace(panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, why=Why.NOT_AUTOMATIC)
+    now = condition(decision, health)
+    assert (now.status, now.cause) == (Namur.FAILURE, HealthCause.FAULT)
+    assert now.causes == (HealthCause.FAULT, HealthCause.NOT_AUTOMATIC, HealthCause.FRICTION_HIGH)
+    assert now.bits == 0b10000011
+
+
+@pytest.mark.parametrize(
+    ("fault", "why", "status", "cause"),
+    [
+        (Fault.DEVICE, Why.NOT_AUTOMATIC, Namur.FAILURE, HealthCause.FAULT),
+        (Fault.DCS_SILENT, Why.NOT_AUTOMATIC, Namur.OUT_OF_SPECIFICATION, HealthCause.DCS_SILENT),
+        (Fault.NONE, Why.LAW_BEYOND_LIMITS, Namur.OUT_OF_SPECIFICATION, HealthCause.BEYOND_LIMITS),
+        (Fault.NONE, Why.STUCK, Namur.OUT_OF_SPECIFICATION, HealthCause.STUCK),
+    ],
+)
+def test_the_class_of_each_fault(fault: Fault, why: Why, status: Namur, cause: HealthCause) -> None:
+    panel = Panel(LAW)
+    mode = Mode.HOLD if fault else Mode.AUTOMATIC
+    decision = replace(panel.cycle.snapshot.decision, mode=mode, fault=fault, why=why)
+    now = condition(decision, Health.idle(STROKE_M))
+    assert (now.status, now.cause) == (status, cause)
+
+
+def test_limits_of_travel_and_reversals_of_0_are_none() -> None:
+    panel = Panel(LAW, travel_limit_strokes=0.5, reversal_limit=1, settle_s=0.3)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(2.0)
+    for reference in (0.8, 0.3, 0.8):
+        panel.set("reference", reference)
+        panel.run(0.3)
+    decision = panel.cycle.snapshot.decision
+    assert condition(decision, panel.health).causes == (HealthCause.TRAVEL, HealthCause.REVERSALS)
+    free = Health(replace(panel.health.settings, travel_limit_m=0.0, reversal_limit=0), panel.health.record)
+    assert condition(decision, free).causes == ()
