@@ -1,109 +1,247 @@
-"""Blind cases through the whole diagnosis: `python -m benchmarks.blind --cases N`; `make blind` runs the campaign.
+"""Blind cases through the whole diagnosis: `make blind` runs what is missing of the campaign and prints its tables.
 
-A case hides one effect or none (`workbench.hiding`, seed 1000 + i), is diagnosed against the whole library, and the
-answer is opened. An effect counts if it is visible. Every fifth case hides nothing; one in eight takes the hidden
-effect out of the library, where the right verdict is "unexplained".
+    clean      one effect drawn at random of the whole library, noise of 0.05 mm      `workbench.hiding`
+    dirty      the same with pressure noise, break-away jitter and 12 bits
+    nothing    no effect, clean and dirty in turn
+    two        two effects, clean
+    removed    one effect, clean, taken out of the library: the right verdict is "unexplained"
+    others     what `tests/workbench/generators.py` makes: other integrators and friction laws, what the library has
+    outside    the same, what the library lacks
+
+Every case is diagnosed against all effects, with one worker; the answer is opened afterwards. A line of JSON is kept a
+case, so that a campaign can be broken off and taken up again. An effect counts if it is visible: the valve without it,
+refitted, misses at least half the floor. What an exact equivalence of the library's own declarations makes the same
+effect counts as that effect: no record could tell it.
 """
 
 import argparse
+import json
+import os
 import time
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from sim.effect import shipped_effects
+from config.recording import Recording
+from config.valve import ValveFile
+from sim.effect import shipped_effect, shipped_effects
+from tests.workbench.generators import KINDS, LAWS, case
+from workbench.confounding import algebraic_class
 from workbench.diagnosis import Diagnosis, diagnose
-from workbench.hiding import Hidden, hide
+from workbench.hiding import hide
 
-FIRST_SEED = 1000
+FIRST_SEED = {"clean": 1000, "dirty": 2000, "nothing": 3000, "two": 4000, "removed": 5000, "others": 0, "outside": 0}
+PLANNED = {"clean": 96, "dirty": 64, "nothing": 64, "two": 16, "removed": 32, "others": 24, "outside": 20}
+FOLDER = Path("blind-out")
+"""Where the lines are kept."""
+
+Line = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """One case: what was hidden ("" nothing), whether the library had it, and what came of it."""
+class Problem:
+    """What is diagnosed, and what only the judge knows."""
 
-    seed: int
-    hidden: str
-    in_library: bool
+    fit: Recording
+    test: Recording
+    base: ValveFile
+    library: Sequence[str]
+    hidden: tuple[str, ...]
     visible: bool
-    diagnosis: Diagnosis
     floor_m: float
-    seconds: float
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """The first set named: the effect, or those that do as well."""
-        step = self.diagnosis.steps[0]
-        return tuple(each.name for each in step.alike)
+    setting: str
 
 
-def outcome(index: int, *, dirty: bool, most: int) -> Outcome:
-    seed = FIRST_SEED + index
-    nothing, outside = index % 5 == 4, index % 8 == 7
-    case = hide(seed, effects=0 if nothing else 1, dirty=dirty)
-    hidden = "" if nothing else case.truth.effect[0].name
-    others = [name for name in shipped_effects() if name != hidden]
-    rivals = np.random.default_rng(seed).permutation(others)[: most - 1].tolist()
-    library = sorted(rivals if outside or nothing else [hidden, *rivals])
-    began_s = time.perf_counter()
-    diagnosis = diagnose(case.fit, case.base, test=case.test, effects=library)
-    seconds = time.perf_counter() - began_s
-    return Outcome(seed, hidden, not outside, _visible(case), diagnosis, case.answer["floor_m"]["test"], seconds)
+def problem(family: str, number: int) -> Problem:
+    """Make the case of a family with a number."""
+    seed = FIRST_SEED[family] + number
+    if family in {"others", "outside"}:
+        return _other(family, number)
+    count = {"nothing": 0, "two": 2}.get(family, 1)
+    dirty = family == "dirty" or (family == "nothing" and number % 2 == 1)
+    made = hide(seed, effects=count, dirty=dirty)
+    hidden = tuple(each.name for each in made.truth.effect)
+    library = [name for name in shipped_effects() if family != "removed" or name not in _same(hidden[0])]
+    visible = all(each["is_visible"] for each in made.answer["visible"].values())
+    floor_m = float(made.answer["floor_m"]["test"])
+    return Problem(made.fit, made.test, made.base, library, hidden, visible, floor_m, "dirty" if dirty else "clean")
 
 
-def _visible(case: Hidden) -> bool:
-    return any(each["is_visible"] for each in case.answer["visible"].values())
+def _other(family: str, number: int) -> Problem:
+    kinds = sorted(name for name, kind in KINDS.items() if (kind.in_library is not None) == (family == "others"))
+    kinds = [name for name in kinds if name not in {"nothing", "presliding"}]
+    law = sorted(LAWS)[number % len(LAWS)]
+    kind = kinds[number % len(kinds)]
+    made = case(kind, law=law, seed=number)
+    return Problem(made.fit, made.test, made.base, shipped_effects(), (kind,), True, 5e-5, law)
 
 
-def report(outcomes: Sequence[Outcome]) -> Iterator[str]:
-    """Yield the figures."""
-    seen = [each for each in outcomes if each.hidden and each.in_library and each.visible]
-    none = [each for each in outcomes if not each.hidden]
-    outside = [each for each in outcomes if each.hidden and not each.in_library and each.visible]
-    single = [each for each in seen if each.diagnosis.verdict == "missing"]
-    ratio = [each.diagnosis.best.errors.test_rmse_m / each.floor_m for each in seen]
-    yield share("true effect first", [each.hidden in each.diagnosis.missing[:1] for each in seen])
-    yield share("true effect first or in the set", [each.hidden in each.named for each in seen])
-    yield share("a single effect named, and right", [each.diagnosis.missing == (each.hidden,) for each in single])
-    yield share("false alarms, nothing hidden", [each.diagnosis.verdict != "adequate" for each in none])
-    yield share("outside the library: unexplained", [each.diagnosis.verdict == "unexplained" for each in outside])
-    if ratio:
-        yield f"{'held-out error after over floor, median':<44}{np.median(ratio):.2f}"
-    yield f"{'seconds a case, median':<44}{np.median([each.seconds for each in outcomes]):.0f}"
-    yield f"seeds {outcomes[0].seed} to {outcomes[-1].seed}"
+def _same(name: str) -> frozenset[str]:
+    library = {each: shipped_effect(each, "library") for each in shipped_effects()}
+    return algebraic_class(name, library)
+
+
+def line(family: str, number: int) -> Line:
+    """Diagnose a case; return what is kept of it."""
+    posed = problem(family, number)
+    began_s, cpu_s = time.perf_counter(), time.process_time()
+    found = diagnose(posed.fit, posed.base, test=posed.test, effects=posed.library, workers=1)
+    return {
+        "family": family,
+        "number": number,
+        "seed": FIRST_SEED[family] + number,
+        "setting": posed.setting,
+        "hidden": list(posed.hidden),
+        "visible": posed.visible,
+        "verdict": found.verdict,
+        "missing": list(found.missing),
+        "sets": [[each.name for each in step.alike] for step in found.steps if step.added],
+        "ranked": [each.name for each in found.steps[0].candidates[:3]],
+        "at_floor": found.best.at_floor,
+        "structured": found.best.structured,
+        "base_rmse_m": found.base.errors.test_rmse_m,
+        "best_rmse_m": found.best.errors.test_rmse_m,
+        "best_block_m": found.best.errors.test_block_m,
+        "floor_m": posed.floor_m,
+        "told_floor_m": found.split.floor_m,
+        "parameters": _parameters(found),
+        "seconds": round(time.perf_counter() - began_s, 1),
+        "cpu_seconds": round(time.process_time() - cpu_s, 1),
+    }
+
+
+def _parameters(found: Diagnosis) -> dict[str, list[float]]:
+    return {name: [each.value, each.std] for name, each in found.best.fit.parameters.items() if "." in name}
+
+
+def named(each: Line, hidden: str) -> bool:
+    """Whether the hidden effect, or one that is the same by algebra, is in a set that the diagnosis names."""
+    return any(_same(hidden) & set(names) for names in each["sets"])
+
+
+def first(each: Line, hidden: str) -> bool:
+    """Whether it is the first one added, or in the set with that."""
+    return bool(each["sets"]) and bool(_same(hidden) & set(each["sets"][0]))
+
+
+def single(each: Line) -> bool:
+    """Whether one effect alone, up to algebra, is named as all that is missing."""
+    if each["verdict"] == "missing":
+        return len(each["missing"]) == 1
+    return each["verdict"] == "one_of" and len(each["sets"]) == 1 and set(each["sets"][0]) <= _same(each["missing"][0])
+
+
+def report(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield the figures, family by family, and the confusion table."""
+    for family in PLANNED:
+        chosen = [each for each in lines if each["family"] == family]
+        if chosen:
+            yield from _figures(family, chosen)
+            yield ""
+    yield from confusion([each for each in lines if each["family"] in {"clean", "dirty"} and each["visible"]])
+
+
+def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
+    seeds = [each["seed"] for each in lines]
+    seen = [each for each in lines if each["visible"]]
+    yield f"{family}: {len(lines)} cases, seeds {min(seeds)} to {max(seeds)}"
+    yield f"  {'seconds of one core a case, median':<52}{np.median([each['cpu_seconds'] for each in lines]):.0f}"
+    if family == "nothing":
+        for setting in ("clean", "dirty"):
+            alarms = [bool(each["missing"]) for each in lines if each["setting"] == setting]
+            yield share(f"false alarms, {setting}", alarms)
+            honest = [each["verdict"] == "adequate" for each in lines if each["setting"] == setting]
+            yield share(f"called adequate, {setting}", honest)
+        return
+    yield f"  {'visible':<52}{len(seen)} of {len(lines)}"
+    if family in {"removed", "outside"}:
+        yield share("called unexplained", [each["verdict"] in {"unexplained", "untrusted"} for each in seen])
+        yield share("a wrong effect named as all there is", [each["verdict"] in {"missing", "one_of"} for each in seen])
+        return
+    known = [each for each in seen if not any("." not in name and name in _bare() for name in each["hidden"])]
+    yield share("true effect first, or in the set with it", [first(each, each["hidden"][0]) for each in known])
+    if family == "two":
+        yield share("both named", [all(named(each, name) for name in each["hidden"]) for each in known])
+    ones = [each for each in known if single(each)]
+    yield share("one alone named: right", [first(each, each["hidden"][0]) for each in ones])
+    falls = [each["best_rmse_m"] / each["floor_m"] for each in known]
+    if falls:
+        middle, ninety = np.quantile(falls, [0.5, 0.9])
+        yield f"  {'held-out error over the floor: median, 90 %':<52}{middle:.2f}, {ninety:.2f}"
+    for verdict, count in sorted(Counter(each["verdict"] for each in known).items()):
+        yield f"  {'verdict ' + verdict:<52}{count}"
+
+
+def _bare() -> frozenset[str]:
+    """Return the effects that the bare valve already does: nothing is missing, and nothing can be."""
+    return frozenset(name for name in shipped_effects() if any(each not in shipped_effects() for each in _same(name)))
+
+
+def confusion(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield for each effect what was named in its place; sets by their first names."""
+    yield "hidden effect: what was named, clean and dirty, visible cases"
+    for name in shipped_effects():
+        said = Counter(
+            "+".join("/".join(names) for names in each["sets"]) or each["verdict"]
+            for each in lines
+            if each["hidden"] == [name]
+        )
+        if said:
+            yield f"  {name:<22}" + ", ".join(f"{what} {count}" for what, count in said.most_common())
 
 
 def share(what: str, holds: Sequence[bool]) -> str:
-    return f"{what:<44}{sum(holds)} of {len(holds)}" + (f" ({sum(holds) / len(holds):.0%})" if holds else "")
+    """Say how many hold."""
+    return f"  {what:<52}{sum(holds)} of {len(holds)}" + (f" ({sum(holds) / len(holds):.1%})" if holds else "")
+
+
+def kept(folder: Path) -> list[Line]:
+    """Read the lines that are there."""
+    file = folder / "cases.jsonl"
+    return [json.loads(each) for each in file.read_text().splitlines()] if file.is_file() else []
+
+
+def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, int]]:
+    """Return the planned cases that are not there, in turn through the families, so that all grow together."""
+    there = {(each["family"], each["number"]) for each in lines}
+    planned = [
+        ((number + 0.5) / PLANNED[family], family, number) for family in families for number in range(PLANNED[family])
+    ]
+    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--first", type=int, default=0, help="number of the first case (0)")
-    parser.add_argument("--dirty", action="store_true", help="pressure noise, break-away jitter, 12 bits")
-    parser.add_argument(
-        "--library",
-        type=int,
-        default=len(shipped_effects()),
-        metavar="N",
-        help="try only N effects, drawn by the seed (all)",
-    )
+    parser.add_argument("--family", nargs="*", choices=PLANNED, default=list(PLANNED), help="families to run (all)")
+    parser.add_argument("--cases", type=int, default=sum(PLANNED.values()), help="run at most so many now")
+    parser.add_argument("--out", type=Path, default=FOLDER, help="where a line a case is kept")
+    parser.add_argument("--table", action="store_true", help="run nothing, print the tables")
     arguments = parser.parse_args()
-    outcomes = []
-    for index in range(arguments.first, arguments.first + arguments.cases):
-        each = outcome(index, dirty=arguments.dirty, most=arguments.library)
-        outcomes.append(each)
-        found = each.diagnosis
-        where = "" if each.in_library else " (not in the library)"
-        print(
-            f"{each.seed} {each.hidden or 'nothing'}{where}{'' if each.visible or not each.hidden else ', invisible'}: "
-            f"{found.verdict} {', '.join(each.named)}; {1e3 * found.base.errors.test_rmse_m:.4f} to "
-            f"{1e3 * found.best.errors.test_rmse_m:.4f} mm, floor {1e3 * each.floor_m:.4f}; {each.seconds:.0f} s",
-            flush=True,
-        )
-    print(*report(outcomes), sep="\n")
+    lines = kept(arguments.out)
+    todo = [] if arguments.table else missing(arguments.family, lines)[: arguments.cases]
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with ProcessPoolExecutor(os.cpu_count()) as pool, (arguments.out / "cases.jsonl").open("a") as file:
+        for done in as_completed([pool.submit(line, *each) for each in todo]):
+            each = done.result()
+            lines.append(each)
+            print(json.dumps(each), file=file, flush=True)
+            print(_told(each), flush=True)
+    print(*report(lines), sep="\n")
+
+
+def _told(each: Line) -> str:
+    hidden = (", ".join(each["hidden"]) or "nothing") + ("" if each["visible"] else " (invisible)")
+    sets = " + ".join("/".join(names) for names in each["sets"])
+    return (
+        f"{each['family']} {each['number']} {hidden}: {each['verdict']} {sets}; "
+        f"{1e3 * each['base_rmse_m']:.4f} to {1e3 * each['best_rmse_m']:.4f} mm, floor {1e3 * each['floor_m']:.4f}; "
+        f"{each['cpu_seconds']:.0f} s of a core"
+    )
 
 
 if __name__ == "__main__":

@@ -67,15 +67,17 @@ def ways(port: int, independent: ModbusTcpClient) -> dict[str, Callable[[], obje
     }
 
 
-def measured(cycles: dict[str, Callable[[], object]]) -> dict[str, list[float]]:
+def measured(
+    cycles: dict[str, Callable[[], object]], number: int = CYCLES, warm_up: int = WARM_UP
+) -> dict[str, list[float]]:
     """Return the times taken by each, in us, cycle by cycle in turn."""
     times: dict[str, list[float]] = {name: [] for name in cycles}
-    for _ in range(WARM_UP + CYCLES):
+    for _ in range(warm_up + number):
         for name, cycle in cycles.items():
             start_ns = time.perf_counter_ns()
             cycle()
             times[name].append((time.perf_counter_ns() - start_ns) / 1e3)
-    return {name: taken[WARM_UP:] for name, taken in times.items()}
+    return {name: taken[warm_up:] for name, taken in times.items()}
 
 
 def driver_alone(port: int) -> list[float]:

@@ -9,7 +9,8 @@
 
 `record` makes a recording ready for simulation and tells what is wrong with it, `free_run` simulates it, `comparison`
 holds the two against each other, `fitting` finds the parameters, `diagnosis` the effects that are missing, `extension`
-adds them, `report` writes it all down for a browser. `hiding` draws recordings whose hidden effect nobody knows.
+adds them, `report` writes it all down for a browser. Where a rig imposes the position there is nothing to simulate:
+`imposed` reads such forces, `force_diagnosis` balances them. `hiding` draws recordings with an effect nobody knows.
 """
 
 from config.recording import Recording
@@ -17,15 +18,20 @@ from workbench.comparison import Comparison, compare
 from workbench.diagnosis import Diagnosis, diagnose
 from workbench.extension import Extension, extend
 from workbench.fitting import Fit, fit
+from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.imposed import read_imposed
 
 __all__ = [
     "Comparison",
     "Diagnosis",
     "Extension",
     "Fit",
+    "ForceDiagnosis",
     "Recording",
     "compare",
     "diagnose",
+    "diagnose_forces",
     "extend",
     "fit",
+    "read_imposed",
 ]

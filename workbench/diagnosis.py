@@ -1,10 +1,10 @@
 """Diagnose: which effect is missing. Every candidate is refitted in full; none is believed for a falling error alone.
 
 A step fits the valve with each effect of the library added, all with the same effort, and accepts what passes the rule
-of `evidence` inside its physical range. The best by robust BIC on the fitted part is added, unless the bare valve,
-fitted once more from that effect's own base parameters, does as well: an optimiser's failure must not look like
-physics. Steps go on until the result is explained (it reaches the floor and leaves no structured residual), nothing
-more is accepted, or three effects are added.
+of `evidence` inside its physical range. Before that, the valve without is fitted once more from the base parameters of
+the best of those with: an optimiser's failure must not look like physics. The best by robust BIC on the fitted part is
+added. Steps go on until the result is explained (it reaches the floor and leaves no structured residual), nothing more
+is accepted, or three effects are added.
 
     adequate      nothing is missing: no effect is accepted, and the valve is at the floor without
     missing       these effects, and with them all is explained
@@ -15,7 +15,8 @@ more is accepted, or three effects are added.
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from os import cpu_count
 from typing import Literal
 
@@ -24,15 +25,15 @@ from config.recording import Recording
 from config.valve import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect, Parameter, find_effect, shipped_effects
-from workbench.confounding import algebraic_class, bare_parameter, classes, told_apart
-from workbench.evidence import Errors, Gain, alike, errors, gain
+from workbench.confounding import algebraic_class, bare_parameter, classes, imitation, told_apart
+from workbench.evidence import LEAST_BIC, Errors, Gain, alike, bic, errors, gain
 from workbench.experiment import Experiment, experiment
-from workbench.fitting import Fit, fit
+from workbench.fitting import Fit, fit, profiled
 from workbench.free_run import FreeRun
 from workbench.held_out import Split, split
 from workbench.parameters import free_parameters
 from workbench.preview import Suspect, preview
-from workbench.simulation_error import SimulationError
+from workbench.simulation_error import NARROW, SimulationError
 from workbench.structure import STRUCTURED
 
 MOST_ADDED = 3
@@ -175,8 +176,8 @@ class _Search:
         self._split = split([recording] if isinstance(recording, Recording) else recording, test)
         self._valve = valve
         there = {each.name for each in valve.effect}
-        names = [name for name in (shipped_effects() if effects is None else effects) if name not in there]
-        self._library = {name: find_effect(name, "effects") for name in names}
+        named = [find_effect(name, "effects") for name in (shipped_effects() if effects is None else effects)]
+        self._library = {each.written: each for each in named if each.written not in there}
         self._seed = seed
         self._workers = workers or cpu_count() or 1
         self._progress = progress or (lambda _what, _done: None)
@@ -190,6 +191,7 @@ class _Search:
         # A base fitted again, and better, takes the place of the first.
         base, last = steps[0].before, steps[-1]
         best = last.added.model if last.added and last.added.model else last.before
+        base, best = self._profiled(base), self._profiled(best)
         verdict = _verdict(best, steps)
         chosen = self._experiment(steps) if verdict == "one_of" else None
         sentence = _sentence(verdict, best, steps, self._library, self._split.repeats)
@@ -207,23 +209,34 @@ class _Search:
         return tuple(steps)
 
     def _step(self, number: int, before: Model) -> Step:
-        models = self._refitted(number, before)
+        names = [name for name in self._library if name not in before.effects]
+        models = self._refitted(number, before, names)
+        before = self._seeded_by(before, [each for each in models.values() if isinstance(each, Model)])
+        # No effect makes a valve worse: what the base has left behind is refitted from it.
+        behind = [name for name, each in models.items() if isinstance(each, Model) and each.fit.cost > before.fit.cost]
+        models |= self._refitted(number, before, behind)
         candidates, added = self._judged(number, before, models)
-        if added is None or added.model is None:
-            return Step(before, candidates, None, ())
-        bare = ValveFile(valve=added.model.fit.valve.valve, effect=before.fit.valve.effect)
-        if self._descends(before.fit, bare):
-            before = self._model(self._base(bare))
-            candidates, added = self._judged(number, before, models)
         return Step(before, candidates, added, self._alike(candidates, added) if added else ())
 
-    def _descends(self, base: Fit, valve: ValveFile) -> bool:
-        """Whether a search from this valve's parameters ends below the base fit."""
+    def _seeded_by(self, before: Model, models: Sequence[Model]) -> Model:
+        """Return the model before, fitted again where a search from a better one's parameters ends below it."""
+        better = [each.fit.valve for each in models if bic(before.fit) - bic(each.fit) > LEAST_BIC]
+        imitations = [each for each in map(imitation, better) if each]
+        valves = [*(each.valve for each in better), *imitations]
+        bare = [ValveFile(valve=valve, effect=before.fit.valve.effect) for valve in valves]
+        with ThreadPoolExecutor(self._workers) as pool:
+            costs = list(pool.map(partial(self._descended, before.fit), bare))
+        if not costs or min(costs) > BETTER * before.fit.cost:
+            return before
+        return self._model(self._base(bare[costs.index(min(costs))]))
+
+    def _descended(self, base: Fit, valve: ValveFile) -> float:
+        """Return the cost at which a search from this valve's parameters ends."""
         composition = Composition.from_file(valve)
         run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure)
         parameters = free_parameters(composition, tuple(base.parameters))
         error = SimulationError(run, composition, parameters, composition.theta)
-        return error.cost(error.descended(error.coordinates(composition.theta))) < BETTER * base.cost
+        return error.cost(error.descended_at(NARROW, error.coordinates(composition.theta)))
 
     def _base(self, valve: ValveFile) -> Fit:
         return fit(
@@ -231,17 +244,17 @@ class _Search:
             valve,
             seed=self._seed,
             workers=self._workers,
+            profile=False,
             progress=lambda done: self._progress("fitting the valve as it is", done),
         )
 
-    def _refitted(self, number: int, before: Model) -> dict[str, Model | str]:
-        """Refit every effect not yet in, each on one thread; where that is not possible, say why."""
-        names = [name for name in self._library if name not in before.effects]
+    def _refitted(self, number: int, before: Model, names: Sequence[str]) -> dict[str, Model | str]:
+        """Refit the named effects, each on one thread; where that is not possible, say why."""
         train, here = self._split.train.recording, before.fit
 
         def refitted(name: str) -> Model | str:
             try:
-                found = fit(train, here.valve, effects=(name,), base=here, seed=self._seed, workers=1)
+                found = fit(train, here.valve, effects=(name,), base=here, seed=self._seed, workers=1, profile=False)
             except InputError as error:
                 return error.problem
             return self._model(found)
@@ -252,6 +265,9 @@ class _Search:
                 models[name] = model
                 self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
         return models
+
+    def _profiled(self, model: Model) -> Model:
+        return replace(model, fit=profiled(model.fit, self._split.train.recording))
 
     def _model(self, found: Fit) -> Model:
         judged = errors(found, self._split)

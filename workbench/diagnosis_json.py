@@ -1,8 +1,13 @@
-"""A diagnosis as JSON: what `positioner diagnose --json` writes."""
+"""A diagnosis as JSON: what `positioner diagnose --json` writes.
+
+`test_typical_rmse_m` is the median of the held-out blocks' errors. `held_out_gain` is the rule's: no block counts for
+more than a factor of 2 in it, so it never exceeds 0.5.
+"""
 
 from math import isfinite
 from typing import Any
 
+from workbench.confounding import untold
 from workbench.diagnosis import Candidate, Diagnosis, Model
 from workbench.fitting import Fit
 
@@ -18,6 +23,10 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,
         "preview": [{"name": each.name, "score": each.score} for each in diagnosis.preview],
+        "untold": [
+            {"name": each.name, "like": list(each.like), "most_m": each.most_m, "shown_by": each.shown_by}
+            for each in untold(diagnosis.split, diagnosis.best.fit.valve)
+        ],
         "candidates": [_candidate(each) for each in diagnosis.candidates],
     }
 
@@ -28,23 +37,29 @@ def _model(model: Model) -> dict[str, Any]:
         **_errors(model),
         "at_floor": model.at_floor,
         "structure_r2": model.errors.structure,
-        "parameters": _parameters(model.fit),
+        "parameters": parameters_json(model.fit),
     }
 
 
 def _errors(model: Model) -> dict[str, float]:
-    return {"train_rmse_m": model.errors.train_rmse_m, "test_rmse_m": model.errors.test_rmse_m}
+    return {
+        "train_rmse_m": model.errors.train_rmse_m,
+        "test_rmse_m": model.errors.test_rmse_m,
+        "test_typical_rmse_m": model.errors.test_block_m,
+    }
 
 
-def _parameters(fit: Fit) -> dict[str, dict[str, float | None]]:
+def parameters_json(fit: Fit) -> dict[str, dict[str, float | bool | None]]:
+    """Return what was fitted; a bound that the recording leaves open is null."""
     return {
         name: {key: _finite(getattr(each, key)) for key in ("value", "std", "lower", "upper")}
+        | {"physical": each.physical}
         for name, each in fit.parameters.items()
     }
 
 
 def _finite(value: float) -> float | None:
-    """JSON has no infinity: what a recording leaves open is null."""
+    """JSON has no infinity."""
     return value if isfinite(value) else None
 
 
@@ -56,10 +71,11 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "name": candidate.name,
         "train_rmse_m": model and model.errors.train_rmse_m,
         "test_rmse_m": model and model.errors.test_rmse_m,
+        "test_typical_rmse_m": model and model.errors.test_block_m,
         "evidence": found and found.bic,
         "held_out_gain": found and found.held_out,
         "held_out_standard_errors": found and found.standard_errors,
-        "parameters": _parameters(model.fit) if model else {},
+        "parameters": parameters_json(model.fit) if model else {},
         "physical": candidate.physical,
         "accepted": candidate.accepted,
         "why_not": candidate.why_not,

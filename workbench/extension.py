@@ -14,6 +14,7 @@ from config.errors import InputError
 from config.recording import Recording
 from config.valve import ValveFile
 from sim.composition import Composition
+from sim.effect import find_effect
 from workbench.evidence import Errors, Gain, errors, gain
 from workbench.fitting import Fit, fit
 from workbench.free_run import FreeRun
@@ -62,7 +63,7 @@ def extend(
     Args:
         recording: one or several.
         valve: the valve to be extended.
-        effects: names of the effects to be added together.
+        effects: names, or paths of own effects' files, to be added together.
         test: held out; by default the last third of the recording.
         seed: of the searches.
         workers: threads, by default one a core.
@@ -71,8 +72,9 @@ def extend(
     Raises:
         InputError: the recording holds too little or other units than SI, an unknown effect or one that is there.
     """
+    there = {find_effect(each.name, "valve file").name for each in valve.effect}
     for name in effects:
-        if name in (each.name for each in valve.effect):
+        if find_effect(name, "effects").name in there:
             raise InputError("valve file", f"effect {name} is there already")
     tell = progress or (lambda _what, _done: None)
     on = split([recording] if isinstance(recording, Recording) else recording, test)

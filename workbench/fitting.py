@@ -10,7 +10,8 @@ workers, which are threads: the simulation holds no interpreter lock.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from os import cpu_count
 from typing import Any, TypeVar
 
@@ -26,21 +27,36 @@ from sim.karnopp import Vector
 from workbench.free_run import FreeRun
 from workbench.measures import fit_percent
 from workbench.motion import slips
-from workbench.parameters import DEFAULT, STATIC, Parameter, free_parameters, strengths
-from workbench.record import Record, ready, require_units
-from workbench.simulation_error import SCALES, SimulationError
+from workbench.parameters import COULOMB, DEFAULT, STATIC, Parameter, free_parameters, strengths
+from workbench.record import Record, ready, require_fittable, require_units
+from workbench.simulation_error import MIDDLE, NARROW, STRIDES, WIDE, SimulationError
 from workbench.starts import drawn, forces_regressed
 from workbench.uncertainty import Uncertainty, uncertainty
 
-STARTS, STARTS_EFFECT = 6, 11
-"""Searches made, of the base and of a valve with an effect added."""
-POLLED = 3
-"""Of these, the best are carried to the end by polling, the very best once more down and polled."""
-BASE_SEEDS = 3
-"""Base fits on which an effect's strengths are tried."""
-DRAWS_REGRESSED, DRAWS_FILE = 40, 12
-SCREEN = SCALES[1]
-AGREE = 1.05
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much a search takes upon itself."""
+
+    starts: int
+    """Searches begun, at the wide level."""
+    carried: int
+    """The best of these are carried on through the other levels,"""
+    polled: int
+    """and of those at most so many, two at a time, are polled,"""
+    agreeing: int
+    """until so many have come to the same."""
+
+
+OF_BASE, OF_EFFECT = Effort(16, 8, 6, 3), Effort(14, 4, 3, 2)
+EXCESSES = (1.0, 0.5, 0.1)
+"""Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
+ELSEWHERE = 0.01
+"""Of a log-parameter: searches that end nearer to each other have found the same place."""
+DRAWS_REGRESSED, DRAWS_FILE, DRAWS_EFFECT = 40, 12, 150
+EACH_SEEDS = 2
+"""Strengths begun at each base fit; the other searches begin at draws."""
+AGREE = 1.01
 """Searches agree if their costs are within this factor of the best."""
 FLAT = 0.5
 """Rise of the cost that is nothing: within it static friction is put in the middle."""
@@ -91,13 +107,13 @@ class Fit:
     starts: tuple[Search, ...]
     """The searches, best first."""
     agreement: int
-    """How many of the three searches that were carried to the end came within 5 % of the best cost."""
+    """How many of the searches that were carried to the end came within 1 % of the best cost."""
     condition: float
     undetermined: tuple[str, ...]
     notes: tuple[str, ...]
     from_pressure: bool
     seeds: tuple[Vector, ...] = field(repr=False)
-    """Parameter vectors of the best searches."""
+    """Parameter vectors at which an effect is added: the best search's, another's that ended elsewhere, the origins."""
 
     @property
     def trusted(self) -> bool:
@@ -128,6 +144,7 @@ def fit(
     workers: int | None = None,
     from_pressure: bool = False,
     base: Fit | None = None,
+    profile: bool = True,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit a valve to a recording.
@@ -142,22 +159,37 @@ def fit(
         workers: threads, by default one a core.
         from_pressure: simulate from the measured pressure instead of the command, without the pressure path.
         base: the fit without `effects`, if it is there already.
+        profile: follow the cost for the intervals; without, they are those of the derivatives, at half the time.
         progress: told the fraction done.
 
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect or parameter.
     """
+    require_fittable(recording)
     record = ready(recording)
     require_units(record, valve.valve)
     _require_motion(record)
     if not effects:
         composition = Composition.from_file(valve)
         error = _error(composition, record, free, from_pressure)
-        return _searched(composition, error, _base_starts(composition, error, seed), workers, progress)
+        origins = _origins(composition, error)
+        found = _searched(composition, error, _base_starts(error, origins, seed), OF_BASE, profile, workers, progress)
+        return replace(found, seeds=(*found.seeds, *origins))
     ground = base or fit(recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free))
     composition = _extended(ground.valve, effects)
     error = _error(composition, record, free, from_pressure)
-    return _searched(composition, error, _effect_starts(composition, error, effects, ground), workers, progress)
+    begins = _effect_starts(composition, error, effects, ground)
+    return _searched(composition, error, begins, OF_EFFECT, profile, workers, progress)
+
+
+def profiled(found: Fit, recording: Recording) -> Fit:
+    """Return a fit with the intervals that following its cost gives."""
+    composition = Composition.from_file(found.valve)
+    error = _error(composition, ready(recording), tuple(found.parameters), found.from_pressure)
+    z = error.coordinates(composition.theta)
+    judged = uncertainty(error, z)
+    parameters = {each.name: _fitted(error, z, judged, i) for i, each in enumerate(error.parameters)}
+    return replace(found, parameters=parameters, condition=judged.condition, undetermined=judged.undetermined)
 
 
 def _error(
@@ -211,25 +243,63 @@ def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTa
     return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
 
 
-def _base_starts(composition: Composition, error: SimulationError, seed: int) -> list[Vector]:
-    """Return coordinates: the valve file's, the regression's, and draws round both; the best by the screening cost."""
-    generator = np.random.default_rng(seed)
+def _origins(composition: Composition, error: SimulationError) -> tuple[Vector, Vector]:
+    """Return the parameter vectors where all begins: the valve file's and the regression's."""
     theta = composition.theta
-    regressed = forces_regressed(theta, error.run.record, error.run.from_pressure)
+    return theta, forces_regressed(theta, error.run.record, error.run.from_pressure)
+
+
+def _base_starts(error: SimulationError, origins: tuple[Vector, Vector], seed: int) -> list[Vector]:
+    """Return coordinates: the origins and draws round both, the best by the screening cost."""
+    generator = np.random.default_rng(seed)
+    theta, regressed = origins
     pool = [theta, regressed, *drawn(regressed, DRAWS_REGRESSED, generator), *drawn(theta, DRAWS_FILE, generator)]
-    return _screened(error, [error.coordinates(each) for each in pool], STARTS)
+    return _screened(error, [error.coordinates(each) for each in pool], OF_BASE.starts)
 
 
 def _effect_starts(composition: Composition, error: SimulationError, effects: Sequence[str], base: Fit) -> list[Vector]:
-    """Return coordinates: each base seed with each strength, the best by the screening cost, and the base as it is."""
+    """Return coordinates: the base as it is, and at each of its seeds the best strengths by the screening cost."""
     names = {find_effect(name, "effects").name for name in effects}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
-    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds[:BASE_SEEDS]]
-    grid = [_with(error, theta, added, values) for theta in seeds for values in strengths(added)]
+    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
     switched_off = error.coordinates(seeds[0])
     weakest = min((switched_off, *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost)
-    return [weakest, *_screened(error, grid, STARTS_EFFECT)]
+    grids = [
+        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in strengths(added)]
+        for theta in seeds
+    ]
+    chosen = [z for grid in grids for z in _screened(error, grid, EACH_SEEDS)]
+    between = _between(error, seeds[0], added)
+    return [weakest, *chosen, *_screened(error, between, OF_EFFECT.starts - len(chosen))]
+
+
+def _between(error: SimulationError, theta: Vector, added: Sequence[Parameter]) -> list[Vector]:
+    """Return draws between an effect's outermost strengths, with any part of the static friction."""
+    generator = np.random.default_rng(0)
+    corners = [error.coordinates(each) for each in (_sticking(theta, 0.0), theta)]
+    pool = []
+    for _ in range(DRAWS_EFFECT):
+        z = corners[0] + generator.uniform() * (corners[1] - corners[0])
+        for i, parameter in enumerate(error.parameters):
+            if parameter in added:
+                low, high = (_coordinate(parameter, theta, end(parameter.starts)) for end in (min, max))
+                z[i] = generator.uniform(low, high)
+        pool.append(z)
+    return pool
+
+
+def _coordinate(parameter: Parameter, theta: Vector, value: float) -> float:
+    changed = theta.copy()
+    changed[parameter.index] = value
+    return parameter.coordinate(changed)
+
+
+def _sticking(theta: Vector, part: float) -> Vector:
+    """Leave only a part of what static friction has above Coulomb's."""
+    changed = theta.copy()
+    changed[STATIC] = theta[COULOMB] + part * (theta[STATIC] - theta[COULOMB])
+    return changed
 
 
 def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
@@ -239,27 +309,42 @@ def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], val
     return error.coordinates(changed)
 
 
-def _screened(error: SimulationError, pool: list[Vector], count: int) -> list[Vector]:
-    return sorted(pool, key=lambda z: error.cost(z, SCREEN))[:count]
+def _screened(error: SimulationError, pool: Iterable[Vector], count: int) -> list[Vector]:
+    return sorted(pool, key=lambda z: error.rough.cost(z, MIDDLE.scale))[:count]
 
 
 def _searched(
     composition: Composition,
     error: SimulationError,
     begins: list[Vector],
+    effort: Effort,
+    profile: bool,
     workers: int | None,
     progress: Progress | None,
 ) -> Fit:
     """Search from every start, poll the best, and judge what was found."""
     tell = progress or (lambda _: None)
+    wide = partial(error.rough.descended_at, WIDE)
+
+    def middle(z: Vector) -> Vector:
+        return error.rough.polled(error.rough.descended_at(MIDDLE, z), STRIDES, MIDDLE.scale)
+
+    narrow = partial(error.descended_at, NARROW)
+
+    begun = _each(wide, begins, workers, lambda done: tell(0.3 * done))
+    carried = _each(middle, _screened(error, begun, effort.carried), workers, lambda done: tell(0.3 + 0.2 * done))
     # The first start as it is stays in the race: descent at a wide scale may lose it.
-    down = sorted([*_each(error.descended, begins, workers, lambda done: tell(0.6 * done)), begins[0]], key=error.cost)
-    polled = _each(error.polled, down[:POLLED], workers, lambda done: tell(0.6 + 0.3 * done))
-    ends = sorted([*polled, error.polled(error.descended(min(polled, key=error.cost)))], key=error.cost)
+    down = _each(narrow, [*carried, begins[0]], workers, lambda done: tell(0.5 + 0.2 * done))
+    down.sort(key=error.cost)
+    ends: list[Vector] = []
+    while len(ends) < effort.polled and _agreeing(error, ends) < effort.agreeing:
+        pair = down[len(ends) : min(len(ends) + 2, effort.polled)]
+        ends = sorted([*ends, *_each(error.polled, pair, workers, lambda done: tell(0.7 + 0.2 * done))], key=error.cost)
+    if _agreeing(error, ends) < effort.agreeing:
+        ends = sorted([*ends, error.polled(narrow(ends[0]))], key=error.cost)
     best = _centred(error, ends[0])
-    judged = uncertainty(error, best, ends)
+    judged = uncertainty(error, best, ends, profile=profile)
     tell(1.0)
-    costs = [error.cost(z) for z in polled]
     valve = _fitted_file(composition, error.theta(best))
     return Fit(
         valve,
@@ -268,14 +353,26 @@ def _searched(
         error.run.record.floor_m,
         error.cost(best),
         error.count,
-        tuple(_search(error, z) for z in sorted([*ends, *down[POLLED:]], key=error.cost)),
-        sum(cost <= AGREE * error.cost(ends[0]) for cost in costs),
+        tuple(_search(error, z) for z in ends),
+        _agreeing(error, ends),
         judged.condition,
         judged.undetermined,
         error.run.record.notes,
         error.run.from_pressure,
-        (error.theta(best), *(error.theta(z) for z in ends[1:])),
+        tuple(error.theta(z) for z in (best, *_elsewhere(ends))),
     )
+
+
+def _elsewhere(ends: Sequence[Vector]) -> list[Vector]:
+    """Return the best search that came to another place than the best of all, if there is one."""
+    away = [z for z in ends if np.max(np.abs(z - ends[0])) > ELSEWHERE]
+    return away[:1]
+
+
+def _agreeing(error: SimulationError, ends: Sequence[Vector]) -> int:
+    """Count the searches that came as low as the best."""
+    costs = [error.cost(z) for z in ends]
+    return sum(cost <= AGREE * min(costs) for cost in costs)
 
 
 def _centred(error: SimulationError, z: Vector) -> Vector:
@@ -333,7 +430,7 @@ def _fitted_file(composition: Composition, theta: Vector) -> ValveFile:
     values: dict[str, Any] = dict(zip(composition.names, theta.tolist(), strict=True))
     base = composition.valve.model_dump() | {name: values[name] for name in BASE}
     tables = [
-        {"name": each.name} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
+        {"name": each.written} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
         for each in composition.effects
     ]
     return validated(ValveFile, {"valve": base, "effect": tables}, composition.source)

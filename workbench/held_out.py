@@ -11,7 +11,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column, Recording
-from workbench.record import Mask, Record, ready
+from workbench.record import Mask, Record, ready, require_fittable
 
 HELD_OUT = 1.0 / 3.0
 """Part of the recording that is held out where no other is given."""
@@ -47,9 +47,10 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
     """Set apart what is held out.
 
     Raises:
-        InputError: no recording, or too few samples.
+        InputError: no recording, too few samples, or more than can be fitted.
     """
     whole = joined(recordings)
+    require_fittable(whole)
     end = len(whole) if test else round(len(whole) * (1.0 - HELD_OUT))
     train = _part(_head(whole, end), 0)
     judged = _part(test, 0) if test else _part(whole, end)

@@ -32,8 +32,9 @@ class Step(Schema):
         found, before, after = extension.gain, extension.refitted_errors, extension.extended_errors
         return cls(
             effects=extension.effects,
-            why=f"evidence {found.bic:.4g}; the held-out block error falls by {100 * found.held_out:.3g} %, "
-            f"{found.standard_errors:.3g} standard errors",
+            why=f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
+            f"{1e3 * before.test_block_m:.4g} to {1e3 * after.test_block_m:.4g} mm, "
+            f"over all seconds by {found.standard_errors:.3g} standard errors",
             given_train_rmse_m=extension.given_train_rmse_m,
             given_test_rmse_m=extension.given_test_rmse_m,
             refitted_train_rmse_m=before.train_rmse_m,

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
-from config.recording import Column, Recording
+from config.recording import CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.valve import ValveParameters
 from workbench.noise import noise_std_m, quantum_m, repeatability_m
 
@@ -23,6 +23,13 @@ UNEVEN = 0.05
 """Sampling is uneven if its periods spread by more than this part of their median."""
 SHORTEST = 4
 """Samples of a segment worth simulating."""
+FEW_STEPS = 10
+"""So often a clock may be set back, in however short a recording: several may have been joined."""
+LIKELY_SPIKE = 8.0
+"""Standard deviations of the noise that a spike stands off at least."""
+MOST_SAMPLES = 500_000
+LONGEST_S = 7200.0
+"""A fit simulates a recording thousands of times: with more samples, or for longer, it would take hours."""
 UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
 Mask = npt.NDArray[np.bool_]
 
@@ -63,9 +70,11 @@ def ready(recording: Recording) -> Record:
     """Make a recording ready.
 
     Raises:
-        InputError: no command or no position in it is a number, or no stretch of it is long enough.
+        InputError: a column is missing or of another length, the time is in disorder, no command or no position is a
+            number, or no stretch is long enough.
     """
     columns = recording.columns
+    _require_columns(columns)
     notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key == "torn" or key.startswith("not ")]
     command_pa = _held(recording.command_pa, notes)
     position_m = recording.position_m
@@ -92,8 +101,24 @@ def ready(recording: Recording) -> Record:
     )
 
 
+def require_fittable(recording: Recording) -> None:
+    """Refuse what would take hours to fit.
+
+    Raises:
+        InputError: too many samples, or too long a time; says how much is allowed.
+    """
+    _require_columns(recording.columns)
+    count, steps = len(recording), np.diff(recording.time_s)
+    most = f"allowed are {MOST_SAMPLES} samples and {LONGEST_S:g} s: cut out the stretch that matters"
+    if count > MOST_SAMPLES:
+        raise InputError("recording", f"{count} samples would take hours to fit; {most}")
+    duration_s = float(np.sum(steps, where=(steps > 0.0) & (steps <= _longest_step_s(steps))))
+    if duration_s > LONGEST_S:
+        raise InputError("recording", f"{duration_s:.6g} s would take hours to fit; {most}")
+
+
 def require_units(record: Record, valve: ValveParameters) -> None:
-    """Recognise a position in per cent or mm and a pressure in bar, psi, kPa or mbar.
+    """Recognise a position in per cent, mm or shares of the stroke, and a pressure in bar, psi, kPa or mbar.
 
     Raises:
         InputError: the numbers are those of another unit; says which and how to import it.
@@ -107,6 +132,17 @@ def require_units(record: Record, valve: ValveParameters) -> None:
             f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m: it looks like {unit}; "
             "import it, --column position_m=NAME:%",
         )
+    if reached > 3.0 * valve.stroke_m and 0.3 < reached < 1.5:
+        raise InputError(
+            "recording",
+            f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m: it looks like a share of the "
+            "stroke, 0 to 1; give it in m",
+        )
+    _require_command_unit(record, valve, position_m)
+    _require_pressure_unit(record)
+
+
+def _require_command_unit(record: Record, valve: ValveParameters, position_m: Column) -> None:
     needed_pa = (valve.spring_n_per_m * float(np.ptp(position_m)) + 2.0 * valve.coulomb_n) / valve.diaphragm_area_m2
     span_pa = float(np.ptp(record.command_pa))
     if span_pa == 0.0 or span_pa > 0.03 * needed_pa:
@@ -115,9 +151,43 @@ def require_units(record: Record, valve: ValveParameters) -> None:
     if 0.2 < span_pa * UNITS_PA[unit] / needed_pa < 5.0:
         raise InputError(
             "recording",
-            f"command_pa spans {span_pa:.4g} where the motion takes some {needed_pa:.3g} Pa: it looks like {unit}; "
-            f"import it, --column command_pa=NAME:{unit}",
+            f"command_pa spans {span_pa:.4g} where the motion takes some {needed_pa:.3g} Pa: it looks like "
+            f"{'kPa or per cent (%)' if unit == 'kPa' else unit}; import it, --column command_pa=NAME:{unit}",
         )
+
+
+def _require_pressure_unit(record: Record) -> None:
+    """Hold the measured pressure against the command: both are the same quantity, but for a lag."""
+    if record.pressure_pa is None:
+        return
+    command_pa, measured = float(np.max(np.abs(record.command_pa))), float(np.max(np.abs(record.pressure_pa)))
+    for unit, factor in UNITS_PA.items():
+        if 0.0 < measured < 0.03 * command_pa and 0.3 < measured * factor / command_pa < 3.0:
+            raise InputError(
+                "recording",
+                f"pressure_pa reaches {measured:.4g} where command_pa reaches {command_pa:.4g} Pa: it looks like "
+                f"{unit}; import it, --column pressure_pa=NAME:{unit}",
+            )
+
+
+def _require_columns(columns: Mapping[str, Column]) -> None:
+    there = ", ".join(columns) or "none"
+    for name in REQUIRED:
+        if name not in columns:
+            imposed = "pressure_pa" in columns and "load_n" in columns
+            hint = "; where a rig imposes the position: workbench.diagnose_forces" if imposed else ""
+            raise InputError("recording", f"column {name} is missing; there are: {there}{hint}")
+    count = len(columns["time_s"])
+    if not count:
+        raise InputError("recording", "holds no samples")
+    for name, column in columns.items():
+        if len(column) != count:
+            raise InputError("recording", f"{name} holds {len(column)} values, time_s {count}: one a sample is needed")
+    if not np.isfinite(columns["time_s"]).all():
+        raise InputError("recording", "time_s: not every sample is a number")
+    set_back = int(np.sum(np.diff(columns["time_s"]) <= 0.0))
+    if set_back > max(FEW_STEPS, CLOCK_STEPS_TOLERATED * count):
+        raise InputError("recording", f"time_s must increase: it does not at {set_back} of {count} samples")
 
 
 def _held(command_pa: Column, notes: list[str]) -> Column:
@@ -151,7 +221,8 @@ def _spikes(position_m: Column) -> Mask:
     if here.size:
         middle_half = np.nanquantile(position_m, 0.99) - np.nanquantile(position_m, 0.01)
         off = np.minimum(np.abs(here - before), np.abs(here - after))
-        spikes[1:-1] = (off > 0.1 * middle_half) & (off > 20.0 * np.abs(after - before)) & (off > 0.0)
+        least_m = max(0.1 * middle_half, LIKELY_SPIKE * noise_std_m(position_m))
+        spikes[1:-1] = (off > least_m) & (off > 20.0 * np.abs(after - before)) & (off > 0.0)
         if middle_half == 0.0:
             spikes[:] = False
     return spikes
@@ -160,8 +231,7 @@ def _spikes(position_m: Column) -> Mask:
 def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple[int, int]]:
     time_s = columns["time_s"]
     steps = np.diff(time_s)
-    forward = steps[steps > 0]
-    longest_s = GAP * float(np.quantile(forward, 0.95)) if forward.size else np.inf
+    longest_s = _longest_step_s(steps)
     breaks: dict[int, str] = {}
     for row in np.flatnonzero(steps <= 0).tolist():
         breaks[row + 1] = f"the clock is set back by {-steps[row]:.6g} s"
@@ -181,6 +251,12 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
             yield first, end
         else:
             notes.append(f"samples {first + 1} to {end} stand alone: not simulated")
+
+
+def _longest_step_s(steps: Column) -> float:
+    """Return the longest step of time that is no gap."""
+    forward = steps[steps > 0.0]
+    return GAP * float(np.quantile(forward, 0.95)) if forward.size else np.inf
 
 
 def _tell_sampling(time_s: Column, segments: tuple[tuple[int, int], ...], notes: list[str]) -> None:

@@ -18,6 +18,8 @@ from workbench.phases import PHASES, Matched, SlipEvents
 
 CERTAIN = 3.5
 FEWEST = 3
+TOLD = 8
+"""Notes told one by one."""
 SHARE = 0.5
 """Part of the squared error from which a phase is named."""
 
@@ -50,7 +52,7 @@ def sentences(found: Findings) -> tuple[str, ...]:
     """Return the sentences."""
     if not found.measured_slips:
         invented = len(found.events.invented_s)
-        tail = f", the model moves {invented} times" if invented else ""
+        tail = f", the model makes {_count(invented)}" if invented else ""
         return (f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion",)
     said = []
     if len({each.direction for each in found.measured_slips}) == 1:
@@ -61,6 +63,13 @@ def sentences(found: Findings) -> tuple[str, ...]:
     graded = [*_along_motion(found), *_late(found), *_offset(found), *_trends(found)]
     said += [text for _, text in sorted(graded, key=lambda each: -each[0])]
     return (*said, *_slips(found), *_share(found), *_rest(found, bool(graded)))
+
+
+def shortened(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return what is said of a recording, many times told only begun: a bad line may lose samples by the thousand."""
+    if len(notes) <= TOLD + 1:
+        return tuple(notes)
+    return (*notes[:TOLD], f"and {len(notes) - TOLD} more of the kind")
 
 
 def _along_motion(found: Findings) -> Iterator[tuple[float, str]]:
@@ -152,8 +161,11 @@ def _trends(found: Findings) -> Iterator[tuple[float, str]]:
 
 def _slips(found: Findings) -> Iterator[str]:
     missed, invented = len(found.events.missed_s), len(found.events.invented_s)
-    if missed or invented:
-        yield f"it misses {missed} of {len(found.measured_slips)} slips and invents {invented}"
+    said = [f"misses {missed} of {len(found.measured_slips)} slips"] if missed else []
+    if invented:
+        said.append(f"invents {invented}" if missed else f"invents {_count(invented)} that the stem does not make")
+    if said:
+        yield f"it {' and '.join(said)}"
 
 
 def _share(found: Findings) -> Iterator[str]:
@@ -191,6 +203,10 @@ def _block_mean(found: Findings, rows: NDArray[np.bool_]) -> tuple[float, float]
 
 def _certain(mean: float, error: float, matters: float) -> bool:
     return abs(mean) > CERTAIN * error and abs(mean) > matters
+
+
+def _count(slips: int) -> str:
+    return f"{slips} slip{'s' if slips > 1 else ''}"
 
 
 def _mm(value_m: float) -> str:

@@ -5,7 +5,13 @@
 The cost is a staircase: a slip happens or does not. So the scale falls, 100, 30, 5 sigma, and with it the step of the
 forward differences, 1e-3, 3e-4, 1e-4 of a log-parameter: large errors are first bounded, then resolved. Polling
 ends the search where derivatives see no further.
+
+The wide scales do with a simulation of longer steps (`rough`); what is compared in the end is always the fine one.
 """
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +21,23 @@ from sim.karnopp import Vector
 from workbench.free_run import FreeRun
 from workbench.parameters import Parameter
 
-SCALES = (100.0, 30.0, 5.0)
-STEPS = (1e-3, 3e-4, 1e-4)
-FINAL = SCALES[-1]
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A stage of the descent."""
+
+    scale: float
+    """Of the soft-L1 cost, in sigma."""
+    difference: float
+    """Step of the forward differences."""
+    enough: float
+    """Relative fall of the cost in an iteration below which the level is done."""
+
+
+WIDE, MIDDLE, NARROW = Level(100.0, 1e-3, 1e-2), Level(30.0, 3e-4, 1e-3), Level(5.0, 1e-4, 1e-4)
+FINAL = NARROW.scale
+ROUGH_STEP_S = 1e-3
+STRIDES = (0.5, 0.2, 0.07)
 POLLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 MOST_ITERATIONS = 12
 MOST_DAMPINGS = 5
@@ -26,8 +46,6 @@ NOTICED = 1e-4
 """Relative fall of the cost for which polling goes on."""
 LONGEST_MOVE = 0.5
 """Of a log-parameter in one iteration."""
-ENOUGH = 1e-5
-"""Relative fall of the cost below which a scale is done."""
 HOPELESS = 1e6
 """What a residual that is not finite counts, in sigma."""
 
@@ -39,6 +57,7 @@ class SimulationError:
         self, run: FreeRun, composition: Composition, parameters: tuple[Parameter, ...], theta: Vector
     ) -> None:
         record = run.record
+        self._composition = composition
         self.parameters = parameters
         self.run = run
         simulated = np.zeros(len(record), dtype=np.bool_)
@@ -48,8 +67,15 @@ class SimulationError:
         self._measured_m = record.position_m[self._rows]
         self.sigma_m = record.noise_m or 1e-6 * composition.valve.stroke_m
         self._theta = np.array(theta)
+        self._costs: dict[tuple[bytes, float], float] = {}
         bounds = np.array([each.bounds for each in parameters]).reshape(-1, 2)
         self.lower, self.upper = bounds[:, 0], bounds[:, 1]
+
+    @cached_property
+    def rough(self) -> "SimulationError":
+        """The same over a simulation of longer steps."""
+        run = FreeRun(self._composition, self.run.record, from_pressure=self.run.from_pressure, step_s=ROUGH_STEP_S)
+        return SimulationError(run, self._composition, self.parameters, self._theta)
 
     @property
     def count(self) -> int:
@@ -74,8 +100,11 @@ class SimulationError:
         return np.clip(np.nan_to_num(error, nan=HOPELESS, posinf=HOPELESS, neginf=-HOPELESS), -HOPELESS, HOPELESS)
 
     def cost(self, z: Vector, scale: float = FINAL) -> float:
-        """Return the soft-L1 cost, half a sum of squares for small residuals."""
-        return soft(self.residuals(z), scale)
+        """Return the soft-L1 cost, half a sum of squares for small residuals; once worked out it is kept."""
+        key = (z.tobytes(), scale)
+        if key not in self._costs:
+            self._costs[key] = soft(self.residuals(z), scale)
+        return self._costs[key]
 
     def rms_m(self, z: Vector) -> float:
         """Return the plain rms error, m."""
@@ -92,19 +121,19 @@ class SimulationError:
         return np.array(columns).T
 
     def descended(self, z: Vector) -> Vector:
-        """Go down from z through the falling scales."""
-        for scale, step in zip(SCALES, STEPS, strict=True):
-            z = self._levenberg_marquardt(z, scale, step)
+        """Go down from z through all levels."""
+        for level in (WIDE, MIDDLE, NARROW):
+            z = self.descended_at(level, z)
         return z
 
-    def _levenberg_marquardt(self, z: Vector, scale: float, step: float) -> Vector:
-        """Go down at one scale: normal equations weighted by 1 / sqrt(1 + (r / s)^2), damped until the cost falls."""
+    def descended_at(self, level: Level, z: Vector) -> Vector:
+        """Go down from z at one level: Levenberg's and Marquardt's, weighted by 1 / sqrt(1 + (r / s)^2)."""
         damping = 1e-3
         residuals = self.residuals(z)
-        cost = soft(residuals, scale)
+        cost = soft(residuals, level.scale)
         for _ in range(MOST_ITERATIONS):
-            weights = 1.0 / np.sqrt(1.0 + (residuals / scale) ** 2)
-            J = self.jacobian(z, step)
+            weights = 1.0 / np.sqrt(1.0 + (residuals / level.scale) ** 2)
+            J = self.jacobian(z, level.difference)
             gradient = J.T @ (weights * residuals)
             curvature = (J.T * weights) @ J
             ridge = np.diag(np.maximum(np.diag(curvature), 1e-9))
@@ -113,30 +142,30 @@ class SimulationError:
                 move = np.linalg.solve(curvature + damping * ridge, -gradient)
                 there = np.clip(z + np.clip(move, -LONGEST_MOVE, LONGEST_MOVE), self.lower, self.upper)
                 tried = self.residuals(there)
-                if soft(tried, scale) < cost:
-                    z, residuals, cost = there, tried, soft(tried, scale)
+                if soft(tried, level.scale) < cost:
+                    z, residuals, cost = there, tried, soft(tried, level.scale)
                     damping *= 0.2
                     break
                 damping *= 6.0
-            if cost > before * (1.0 - ENOUGH):
+            if cost > before * (1.0 - level.enough):
                 return z
         return z
 
-    def polled(self, z: Vector) -> Vector:
+    def polled(self, z: Vector, steps: Sequence[float] = POLLS, scale: float = FINAL) -> Vector:
         """Try each direction both ways by falling steps until none helps.
 
         The directions are the coordinates and the eigenvectors of J'J, which follow the valleys.
         """
-        best = self.cost(z)
-        J = self.jacobian(z, STEPS[0])
+        best = self.cost(z, scale)
+        J = self.jacobian(z, WIDE.difference)
         _, vectors = np.linalg.eigh(J.T @ J)
         ways = [*np.eye(z.size), *(vectors / np.max(np.abs(vectors), axis=0)).T]
-        for step in POLLS:
+        for step in steps:
             for _ in range(MOST_SWEEPS):
                 before = best
                 for way in (sign * step * each for each in ways for sign in (1.0, -1.0)):
                     there = np.clip(z + way, self.lower, self.upper)
-                    cost = self.cost(there)
+                    cost = self.cost(there, scale)
                     if cost < best * (1.0 - NOTICED):
                         z, best = there, cost
                 if best == before:

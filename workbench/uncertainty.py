@@ -4,10 +4,11 @@
     kappa = mean square residual (at least 1) x (1 + 2 sum rho_k), rho_k the residual's autocorrelation up to its first
             zero: correlated errors count for fewer samples
 
-The interval of a parameter follows the cost itself along the direction in which the others give way, C_i / C_ii, out
-to where it last stays below a rise of 1.92 kappa (95 %), and takes in every other search that ended below it: a
-staircase has no other slope. The condition number is that of J scaled
-to unit columns; a combination is not determined if its standard deviation exceeds 1, a factor of e.
+The interval of a parameter follows the cost itself, out to where it last stays below a rise of 1.92 kappa (95 %): the
+parameter is moved alone and along the direction in which the others give way, C_i / C_ii, and from either the others
+take one step of Gauss and Newton. It takes in every other search that ended below the rise: a staircase has no other
+slope. The condition number is that of J scaled to unit columns; a combination is not determined if its standard
+deviation exceeds 1, a factor of e.
 """
 
 from collections.abc import Sequence
@@ -24,8 +25,12 @@ DIFFERENCE = 1e-3
 RISE_95 = 1.92
 FARTHEST = 1.0
 """Of a log-parameter: an interval is not followed farther."""
+GIVEN_UP = 3
+"""Doublings above the limit after which the cost is taken to stay there."""
 INVOLVED = 0.3
 """Component of a unit vector from which a parameter is named as part of a combination."""
+NOTHING = 1e-30
+"""Of the largest eigenvalue: an information that is none."""
 ILL = 1e4
 """Condition number from which the worst combination is told even if its deviation is below 1."""
 
@@ -43,8 +48,10 @@ class Uncertainty:
     """Rise of the cost that counts as significant, 1.92 kappa."""
 
 
-def uncertainty(error: SimulationError, z: Vector, others: Sequence[Vector] = ()) -> Uncertainty:
-    """Judge a minimum, `others` being where other searches ended."""
+def uncertainty(
+    error: SimulationError, z: Vector, others: Sequence[Vector] = (), *, profile: bool = True
+) -> Uncertainty:
+    """Judge a minimum, `others` being where other searches ended; without `profile` by the derivatives alone."""
     residuals = error.residuals(z)
     weights = 1.0 / np.sqrt(1.0 + (residuals / FINAL) ** 2)
     J = _central(error, z) * np.sqrt(weights)[:, None]
@@ -58,13 +65,15 @@ def uncertainty(error: SimulationError, z: Vector, others: Sequence[Vector] = ()
     std = np.sqrt(np.diag(covariance))
     std[~seen] = np.inf
     rise = RISE_95 * kappa
-    ends = [_interval(error, z, _direction(covariance, i), std[i], rise, i) for i in range(z.size)]
     limit = error.cost(z) + rise
+    lower, upper = z - 1.96 * std, z + 1.96 * std
+    if profile:
+        curve = _Curve(error, z, J, np.sqrt(weights), covariance, limit)
+        lower, upper = np.array([curve.interval(i, float(std[i])) for i in range(z.size)]).T
     as_good = np.array([z, *(each for each in others if error.cost(each) < limit)])
-    lower, upper = np.array(ends).T
     lower, upper = np.minimum(lower, as_good.min(axis=0)), np.maximum(upper, as_good.max(axis=0))
     condition = float(np.linalg.cond(scaled)) if seen.all() else np.inf
-    deviations = np.sqrt(kappa / np.maximum(values, 1e-300))
+    deviations = np.sqrt(kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))
     undetermined = tuple(
         _combination(error, vectors[:, i]) for i in range(z.size) if deviations[i] > 1.0 or (condition > ILL and i == 0)
     )
@@ -94,35 +103,62 @@ def _correlation(residuals: Vector) -> float:
     return 1.0 + 2.0 * float(rho[: negative.argmax() if negative.any() else rho.size].sum())
 
 
-def _direction(covariance: NDArray[np.float64], i: int) -> Vector:
-    """Return the move of all coordinates per unit of the i-th."""
-    unit = np.eye(len(covariance))[i]
-    return np.asarray(covariance[i] / covariance[i, i]) if covariance[i, i] > 0.0 else unit
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """The profile of the cost round a minimum: one coordinate is set, the others give way."""
 
+    error: SimulationError
+    z: Vector
+    J: NDArray[np.float64]
+    """Weighted derivatives at the minimum."""
+    weights: Vector
+    """Roots of the weights."""
+    covariance: NDArray[np.float64]
+    limit: float
 
-def _interval(
-    error: SimulationError, z: Vector, direction: Vector, std: float, rise: float, i: int
-) -> tuple[float, float]:
-    limit = error.cost(z) + rise
-    first = min(max(0.5 * std, 1e-6), 0.1)
-    below, above = (_reach(error, z, way * direction, first, limit) for way in (-1.0, 1.0))
-    return z[i] - below, z[i] + above
+    def interval(self, i: int, std: float) -> tuple[float, float]:
+        """Return the ends of the interval in which the profile stays below the limit."""
+        first = min(max(0.5 * std, 1e-6), 0.1)
+        return float(self.z[i]) - self._reach(i, -1.0, first), float(self.z[i]) + self._reach(i, 1.0, first)
 
+    def _reach(self, i: int, way: float, first: float) -> float:
+        """Return the farthest distance at which the cost is below the limit: a staircase may rise and fall again."""
+        near, far, misses = 0.0, first, 0
+        distance = first
+        while distance < FARTHEST and misses < GIVEN_UP:
+            if self._below(i, way * distance):
+                near, far, misses = distance, 2.0 * distance, 0
+            else:
+                misses += 1
+            distance *= 2.0
+        for _ in range(5):
+            middle = 0.5 * (near + far)
+            near, far = (middle, far) if self._below(i, way * middle) else (near, middle)
+        return far
 
-def _reach(error: SimulationError, z: Vector, direction: Vector, first: float, limit: float) -> float:
-    """Return the farthest distance at which the cost is below the limit: a staircase may rise and fall again."""
+    def _below(self, i: int, way: float) -> bool:
+        """Whether the cost stays below the limit: moved alone, along the valley, or there with the others refitted."""
+        alone = self._clipped(self.z + way * np.eye(self.z.size)[i])
+        there = self._clipped(self.z + way * self._direction(i))
+        return any(self.error.cost(each) < self.limit for each in (there, alone)) or any(
+            self.error.cost(self._given_way(i, each)) < self.limit for each in (there, alone)
+        )
 
-    def below(distance: float) -> bool:
-        return error.cost(np.clip(z + distance * direction, error.lower, error.upper)) < limit
+    def _given_way(self, i: int, z: Vector) -> Vector:
+        """Return z after one step of Gauss and Newton by the other coordinates, with the derivatives of the minimum."""
+        others = np.arange(z.size) != i
+        residuals = self.weights * self.error.residuals(z)
+        move = np.zeros(z.size)
+        move[others] = np.linalg.lstsq(self.J[:, others], -residuals, rcond=1e-10)[0]
+        return self._clipped(z + np.clip(move, -FARTHEST, FARTHEST))
 
-    distances = first * 2.0 ** np.arange(np.ceil(np.log2(FARTHEST / first)))
-    inside = [distance for distance in distances.tolist() if below(distance)]
-    near = inside[-1] if inside else 0.0
-    far = 2.0 * near if inside else first
-    for _ in range(5):
-        middle = 0.5 * (near + far)
-        near, far = (middle, far) if below(middle) else (near, middle)
-    return far
+    def _direction(self, i: int) -> Vector:
+        """Return the move of all coordinates per unit of the i-th."""
+        own = self.covariance[i, i]
+        return np.asarray(self.covariance[i] / own if own > 0.0 else np.eye(self.z.size)[i])
+
+    def _clipped(self, z: Vector) -> Vector:
+        return np.clip(z, self.error.lower, self.error.upper)
 
 
 def _combination(error: SimulationError, vector: Vector) -> str:

@@ -13,6 +13,7 @@ from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis_json import as_json
 from workbench.experiment import MENU, experiment
 
 BARE = drawn_valve(np.random.default_rng(11))
@@ -36,6 +37,14 @@ def test_the_missing_effect_is_named_and_explains_all(diagnosed: Diagnosis) -> N
     assert diagnosed.indistinguishable == ()
     assert diagnosed.best.errors.train_rmse_m < 1.1 * diagnosed.split.floor_m < diagnosed.base.errors.train_rmse_m
     assert diagnosed.best.fit.parameters["ip_lag.time_constant_s"].value == pytest.approx(0.05, rel=0.02)
+
+
+def test_the_diagnosis_does_not_depend_on_the_workers(lagging: tuple[Recording, Recording]) -> None:
+    short = [_head(each, 600) for each in lagging]
+    said = [
+        as_json(diagnose(short[0], SEED, test=short[1], effects=("ip_lag",), workers=workers)) for workers in (1, 3)
+    ]
+    assert said[0] == said[1]
 
 
 def test_the_best_is_listed_first_and_the_preview_ranks_all(diagnosed: Diagnosis) -> None:
@@ -81,7 +90,7 @@ def force(v: float, q: Parameters) -> float:
 
 def test_an_effect_that_would_have_to_be_negative_is_refused_and_said_so(tmp_path: Path) -> None:
     (tmp_path / "push.py").write_text(PUSH)
-    pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=2e3)
+    pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=1e3)
     found = diagnose(record_of(pushed, 6, COUNT), SEED, effects=("quadratic_drag",))
     (drag,) = found.candidates
     assert not drag.physical
@@ -121,6 +130,10 @@ def test_a_stem_that_hardly_moves_is_said_with_the_files_name(
     write_recording(tmp_path / "rec.csv", Recording(columns))
     assert main(["diagnose", str(tmp_path / "rec.csv"), "--valve", "seed"]) == 2
     assert f"{tmp_path / 'rec.csv'}: the stem moves 0 times" in capsys.readouterr().err
+
+
+def _head(recording: Recording, rows: int) -> Recording:
+    return Recording({name: column[:rows] for name, column in recording.columns.items()})
 
 
 def _diagnosed(folder: Path, *effects: str) -> dict[str, Any]:

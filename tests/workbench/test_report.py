@@ -18,7 +18,8 @@ from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.comparison import Comparison, compare
 from workbench.diagnosis import Diagnosis, diagnose
 from workbench.experiment import Experiment
-from workbench.report import Subject, report_comparison, report_diagnosis
+from workbench.journal import Journal
+from workbench.report import Subject, report_comparison, report_diagnosis, report_journal
 from workbench.report.page import plot
 from workbench.report.series import drawn, extremes, running_s
 
@@ -247,6 +248,34 @@ def test_without_plotly_one_line_says_so(
 def test_a_folder_that_is_not_there_is_named(compared: tuple[Comparison, Subject], tmp_path: Path) -> None:
     with pytest.raises(InputError, match=re.escape(str(tmp_path / "none" / "a.html"))):
         report_comparison(compared[0], tmp_path / "none" / "a.html", compared[1])
+
+
+STEP = {
+    "effects": ("ip_lag",),
+    "why": "evidence 99",
+    "given_train_rmse_m": 4e-3,
+    "given_test_rmse_m": 5e-3,
+    "refitted_train_rmse_m": 1e-3,
+    "refitted_test_rmse_m": 1.5e-3,
+    "extended_train_rmse_m": 3e-4,
+    "extended_test_rmse_m": 4e-4,
+    "floor_m": 5e-5,
+    "parameters": {"ip_lag.time_constant_s": 0.08},
+}
+
+
+def test_a_journal_shows_the_error_at_each_step(tmp_path: Path) -> None:
+    second = STEP | {"effects": ("preload", "<b>"), "extended_train_rmse_m": 5.1e-5, "extended_test_rmse_m": 5.2e-5}
+    report_journal(Journal.model_validate({"steps": (STEP, second)}), tmp_path / "journal.html", "FV-1")
+    page = read(tmp_path / "journal.html")
+    assert page.fetched == []
+    bars = {each["name"]: each for each in page.figures["plot-journal"]["data"]}
+    assert bars["held out"]["x"] == ["as given", "refitted", "1: + ip_lag", "2: + preload, <b>"]
+    assert bars["held out"]["y"] == [5.0, 1.5, 0.4, 0.052]
+    assert bars["fitted"]["y"] == [4.0, 1.0, 0.3, 0.051]
+    assert [row[0][0] for row in page.tables["table-journal"][1:]] == bars["held out"]["x"]
+    assert page.tables["table-step-1"][1][1] == ("0.08", "ip_lag.time_constant_s = 0.08")
+    assert "evidence 99" in page.words
 
 
 def test_thinning_keeps_every_extreme() -> None:

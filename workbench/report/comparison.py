@@ -25,6 +25,7 @@ from workbench.report.page import (
 )
 from workbench.report.series import MOST, stretch
 from workbench.report.units import Shown, length, of_stroke, times
+from workbench.sentences import shortened
 
 MEANINGS = {
     "stuck": "the stem rests",
@@ -321,4 +322,4 @@ def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> str:
     """Return what is known of the recording itself."""
     said = [f"{key}: {value}" for key, value in subject.metadata.items()]
     whole = [] if notes else ["Nothing in it had to be left out or cut"]
-    return section("recording", "About the recording", bullets([*notes, *whole, *more, *said]))
+    return section("recording", "About the recording", bullets([*shortened(notes), *whole, *more, *said]))

@@ -9,7 +9,7 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import Effect, find_effect
 from workbench.comparison import Comparison, compare
-from workbench.confounding import classes, told_apart
+from workbench.confounding import classes, told_apart, untold
 from workbench.diagnosis import Candidate, Diagnosis, Model, Step
 from workbench.evidence import LEAST_BIC, LEAST_GAIN, LEAST_STANDARD_ERRORS
 from workbench.experiment import Experiment
@@ -131,6 +131,7 @@ def _verdict(diagnosis: Diagnosis, seen: _Seen) -> str:
 def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
     before, after = diagnosis.base.errors, diagnosis.best.errors
     stroke_m = diagnosis.base.fit.valve.valve.stroke_m
+    added = ", ".join(_effect(name).name.replace("_", " ") for name in diagnosis.missing)
     tried = len({each.name for each in diagnosis.candidates})
     return figures_of_merit(
         [
@@ -141,7 +142,7 @@ def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
             ),
             ("and after, mm", length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
             ("Floor, mm", length(seen.floor_m), "no model does better"),
-            ("Added", Shown(", ".join(diagnosis.missing) or "nothing"), f"of {tried} effects tried"),
+            ("Added", Shown(added or "nothing"), f"of {tried} effects tried"),
         ]
     )
 
@@ -426,6 +427,7 @@ def _untold(diagnosis: Diagnosis) -> str:
     said += [
         f"at the end of its physical range: {parameter(key)[0]}" for key, f in best.parameters.items() if f.at_bound
     ]
+    said += [each.sentence for each in untold(diagnosis.split, best.valve)]
     if not best.trusted:
         said.append("searches from different starts end at different errors: a better fit may exist")
     said.append(

@@ -85,6 +85,11 @@ def heading(title: str, subject: Subject, facts: str) -> str:
     return f'<h1>{escape(title)}</h1>\n<p class="source">{files}{when} · {escape(facts)}</p>'
 
 
+def heading_alone(title: str, facts: str) -> str:
+    """Return the title of what is about no recording."""
+    return f'<h1>{escape(title)}</h1>\n<p class="source">{escape(facts)}</p>'
+
+
 def verdict(kind: str, first: str, *parts: str) -> str:
     """Return the verdict, with the HTML that belongs to it; kind good, bad or open."""
     return f'<section class="verdict {kind}" id="verdict"><strong>{escape(first)}</strong>{_lines(parts)}</section>'

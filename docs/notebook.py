@@ -1,0 +1,117 @@
+"""Runs a page of commands and code as a person would and writes it with what they printed and drew.
+
+    python docs/notebook.py docs/tutorial/source.md docs/tutorial.md
+
+The source is Markdown. Everything happens in one folder that goes away afterwards, block by block:
+
+    ```toml NAME      a file to be written there
+    ```sh             commands, one a line or continued by a backslash; one that ends in & goes on until the page ends
+    ```python         code; all blocks share their names, and a figure saved as *.png follows the block that saved it
+
+Output follows its block, with an exit status of 1 (what was asked about does not hold); anything worse ends the run.
+Nothing else of the source is changed.
+"""
+
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, chdir, contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+BLOCK = re.compile(r"^```(?P<kind>toml|sh|python)(?: (?P<name>\S+))?\n(?P<text>.*?)^```\n", re.MULTILINE | re.DOTALL)
+HOLDS_NOT = 1
+END_WITHIN_S = 20.0
+
+
+class Notebook:
+    """The folder, the names and the processes of one page."""
+
+    def __init__(self, images: Path, prefix: str, processes: ExitStack) -> None:
+        self._images = images
+        self._prefix = prefix
+        self._processes = processes
+        self._names: dict[str, Any] = {"__name__": "__notebook__"}
+
+    def after(self, block: re.Match[str]) -> str:
+        """Run a block; return it with what comes after it on the page."""
+        kind, text = block["kind"], block["text"]
+        if kind == "toml":
+            Path(block["name"]).write_text(text, encoding="utf-8")
+            return block[0]
+        printed = "".join(map(self._command, _commands(text))) if kind == "sh" else self._code(text)
+        shown = f"\n```text\n{printed.rstrip()}\n```\n" if printed.strip() else ""
+        return block[0] + shown + "".join(self._figures())
+
+    def _command(self, command: str) -> str:
+        print(f"$ {command}", file=sys.stderr, flush=True)
+        if command.endswith("&"):
+            return self._processes.enter_context(_going_on(command.removesuffix("&").strip()))
+        words = ["bash", "-c", command]
+        done = subprocess.run(
+            words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, env=_environment()
+        )
+        if done.returncode > HOLDS_NOT:
+            raise SystemExit(f"`{command}` ends with {done.returncode}:\n{done.stdout}")
+        return done.stdout + (f"[exit status {done.returncode}]\n" if done.returncode else "")
+
+    def _code(self, text: str) -> str:
+        printed = io.StringIO()
+        with redirect_stdout(printed):
+            exec(compile(text, "notebook", "exec"), self._names)
+        return printed.getvalue()
+
+    def _figures(self) -> Iterator[str]:
+        for path in sorted(Path().glob("*.png")):
+            kept = self._images / f"{self._prefix}-{path.name}"
+            shutil.move(path, kept)
+            yield f"\n![{path.stem.replace('-', ' ')}](img/{kept.name})\n"
+
+
+def _commands(text: str) -> list[str]:
+    return [line.strip() for line in text.replace("\\\n", " ").splitlines() if line.strip()]
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment of a command: this installation's `positioner`, and no terminal's width."""
+    return {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "120"}
+
+
+@contextmanager
+def _going_on(command: str) -> Iterator[str]:
+    """Start a command, give its first line of output, and end it at last."""
+    path = Path(f"{re.sub(r'[^a-z]+', '-', command)}.log")
+    with path.open("w") as log:
+        process = subprocess.Popen(command.split(), stdout=subprocess.PIPE, stderr=log, text=True, env=_environment())
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        if not line:
+            raise SystemExit(f"`{command}` did not start: {path.read_text().strip()}")
+        yield line
+    finally:
+        process.terminate()
+        process.wait(END_WITHIN_S)
+        if process.stdout is not None:
+            process.stdout.close()
+
+
+def run(source: Path, target: Path) -> None:
+    """Run a source and write its page, the figures into `img` beside it."""
+    text, target = source.read_text(encoding="utf-8"), target.resolve()
+    images = target.parent / "img"
+    with tempfile.TemporaryDirectory() as folder, chdir(folder), ExitStack() as processes:
+        notebook = Notebook(images, target.stem, processes)
+        page = BLOCK.sub(notebook.after, text)
+    made = f"<!-- Made by `make docs` from {source.parent.name}/{source.name}: edit that. -->\n\n"
+    target.write_text(made + page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    os.environ["MPLBACKEND"] = "Agg"
+    run(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,92 @@
+"""The executed page: what a source's blocks print stands after them, and the committed page is its source's."""
+
+from pathlib import Path
+
+import pytest
+
+from docs.notebook import BLOCK, run
+
+DOCS = Path(__file__).parents[2] / "docs"
+SOURCE = """# Title
+```toml made.toml
+key = 1
+```
+```sh
+cat \\
+    made.toml
+false
+yes on &
+```
+```python
+from pathlib import Path
+value = 6 * 7
+```
+Words.
+```python
+print(value)
+Path("a-figure.png").write_bytes(b"picture")
+```
+"""
+PAGE = """# Title
+```toml made.toml
+key = 1
+```
+```sh
+cat \\
+    made.toml
+false
+yes on &
+```
+
+```text
+key = 1
+[exit status 1]
+on
+```
+```python
+from pathlib import Path
+value = 6 * 7
+```
+Words.
+```python
+print(value)
+Path("a-figure.png").write_bytes(b"picture")
+```
+
+```text
+42
+```
+
+![a figure](img/page-a-figure.png)
+"""
+
+
+def test_a_page_holds_what_its_blocks_print_and_draw(tmp_path: Path) -> None:
+    (tmp_path / "img").mkdir()
+    (tmp_path / "source.md").write_text(SOURCE)
+    run(tmp_path / "source.md", tmp_path / "page.md")
+    made, _, page = (tmp_path / "page.md").read_text().partition("\n\n")
+    assert "source.md" in made
+    assert page == PAGE
+    assert (tmp_path / "img" / "page-a-figure.png").read_bytes() == b"picture"
+
+
+@pytest.mark.parametrize("command", ["exit 2", "nothing-of-that-name", "false &"])
+def test_a_command_that_cannot_do_its_work_ends_the_run(command: str, tmp_path: Path) -> None:
+    (tmp_path / "source.md").write_text(f"```sh\n{command}\n```\n")
+    with pytest.raises(SystemExit, match=r"ends with|did not start"):
+        run(tmp_path / "source.md", tmp_path / "page.md")
+    assert not (tmp_path / "page.md").exists()
+
+
+def test_the_tutorial_is_its_source_run() -> None:
+    source, page = (DOCS / name for name in ("tutorial/source.md", "tutorial.md"))
+    text = page.read_text(encoding="utf-8")
+    at = 0
+    for part in BLOCK.split(source.read_text(encoding="utf-8"))[::4]:
+        assert part in text[at:], f"{page} is not what {source} makes: run `make docs`"
+        at = text.index(part, at)
+    for block in BLOCK.finditer(source.read_text(encoding="utf-8")):
+        assert block[0] in text, f"{page} lacks {block[0]}: run `make docs`"
+    for name in ("compared", "race", "fall"):
+        assert (DOCS / "img" / f"tutorial-{name}.png").is_file()

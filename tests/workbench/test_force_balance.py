@@ -1,0 +1,204 @@
+"""Diagnosis from forces under an imposed position, on benches with a known answer, and its bad input."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.recording import Column, Recording, write_recording
+from config.writing import valve_toml
+from positioner.cli.main import main
+from tests.workbench.valves import SEED
+from workbench import diagnose
+from workbench.force_diagnosis import ForceDiagnosis, as_json, diagnose_forces
+from workbench.imposed import is_imposed, read_imposed
+
+Capture = pytest.CaptureFixture[str]
+AREA_M2, COULOMB_N, SPRING_N_PER_M, VISCOUS_NS_PER_M, WEIGHT_N = 0.01, 60.0, 3e3, 200.0, -25.0
+VALVE = SEED.model_copy(
+    update={"valve": SEED.valve.model_copy(update={"stroke_m": 0.1, "diaphragm_area_m2": 0.011, "mass_kg": 0.5})}
+)
+
+
+def bench(level_pa: float, seed: int, *, mu: float = 0.0, excess_n: float = 0.0, yield_m: float = 0.0) -> Recording:
+    """A rig pulls the stem up and down, each stroke at its own speed, at a pressure that swings by a fifth."""
+    generator = np.random.default_rng(seed)
+    corners_m = 0.05 + 0.045 * np.where(np.arange(13) % 2, 1.0, -1.0) * generator.uniform(0.7, 1.0, 13)
+    at_s = np.cumsum([0.0, *np.exp(generator.uniform(np.log(1.5), np.log(15.0), 12))])
+    time_s: Column = 0.01 * np.arange(round(100.0 * at_s[-1]))
+    position_m = np.interp(time_s, at_s, corners_m)
+    velocity = np.gradient(position_m, time_s)
+    direction = np.sign(velocity)
+    if yield_m:
+        shown = direction[0]
+        for i in range(1, direction.size):
+            shown = np.clip(shown + (position_m[i] - position_m[i - 1]) / yield_m, -1.0, 1.0)
+            direction[i] = shown
+    pressure_pa = level_pa * (1.0 + 0.2 * np.sin(0.7 * time_s))
+    level_n = COULOMB_N + mu * pressure_pa + excess_n * np.exp(-((velocity / 0.008) ** 2))
+    load_n = (
+        -AREA_M2 * pressure_pa
+        + SPRING_N_PER_M * position_m
+        + VISCOUS_NS_PER_M * velocity
+        + level_n * direction
+        + WEIGHT_N
+        + 1.5 * generator.standard_normal(time_s.size)
+    )
+    return Recording(
+        {
+            "time_s": time_s,
+            "pressure_pa": pressure_pa,
+            "position_m": position_m + 2e-5 * generator.standard_normal(time_s.size),
+            "load_n": load_n,
+        }
+    )
+
+
+def diagnosed(seed: int = 1, **hidden: float) -> ForceDiagnosis:
+    return diagnose_forces([bench(level_pa, seed + i, **hidden) for i, level_pa in enumerate((5e4, 1e5, 2e5))], VALVE)
+
+
+@pytest.mark.parametrize("seed", [1, 5, 9])
+def test_nothing_hidden_nothing_found(seed: int) -> None:
+    """The rows at reversals, which count for one direction or the other, bias viscous friction by some per cent."""
+    found = diagnosed(seed)
+    assert found.verdict == "adequate", found.sentence
+    assert found.missing == ()
+    true = {
+        "diaphragm_area_m2": AREA_M2,
+        "spring_n_per_m": SPRING_N_PER_M,
+        "viscous_ns_per_m": VISCOUS_NS_PER_M,
+        "coulomb_n": COULOMB_N,
+        "constant_n": WEIGHT_N,
+    }
+    for name, value in true.items():
+        assert found.base.parameters[name] == pytest.approx(value, rel=0.1 if name == "viscous_ns_per_m" else 0.02), (
+            name
+        )
+
+
+def test_friction_that_grows_with_pressure_is_found_and_nothing_else() -> None:
+    found = diagnosed(mu=1e-4)
+    assert (found.verdict, found.missing) == ("missing", ("pressure_friction",))
+    assert found.best.parameters["pressure_friction.growth_n_per_pa"] == pytest.approx(1e-4, rel=0.05)
+    assert found.floor_n is not None
+    assert found.best.typical_n < 1.7
+    assert found.base.test_rms_n > 4.0
+
+
+def test_two_effects_are_found_one_after_the_other() -> None:
+    found = diagnosed(mu=1e-4, yield_m=2e-3)
+    assert set(found.missing[:2]) == {"pressure_friction", "presliding"}
+    assert found.indistinguishable == ()
+    assert 1e-3 < found.best.parameters["presliding.yield_m"] < 4e-3
+
+
+def test_friction_that_falls_with_speed_is_found_and_its_opposite_is_refused() -> None:
+    found = diagnosed(excess_n=25.0)
+    assert found.missing[:1] == ("stribeck",)
+    opposite = diagnosed(excess_n=-25.0)
+    tried = [each for each in opposite.candidates if each.name == "stribeck"]
+    assert tried
+    assert all("the rows want stribeck.excess_n below 0" in each.why_not for each in tried)
+
+
+def test_a_test_recording_is_judged_and_never_fitted() -> None:
+    trained, other = [bench(5e4, 1), bench(2e5, 2)], bench(1e5, 3)
+    spoilt = Recording({**other.columns, "load_n": other.columns["load_n"] + 300.0})
+    found, off = (diagnose_forces(trained, VALVE, test=each) for each in (other, spoilt))
+    assert found.base.parameters == off.base.parameters
+    assert off.base.test_rms_n > 10.0 * found.base.test_rms_n
+
+
+def test_an_axis_that_counts_the_other_way_is_turned() -> None:
+    turned = [
+        Recording({**each.columns, "position_m": -each.columns["position_m"]})
+        for each in (bench(5e4, 1, mu=1e-4), bench(1e5, 2, mu=1e-4), bench(2e5, 3, mu=1e-4))
+    ]
+    found = diagnose_forces(turned, VALVE)
+    assert found.missing == ("pressure_friction",)
+    assert any("turned" in note for note in found.rows.notes)
+    assert found.best.parameters["coulomb_n"] == pytest.approx(COULOMB_N, rel=0.1)
+
+
+def test_json_has_the_verdict_and_the_numbers() -> None:
+    said = as_json(diagnosed(mu=1e-4))
+    assert said["missing"] == ["pressure_friction"]
+    assert said["best"]["test_rmse_n"] < said["base"]["test_rmse_n"]
+    assert said["experiment"] is None
+    assert any(each["accepted"] for each in said["candidates"])
+
+
+def one_way(columns: dict[str, Column]) -> dict[str, Column]:
+    return columns | {"position_m": np.linspace(0.0, 0.1, len(columns["time_s"]))}
+
+
+BAD = {
+    "one direction": (one_way, "the stem only opens"),
+    "no motion": (lambda c: c | {"position_m": np.full(len(c["time_s"]), 0.05)}, "the stem does not move"),
+    "per cent": (lambda c: c | {"position_m": 1e3 * c["position_m"]}, "it looks like per cent (%) or mm"),
+    "bar": (lambda c: c | {"pressure_pa": 1e-5 * c["pressure_pa"]}, "it looks like bar"),
+    "psi": (lambda c: c | {"pressure_pa": c["pressure_pa"] / 6894.757}, "it looks like psi"),
+    "disordered": (lambda c: c | {"time_s": c["time_s"][::-1]}, "time_s must increase"),
+    "short": (lambda c: {name: column[:8] for name, column in c.items()}, "8 samples, at least 12 are needed"),
+    "no pressure": (lambda c: {name: c[name] for name in c if name != "pressure_pa"}, "column pressure_pa is missing"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line(case: str, tmp_path: Path, capsys: Capture) -> None:
+    spoil, said = BAD[case]
+    spoilt = Recording(spoil(dict(bench(1e5, 1).columns)))
+    with pytest.raises(InputError) as caught:
+        diagnose_forces(spoilt, VALVE)
+    assert said in str(caught.value)
+    path = tmp_path / "rec.csv"
+    write_recording(path, spoilt)
+    (tmp_path / "valve.toml").write_text(valve_toml(VALVE), encoding="utf-8")
+    assert main(["diagnose", str(path), "--valve", str(tmp_path / "valve.toml")]) == 2
+    printed = capsys.readouterr().err
+    assert said in printed
+    assert printed.count("\n") == 1
+    assert printed.startswith(f"positioner diagnose: {path}: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("branch,pressure_pa,position_m\nup,1,2\n", "reading 1: branch 'up'; allowed: rising, falling"),
+        ("branch,pressure_pa,position_m\nrising,one,2\n", "reading 1: pressure_pa 'one' is not a number"),
+        ("branch,pressure_pa\nrising,1\n", "column position_m is missing"),
+        ("branch,pressure_pa,position_m\n", "0 rows with a known direction"),
+        ("branch,pressure_pa,position_m\nrising,1\n", "reading 1: position_m '' is not a number"),
+    ],
+)
+def test_a_bad_static_curve_is_one_line(text: str, said: str, tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    assert main(["diagnose", str(path), "--valve", "seed"]) == 2
+    printed = capsys.readouterr().err
+    assert said in printed
+    assert printed.count("\n") == 1
+
+
+def test_a_parquet_file_of_a_bench_is_read(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    written = bench(1e5, 1)
+    write_recording(tmp_path / "rec.parquet", written)
+    assert is_imposed(tmp_path / "rec.parquet")
+    np.testing.assert_array_equal(read_imposed(tmp_path / "rec.parquet").columns["load_n"], written.columns["load_n"])
+
+
+def test_a_simulation_of_a_bench_recording_is_refused_with_the_way_out() -> None:
+    with pytest.raises(InputError, match=r"column command_pa is missing.*workbench\.diagnose_forces"):
+        diagnose(bench(1e5, 1), VALVE)
+
+
+def test_a_recording_with_a_command_is_none_of_a_bench(tmp_path: Path) -> None:
+    path = tmp_path / "rec.csv"
+    path.write_text("time_s,command_pa,position_m,load_n\n0,1,2,3\n")
+    assert not is_imposed(path)
+    path.write_text("# a bench\ntime_s,pressure_pa,position_m,load_n\n0,1,2,3\n")
+    assert is_imposed(path)
+    assert len(read_imposed(path)) == 1

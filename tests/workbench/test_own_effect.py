@@ -1,0 +1,81 @@
+"""An effect of an engineer's own, as docs/effects.md has it: fitted, diagnosed and extended by its file's path."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import write_recording
+from config.valve import load_valve
+from config.writing import valve_toml, write_valve
+from positioner.cli.main import main
+from tests.workbench.valves import drawn_valve, record_of, with_effect
+from workbench.fitting import fit
+from workbench.journal import Journal
+
+PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
+BARE = drawn_valve(np.random.default_rng(11))
+SPOT = {"excess_n": 900.0, "position_m": 0.045, "width_m": 0.002}
+COUNT = 900
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The documented effect, a recording of a valve that has it, what is known, and a folder for the new valve."""
+    folder = tmp_path_factory.mktemp("own")
+    match = re.search(r'```python\n(""".*?tight spot.*?)```', PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert match
+    (folder / "effects").mkdir()
+    (folder / "valves").mkdir()
+    spot = folder / "effects" / "tight_spot.py"
+    spot.write_text(match[1], encoding="utf-8")
+    write_recording(folder / "rec.csv", record_of(with_effect(BARE, str(spot), **SPOT), 5, COUNT))
+    (folder / "known.toml").write_text(valve_toml(BARE), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def here(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_diagnose_finds_it_by_its_path(here: Path) -> None:
+    words = ["diagnose", "rec.csv", "--valve", "known.toml", "--effects", "./effects/tight_spot.py"]
+    assert main([*words, "--json", "said.json", "--report", "said.html"]) == 1
+    said = json.loads((here / "said.json").read_text())
+    assert said["missing"] == ["effects/tight_spot.py"]
+    assert said["best"]["test_rmse_m"] < 0.5 * said["base"]["test_rmse_m"]
+    assert said["best"]["parameters"]["tight_spot.position_m"]["value"] == pytest.approx(0.045, abs=5e-4)
+    assert "jumps when it gets past" in (here / "said.html").read_text(encoding="utf-8")
+
+
+def test_extend_names_it_as_seen_from_the_new_file(here: Path) -> None:
+    words = ["extend", "known.toml", "--effect", "./effects/tight_spot.py", "--fit", "rec.csv"]
+    assert main([*words, "-o", "valves/new.toml", "--json", "said.json"]) == 0
+    assert 'name = "../effects/tight_spot.py"' in (here / "valves" / "new.toml").read_text()
+    assert main(["compare", "rec.csv", "--valve", "valves/new.toml"]) == 0
+    assert main([*words[:1], "valves/new.toml", *words[2:], "-o", "valves/again.toml"]) == 2
+    said = json.loads((here / "said.json").read_text())
+    assert said["falls"] is True
+    assert said["extended"]["test_rmse_m"] < 0.5 * said["refitted"]["test_rmse_m"]
+    step = Journal.beside(here / "valves" / "new.toml").steps[0]
+    assert said["extended"]["test_rmse_m"] == step.extended_test_rmse_m
+    assert said["extended"]["parameters"]["tight_spot.excess_n"]["value"] == step.parameters["tight_spot.excess_n"]
+    assert said["valve"] == "valves/new.toml"
+
+
+def test_a_fitted_valve_keeps_the_path(here: Path) -> None:
+    recording = record_of(with_effect(BARE, "effects/tight_spot.py", **SPOT), 5, COUNT)
+    found = fit(recording, with_effect(BARE, "effects/tight_spot.py", **SPOT), free=("coulomb_n",))
+    assert [each.name for each in found.valve.effect] == ["effects/tight_spot.py"]
+
+
+def test_a_file_written_elsewhere_is_read_back_as_the_same_valve(here: Path) -> None:
+    valve = with_effect(BARE, str(here / "effects" / "tight_spot.py"), **SPOT)
+    write_valve(here / "valves" / "moved.toml", valve, ["a remark"])
+    assert load_valve(here / "valves" / "moved.toml") == valve
+    assert (here / "valves" / "moved.toml").read_text().startswith("# a remark\n[valve]\n")
+    assert 'name = "../effects/tight_spot.py"' in (here / "valves" / "moved.toml").read_text()

@@ -1,0 +1,89 @@
+"""The measured servo motor of ../shared/data, torque open loop to angle: asymmetric friction, and what only seems so.
+
+Skipped where the recordings are not; they are nobody's to copy. Area 1: newtons are newton metres, metres are radians.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from config.valve import EffectTable, ValveFile
+from workbench import compare, diagnose
+from workbench.diagnosis import Diagnosis
+from workbench.friction_balance import forces
+from workbench.record import ready
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
+MOTOR = ValveFile.model_validate(
+    {
+        "valve": {
+            "name": "servo motor: torque in N m, angle in rad, no spring",
+            "mass_kg": 2.0e-4,
+            "diaphragm_area_m2": 1.0,
+            "spring_n_per_m": 1e-6,
+            "viscous_ns_per_m": 2.5e-4,
+            "coulomb_n": 0.0303,
+            "static_n": 0.0303,
+            "stribeck_velocity_m_per_s": 1.0,
+            "deadzone_ratio": 1e-3,
+            "stroke_m": 40.0,
+        }
+    }
+)
+
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
+
+
+def recorded(name: str, every: int = 1) -> Recording:
+    recording = Recording.read(DATA / f"{name}.csv")
+    return Recording({each: column[::every] for each, column in recording.columns.items()})
+
+
+@pytest.fixture(scope="module")
+def diagnosed() -> Diagnosis:
+    """100 of the 1000 samples a second: the triangle takes 12 s."""
+    effects = ("asymmetric_friction", "stribeck")
+    return diagnose(recorded("J_7", 10), MOTOR, test=recorded("J_9", 10), effects=effects, workers=1)
+
+
+def test_friction_differs_between_the_directions(diagnosed: Diagnosis) -> None:
+    assert diagnosed.missing[:1] == ("asymmetric_friction",)
+    assert diagnosed.base.errors.test_rmse_m > 10.0
+    assert 0.3 < diagnosed.best.errors.test_rmse_m < 1.9
+    assert diagnosed.best.fit.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(-0.11, abs=0.02)
+
+
+def test_a_stribeck_term_is_refused(diagnosed: Diagnosis) -> None:
+    tried = [each for each in diagnosed.candidates if each.name == "stribeck"]
+    assert len(tried) == len(diagnosed.steps)
+    assert not any(each.accepted for each in tried)
+
+
+def test_a_motor_that_does_not_repeat_itself_is_not_called_explained(diagnosed: Diagnosis) -> None:
+    assert diagnosed.verdict in {"unexplained", "untrusted"}
+
+
+@pytest.mark.parametrize("name", ["J_3", "J_5", "J_9"])
+def test_the_reconstructed_friction_wants_a_negative_stribeck_term(name: str) -> None:
+    record = ready(recorded(name))
+    found = forces(
+        MOTOR.valve, record.time_s, record.position_m, record.command_pa, np.zeros(len(record)), record.noise_m
+    )
+    v, d = found.velocity_m_per_s, found.direction
+    for speed in (0.5, 2.0, 10.0):
+        matrix = np.column_stack([v, d, np.ones(v.size), d * np.exp(-((v / speed) ** 2))])
+        assert np.linalg.lstsq(matrix, found.friction_n)[0][3] < 0.0
+
+
+def test_below_break_away_only_presliding_moves_the_motor() -> None:
+    """Its stiffness is read from the rise to the first peak, and predicts the other recording."""
+    first, other = recorded("sigma0_1", 10), recorded("sigma0_2", 10)
+    rising = first.time_s < 1.0
+    stiffness = 1.0 / np.polyfit(first.command_pa[rising], first.position_m[rising], 1)[0]
+    assert stiffness == pytest.approx(6.4, rel=0.1)
+    yields = EffectTable.model_validate({"name": "presliding", "stiffness_n_per_m": float(stiffness)})
+    without = compare(other, MOTOR).rms_m
+    extended = compare(other, ValveFile(valve=MOTOR.valve, effect=(yields,))).rms_m
+    assert extended < 0.8 * without
