@@ -201,12 +201,23 @@ class _Search:
         steps: list[Step] = []
         here = base
         while len(steps) < MOST_ADDED:
-            steps.append(self._step(len(steps) + 1, here))
+            following = self._step(len(steps) + 1, here)
+            if steps:
+                steps[-1] = self._without_missing(steps[-1], following)
+            steps.append(following)
             added = steps[-1].added
             if added is None or added.model is None or added.model.explained:
                 break
             here = added.model
         return tuple(steps)
+
+    def _without_missing(self, step: Step, following: Step) -> Step:
+        """Drop from the equally good what is accepted after the added one too: it is missing as well, not a rival."""
+        assert step.added
+        still = {each.name for each in following.candidates if each.accepted}
+        own = algebraic_class(step.added.name, self._library)
+        left = tuple(each for each in step.alike if each.name in own or each.name not in still)
+        return replace(step, alike=left)
 
     def _step(self, number: int, before: Model) -> Step:
         names = [name for name in self._library if name not in before.effects]

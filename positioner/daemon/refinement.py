@@ -13,6 +13,7 @@ import os
 import pickle
 import subprocess
 import sys
+from contextlib import suppress
 from queue import SimpleQueue
 from threading import Event, Thread
 from typing import IO, cast
@@ -33,14 +34,7 @@ class RefinementProcess:
     """The process, and the thread that speaks with it. Made once; `refiner` gives each valve its own side."""
 
     def __init__(self) -> None:
-        one_core = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "positioner.daemon.refinement"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,
-            env={**os.environ, **one_core},
-        )
+        self._process: subprocess.Popen[bytes] | None = None
         self._jobs: SimpleQueue[tuple[ProcessRefiner, Job] | None] = SimpleQueue()
         self.alive = True
         self._thread = Thread(target=self._serve, name="refinement", daemon=True)
@@ -54,6 +48,8 @@ class RefinementProcess:
         """End the process."""
         self._jobs.put(None)
         self._thread.join(ENDING_S)
+        if self._process is None:
+            return
         try:
             self._process.wait(ENDING_S)
         except subprocess.TimeoutExpired:
@@ -64,10 +60,25 @@ class RefinementProcess:
         """Queue a job."""
         self._jobs.put((refiner, job))
 
+    def _started(self) -> "subprocess.Popen[bytes]":
+        one_core = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        return subprocess.Popen(
+            [sys.executable, "-m", "positioner.daemon.refinement"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            env={**os.environ, **one_core},
+        )
+
     def _serve(self) -> None:
-        down, up = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
-        with down, up:
-            while (task := self._jobs.get()) is not None:
+        """Start the process when the first job comes, and hand it one after another."""
+        task = self._jobs.get()
+        if task is None:
+            return
+        self._process = process = self._started()
+        down, up = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
+        with suppress(OSError), down, up:
+            while task is not None:
                 refiner, job = task
                 try:
                     pickle.dump(job, down)
@@ -78,6 +89,7 @@ class RefinementProcess:
                     result = None
                     say(log, logging.ERROR, "the refinement process is gone", reason=str(error))
                 refiner.give(result)
+                task = self._jobs.get()
 
 
 class ProcessRefiner:

@@ -35,11 +35,11 @@ class Parameters(NamedTuple):
         float,
         Parameter(
             "presliding stiffness",
-            1.0,
+            1e-3,
             1e12,
             off=1e12,
-            starts=(1e5, 3e4, 1e4, 3e3, 1e3),
-            scale="coulomb_n",
+            starts=(1e4, 3e3, 1e3, 3e2, 1e2),
+            scale="coulomb_n / stroke_m",
         ),
     ]
 

@@ -21,6 +21,7 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
+from positioner.estimation.refiner import InPlace
 from sim.slave.modbus import device_of
 
 STROKE_M = 0.1016
@@ -46,7 +47,7 @@ def recorded(folder: Path) -> list[str]:
         link = Link(driver_for(ModbusTcpDevice(port=port_in(slave), reply_timeout_s=5.0)), pace)
         held_pa, _ = link.open()
         recorder = Recorder(folder / "recordings", "v", 10_000_000, 2)
-        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, EXCITED, recorder)
+        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa, InPlace()), pace, EXCITED, recorder)
         recorder.start()
         for _ in played(cycle, dcs, 1.8):
             pass

@@ -60,6 +60,9 @@ def test_a_job_that_makes_no_sense_fails_alone(process: RefinementProcess) -> No
 def test_a_process_that_died_refuses() -> None:
     process = RefinementProcess()
     refiner = process.refiner(patient=True)
+    assert refiner.submit(job())
+    assert refiner.collect() is not None
+    assert process._process is not None
     os.kill(process._process.pid, signal.SIGKILL)
     process._process.wait()
     refiner.submit(job())
