@@ -31,13 +31,13 @@ bench: $(READY)         ## figures that depend on the machine, as ratios in one 
 soak: $(READY)          ## ten minutes of a polled, recording daemon: does its memory stay flat?
 	$(BIN)/python -m benchmarks.memory --minutes 10
 
-blind: $(READY)         ## hours: recordings with hidden effects, diagnosed blind
-	$(BIN)/python -m benchmarks.blind --cases 100
-	$(BIN)/python -m benchmarks.blind --cases 100 --dirty
+blind: $(READY)         ## hours, can be broken off: what is missing of the blind campaign, and its tables
+	$(BIN)/python -m benchmarks.blind
 
 docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner reproduce --out docs/img
 	$(BIN)/positioner demo --out demo-out && cp demo-out/run.png docs/img/demo.png
+	$(BIN)/python docs/notebook.py docs/tutorial/source.md docs/tutorial.md
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out build dist
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out blind-out build dist
