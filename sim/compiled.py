@@ -37,7 +37,7 @@ NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
 ENTRIES: Mapping[str, tuple[str, ...]] = {
     "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
-    "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
+    "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
 }
 
 
@@ -53,6 +53,7 @@ class _Respond(Protocol):
         commands: Vector,
         periods: Vector,
         longest_step: float,
+        tolerance: float,
         path: Vector,
         /,
     ) -> None: ...

@@ -17,9 +17,9 @@
 x stem position, m; v velocity, m/s; p actuator pressure, Pa; t time, s; the command u, Pa, is held over a period.
 A period is cut into equal steps h. Over a step the pressure goes straight from its start to its end value; inside it
 every change of mode is bisected to h / 2^30, and the motion is integrated by Bogacki and Shampine's pair of orders
-3 and 2, the sub-step halved until the pair agrees on v to TOLERANCE (|v| + v_s). The Stribeck slope near v_s grows
-deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the sub-steps are some 0.1 us; away
-from it one sub-step is one step.
+3 and 2, the sub-step halved until the pair agrees on v to tolerance (|v| + v_s), TOLERANCE unless another is asked for.
+The Stribeck slope near v_s grows deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the
+sub-steps are some 0.1 us; away from it one sub-step is one step.
 
 The file is plain Python and runs as it stands: the bare valve. `sim.compiled` compiles this text after putting the
 effects of a valve file into the places at its end, which stand empty here. All that is compiled must stand in
@@ -40,7 +40,7 @@ BREAKING = 1
 SLIP = 2
 
 TOLERANCE = 1e-5
-"""Of one sub-step on the velocity, relative to |v| + v_s."""
+"""Of one sub-step on the velocity, relative to |v| + v_s, where nothing else is asked for."""
 SHORTEST = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
 BISECTIONS = 30
@@ -195,6 +195,7 @@ def move(
     h: float,
     x: float,
     v: float,
+    tolerance: float,
     q: Any,
     z: Any,
 ) -> tuple[float, float, float, bool]:
@@ -203,8 +204,8 @@ def move(
     s = h - tau
     while tau < h:
         x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
-        tolerance = TOLERANCE * (abs(v1) + valve.v_s)
-        if error > tolerance and s > SHORTEST * h:
+        allowed = tolerance * (abs(v1) + valve.v_s)
+        if error > allowed and s > SHORTEST * h:
             s *= 0.5
             continue
         if margin(valve, mode, sigma, stem_at(drive, tau + s, x1, v1), q, z) < 0.0:
@@ -212,7 +213,7 @@ def move(
             return min(tau + s, h), x1, v1, True
         tau = h if s >= h - tau else tau + s
         x, v, a = x1, v1, a1
-        if error < 0.1 * tolerance:
+        if error < 0.1 * allowed:
             s *= 2.0
         s = min(s, h - tau)
     return h, x, v, False
@@ -261,6 +262,7 @@ def step(
     v: float,
     mode: int,
     sigma: float,
+    tolerance: float,
     q: Any,
     z: Any,
 ) -> tuple[float, float, int, float]:
@@ -270,7 +272,7 @@ def step(
         if mode == STUCK:
             tau, mode, sigma = wait(valve, drive, tau, h, x, q, z)
             continue
-        tau, x, v, over = move(valve, mode, sigma, drive, tau, h, x, v, q, z)
+        tau, x, v, over = move(valve, mode, sigma, drive, tau, h, x, v, tolerance, q, z)
         if over and mode == SLIP:
             mode, sigma, v = after_slip(valve, sigma, stem_at(drive, tau, x, v), q, z)
             if mode == SLIP:
@@ -302,7 +304,14 @@ def rest(theta: Vector, state: Vector, time: float, position: float, command: fl
 
 
 def carry(
-    valve: Karnopp, now: Condition, command: float, duration: float, longest_step: float, q: Any, z: Any
+    valve: Karnopp,
+    now: Condition,
+    command: float,
+    duration: float,
+    longest_step: float,
+    tolerance: float,
+    q: Any,
+    z: Any,
 ) -> Condition:
     """Carry the valve over a duration (s) with the command (Pa) held, in equal steps of at most longest_step (s)."""
     t, x, v, p, mode, sigma, indicated = now
@@ -311,7 +320,7 @@ def carry(
     for i in range(n):
         t0, x0 = t + i * h, x
         p0, p = pressure(command, h, Stem(t0, x, v, p), q, z)
-        x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / h), h, x, v, mode, sigma, q, z)
+        x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / h), h, x, v, mode, sigma, tolerance, q, z)
         x, v = settle(valve, Stem(t0 + h, x, v, p), q, z)
         if v == 0.0:
             mode = STUCK
@@ -321,12 +330,20 @@ def carry(
     return Condition(t + duration, x, v, p, mode, sigma, indicated)
 
 
-def respond(theta: Vector, state: Vector, commands: Vector, periods: Vector, longest_step: float, path: Vector) -> None:
+def respond(
+    theta: Vector,
+    state: Vector,
+    commands: Vector,
+    periods: Vector,
+    longest_step: float,
+    tolerance: float,
+    path: Vector,
+) -> None:
     """Hold each command for its period in turn; write t, p, x, v, indicated into the rows of path, the start first."""
     valve, now, q, z = karnopp(theta), read(state), parameters(theta), memories(state)
     for i in range(len(commands) + 1):
         if i > 0:
-            now = carry(valve, now, commands[i - 1], periods[i - 1], longest_step, q, z)
+            now = carry(valve, now, commands[i - 1], periods[i - 1], longest_step, tolerance, q, z)
         path[0, i] = now.t
         path[1, i] = now.p
         path[2, i] = now.x

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.composition import Composition
-from sim.karnopp import Vector
+from sim.karnopp import TOLERANCE, Vector
 
 STEP_S = 1e-5
 
@@ -79,8 +79,9 @@ def follow(
     command_pa: npt.ArrayLike,
     period_s: npt.ArrayLike,
     step_s: float,
+    tolerance: float = TOLERANCE,
 ) -> Response:
-    """Carry the state, in place, through the commands.
+    """Carry the state, in place, through the commands; `sim.karnopp` says what the tolerance is of.
 
     Raises:
         ValueError: as `respond`.
@@ -92,7 +93,7 @@ def follow(
     if not (np.isfinite(periods).all() and (periods > 0.0).all()):
         raise ValueError("period_s must be finite and greater than 0")
     path = np.empty((5, commands.size + 1))
-    composition.kernel.respond(theta, state, commands, periods, checked_step(step_s), path)
+    composition.kernel.respond(theta, state, commands, periods, checked_step(step_s), tolerance, path)
     held = np.append(commands, commands[-1])
     time, pressure, position, velocity, indicated = path
     return Response(time, held, pressure, position, velocity, indicated)

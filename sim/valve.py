@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from config.valve import ValveFile
 from sim.composition import Composition
-from sim.karnopp import karnopp, read
+from sim.karnopp import TOLERANCE, karnopp, read
 from sim.open_loop import STEP_S, Response, at_rest, checked_step, follow
 
 
@@ -52,7 +52,7 @@ class Valve:
             raise ValueError(f"cannot hold {command_pa} Pa for {duration_s} s")
         self._command[0] = command_pa
         self._period[0] = duration_s
-        self._respond(self._theta, self._state, self._command, self._period, self._step_s, self._path)
+        self._respond(self._theta, self._state, self._command, self._period, self._step_s, TOLERANCE, self._path)
 
     def run(self, command_pa: npt.ArrayLike, period_s: npt.ArrayLike) -> Response:
         """Hold n commands (Pa) in turn, each for its period (s, one for all or n); as n calls of `advance`.

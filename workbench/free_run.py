@@ -20,8 +20,19 @@ from sim.karnopp import SLIP, Vector, read, write
 from sim.open_loop import at_rest, follow
 from workbench.record import Record
 
-STEP_S = 2.5e-4
-"""Within 0.1 um of a hundredth of it, with a rate limit 0.5 um: a hundredth of a transmitter's noise."""
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """How finely a run is integrated: longest step, s, and the tolerance of `sim.karnopp`."""
+
+    step_s: float
+    tolerance: float
+
+
+FINE = Accuracy(2.5e-4, 1e-4)
+"""Within 0.5 um of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
+ROUGH = Accuracy(1e-3, 1e-3)
+"""Within 50 um, in a third of the time."""
 STILL = 4.0
 """Standard deviations of the noise within which the stem stands still."""
 LONGEST_START = 50
@@ -58,10 +69,10 @@ class FreeRun:
     """
 
     def __init__(
-        self, composition: Composition, record: Record, *, from_pressure: bool = False, step_s: float = STEP_S
+        self, composition: Composition, record: Record, *, from_pressure: bool = False, accuracy: Accuracy = FINE
     ) -> None:
         self.record = record
-        self._step_s = step_s
+        self._accuracy = accuracy
         self.from_pressure = from_pressure
         everything = (composition, list(range(len(composition.names))))
         self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
@@ -76,10 +87,12 @@ class FreeRun:
         load_n = self.record.load_n
         drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
         rows = np.full((4, len(self.record)), np.nan)
+        fine = self._accuracy
         for (first, end), begin in zip(self.record.segments, self._starts, strict=True):
             state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
             periods = np.diff(self.record.time_s[first:end])
-            path = follow(self._composition, vector, state, drive_pa[first : end - 1], periods, self._step_s)
+            held_pa = drive_pa[first : end - 1]
+            path = follow(self._composition, vector, state, held_pa, periods, fine.step_s, fine.tolerance)
             rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
         return Run(*rows)
 

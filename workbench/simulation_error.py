@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sim.composition import Composition
 from sim.karnopp import Vector
-from workbench.free_run import FreeRun
+from workbench.free_run import ROUGH, FreeRun
 from workbench.parameters import Parameter
 
 
@@ -36,7 +36,6 @@ class Level:
 
 WIDE, MIDDLE, NARROW = Level(100.0, 1e-3, 1e-2), Level(30.0, 3e-4, 1e-3), Level(5.0, 1e-4, 1e-4)
 FINAL = NARROW.scale
-ROUGH_STEP_S = 1e-3
 STRIDES = (0.5, 0.2, 0.07)
 POLLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 MOST_ITERATIONS = 12
@@ -74,7 +73,7 @@ class SimulationError:
     @cached_property
     def rough(self) -> "SimulationError":
         """The same over a simulation of longer steps."""
-        run = FreeRun(self._composition, self.run.record, from_pressure=self.run.from_pressure, step_s=ROUGH_STEP_S)
+        run = FreeRun(self._composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH)
         return SimulationError(run, self._composition, self.parameters, self._theta)
 
     @property

@@ -22,6 +22,8 @@ CONFOUNDED = {
     "dwell_stiction": "holds of different lengths: this effect breaks away at the same force after each",
     "presliding": "small steps against a stuck stem: only presliding moves it",
 }
+LOST = 40.0
+"""|v| / v_x beyond which, for any n >= 1, less than 5e-18 of the excess is left; a power is dear."""
 
 
 class Parameters(NamedTuple):
@@ -49,5 +51,8 @@ class Parameters(NamedTuple):
 
 def friction(F_c: float, F_s: float, v: float, q: Parameters) -> tuple[float, float]:
     """Raise both levels by what is left of the excess at v."""
-    left = q.excess_n * exp(-((abs(v) / q.velocity_m_per_s) ** q.exponent))
+    w = abs(v) / q.velocity_m_per_s
+    if w > LOST:
+        return F_c, F_s
+    left = q.excess_n * exp(-(w**q.exponent))
     return F_c + left, F_s + left

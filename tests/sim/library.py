@@ -63,7 +63,9 @@ def plain(effects: Sequence[Effect]) -> Callable[[Sequence[float], Series, float
         state = np.zeros(karnopp.MEMORY + sum(each.memory for each in effects))
         path = np.empty((5, commands.size + 1))
         module.__dict__["rest"](theta, state, 0.0, 0.0, 0.0)
-        module.__dict__["respond"](theta, state, commands, np.full(commands.size, period_s), step_s, path)
+        module.__dict__["respond"](
+            theta, state, commands, np.full(commands.size, period_s), step_s, karnopp.TOLERANCE, path
+        )
         return path
 
     return run

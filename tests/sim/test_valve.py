@@ -62,7 +62,7 @@ def test_the_plain_python_text_gives_the_compiled_numbers() -> None:
     plain, compiled = np.empty((5, 11)), np.empty((5, 11))
     for function, path in ((karnopp.respond, plain), (composition.kernel.respond, compiled)):
         state = np.zeros(composition.kernel.state_size)
-        function(composition.theta.copy(), state, commands, periods, 1e-5, path)
+        function(composition.theta.copy(), state, commands, periods, 1e-5, karnopp.TOLERANCE, path)
     assert plain[2, -1] > 1e-3
     assert plain.tolist() == compiled.tolist()
 

@@ -1,6 +1,7 @@
 """Compare: the true valve is adequate; a hidden effect is not, and the sentences say how it fails."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench import compare
 from workbench.comparison import as_json
-from workbench.free_run import FreeRun
+from workbench.free_run import FINE, ROUGH, Accuracy, FreeRun
 from workbench.record import ready
 
 
@@ -83,6 +84,21 @@ def test_segments_are_simulated_apart() -> None:
     composition = Composition.from_file(valve)
     simulated = FreeRun(composition, record).position_m(composition.theta)
     assert simulated[1500] == pytest.approx(columns["position_m"][1500], abs=5 * NOISE_M)
+
+
+@pytest.mark.parametrize(
+    "effect", [{}, {"name": "ip_lag", "time_constant_s": 0.05}, {"name": "backlash", "width_m": 1e-3}]
+)
+def test_a_run_is_as_exact_as_it_says(effect: dict[str, Any]) -> None:
+    bare = drawn_valve(np.random.default_rng(0))
+    valve = with_effect(bare, **effect) if effect else bare
+    record, composition = ready(record_of(valve, 0)), Composition.from_file(valve)
+    finest, fine, rough = (
+        FreeRun(composition, record, accuracy=each).position_m(composition.theta)
+        for each in (Accuracy(0.01 * FINE.step_s, 0.01 * FINE.tolerance), FINE, ROUGH)
+    )
+    assert np.max(np.abs(fine - finest)) < 5e-7
+    assert np.max(np.abs(rough - finest)) < 5e-5
 
 
 def test_a_stem_that_never_moves_is_no_proof() -> None:

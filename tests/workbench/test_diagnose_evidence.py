@@ -1,5 +1,7 @@
 """What a candidate is held against: block errors, the meter of structure, algebraic classes, what is held out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,24 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
     before[12:14] = np.log(6e-3)
     _, standard_errors = fall(before, np.log(np.full(30, 5e-5)))
     assert standard_errors < 2.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "there"),
+    [
+        ({}, True),
+        ({"train_rmse_m": 2.0 * NOISE_M}, False),
+        ({"test_rmse_m": 20.0 * NOISE_M}, True),
+        ({"train_block_m": 1.3 * NOISE_M}, False),
+        ({"test_block_m": 1.3 * NOISE_M}, False),
+    ],
+)
+def test_the_floor_is_missed_by_many_blocks_or_by_far_in_what_was_fitted(
+    changed: dict[str, float], there: bool
+) -> None:
+    none = np.zeros(0)
+    fitted = Errors(NOISE_M, NOISE_M, NOISE_M, NOISE_M, none, none, 0.0)
+    assert replace(fitted, **changed).at_floor(NOISE_M) is there
 
 
 def errors_of(logs: np.ndarray) -> Errors:
