@@ -12,6 +12,10 @@ class InputError(Exception):
         self.source = source
         self.problem = problem
 
+    def __reduce__(self) -> tuple[type["InputError"], tuple[str, str]]:
+        """Pass between processes, as what a worker could not do is told by another."""
+        return type(self), (self.source, self.problem)
+
 
 class Unfulfilled(Exception):
     """The thing asked about does not hold, or could not be done. Commands print it and exit with status 1."""

@@ -83,6 +83,9 @@ class Parameter:
     """Parameters of the bare valve, multiplied and divided, such as "spring_n_per_m * stroke_m"; empty: 1."""
     given: bool = False
     """Read from a drawing or a data sheet: a fit leaves it at its start."""
+    seen: str = ""
+    """What a record's positions suggest for it, "lowest", "swept" or "quantum": a fit begins there too. Searches that
+    begin elsewhere would not find it."""
 
     def starts_for(self, valve: ValveParameters) -> tuple[float, ...]:
         """Return where a fit may start on this valve; what lies beyond the range stands at its end."""

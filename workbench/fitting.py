@@ -30,7 +30,7 @@ from workbench.motion import slips
 from workbench.parameters import COULOMB, DEFAULT, STATIC, Parameter, free_parameters, strengths
 from workbench.record import Record, ready, require_fittable, require_units
 from workbench.simulation_error import MIDDLE, NARROW, STRIDES, WIDE, SimulationError
-from workbench.starts import drawn, forces_regressed
+from workbench.starts import drawn, forces_regressed, values_seen, with_plays
 from workbench.uncertainty import Uncertainty, uncertainty
 
 
@@ -265,11 +265,14 @@ def _effect_starts(composition: Composition, error: SimulationError, effects: Se
     ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
     switched_off = error.coordinates(seeds[0])
     weakest = min((switched_off, *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost)
+    points = [*strengths(added), *values_seen(added, error.run.record)]
     grids = [
-        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in strengths(added)]
+        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
         for theta in seeds
     ]
     chosen = [z for grid in grids for z in _screened(error, grid, EACH_SEEDS)]
+    for band in with_plays(seeds[0], added):
+        chosen += _screened(error, map(error.coordinates, band), 1)
     between = _between(error, seeds[0], added)
     return [weakest, *chosen, *_screened(error, between, OF_EFFECT.starts - len(chosen))]
 

@@ -36,6 +36,8 @@ class Parameter:
     most: float
     starts: tuple[float, ...] = ()
     """Where a fit may begin, as an effect declares it."""
+    seen: str = ""
+    """What the record's positions suggest for it, as an effect declares it."""
 
     def coordinate(self, theta: Vector) -> float:
         """Return z of the value in theta, inside the range."""
@@ -97,7 +99,8 @@ def _parameter(composition: Composition, index: int) -> Parameter:
         return Parameter(name, index, value / FACTOR, value * FACTOR)
     effect, _, key = name.partition(".")
     declared = next(each for each in composition.effects if each.name == effect).parameters[key]
-    return Parameter(name, index, declared.least, declared.most, declared.starts_for(composition.valve))
+    starts = declared.starts_for(composition.valve)
+    return Parameter(name, index, declared.least, declared.most, starts, declared.seen)
 
 
 def _smallest(composition: Composition, name: str) -> float:

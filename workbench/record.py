@@ -1,8 +1,9 @@
 """A recording made ready for simulation: cut where it is broken, its bad samples marked, all of it told.
 
 The clock set back, a gap, or rows that the daemon's recorder missed begin a new segment, simulated from rest on its
-own. A position that is not a number, or a spike, is left out of the error; a command that is not a number is the one
-before, still in force. Nothing else is touched, and `notes` has a sentence for each of these, samples counted from 1.
+own. Samples that the daemon lost are a longer period: it wrote no command in the meantime. A position that is not a
+number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. Nothing
+else is touched, and `notes` has a sentence for each of these, samples counted from 1.
 """
 
 from collections.abc import Iterator, Mapping
@@ -237,12 +238,15 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
         breaks[row + 1] = f"the clock is set back by {-steps[row]:.6g} s"
     for row in np.flatnonzero(steps > longest_s).tolist():
         breaks[row + 1] = f"a gap of {steps[row]:.6g} s"
-    for name in ("lost_samples", "unrecorded"):
-        counted = columns.get(name)
-        if counted is not None:
-            for row in np.flatnonzero(np.diff(counted) > 0).tolist():
-                told = f"{name} rises by {counted[row + 1] - counted[row]:g}"
-                breaks[row + 1] = f"{breaks[row + 1]}, {told}" if row + 1 in breaks else told
+    for row, rise in _rises(columns.get("unrecorded")).items():
+        told = f"unrecorded rises by {rise:g}"
+        breaks[row] = f"{breaks[row]}, {told}" if row in breaks else told
+    lost = _rises(columns.get("lost_samples"))
+    if lost:
+        notes.append(
+            f"lost_samples rises by {sum(lost.values()):g} in {len(lost)} places, the first before sample "
+            f"{min(lost) + 1}: the command before is held"
+        )
     for row in sorted(breaks):
         notes.append(f"before sample {row + 1} {breaks[row]}: simulated anew from there")
     edges = [0, *sorted(breaks), time_s.size]
@@ -251,6 +255,14 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
             yield first, end
         else:
             notes.append(f"samples {first + 1} to {end} stand alone: not simulated")
+
+
+def _rises(counted: Column | None) -> dict[int, float]:
+    """Return the rows at which a counter has risen, and by how much."""
+    if counted is None:
+        return {}
+    rises = np.diff(counted)
+    return {row + 1: float(rises[row]) for row in np.flatnonzero(rises > 0.0).tolist()}
 
 
 def _longest_step_s(steps: Column) -> float:

@@ -40,7 +40,8 @@ STRIDES = (0.5, 0.2, 0.07)
 POLLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)
 MOST_ITERATIONS = 12
 MOST_DAMPINGS = 5
-MOST_SWEEPS = 8
+MOST_SWEEPS = 24
+"""Of a polling, over all its steps: what is far from the floor could go on for ever, and for nothing."""
 NOTICED = 1e-4
 """Relative fall of the cost for which polling goes on."""
 LONGEST_MOVE = 0.5
@@ -159,8 +160,9 @@ class SimulationError:
         J = self.jacobian(z, WIDE.difference)
         _, vectors = np.linalg.eigh(J.T @ J)
         ways = [*np.eye(z.size), *(vectors / np.max(np.abs(vectors), axis=0)).T]
+        sweeps = iter(range(MOST_SWEEPS))
         for step in steps:
-            for _ in range(MOST_SWEEPS):
+            for _ in sweeps:
                 before = best
                 for way in (sign * step * each for each in ways for sign in (1.0, -1.0)):
                     there = np.clip(z + way, self.lower, self.upper)

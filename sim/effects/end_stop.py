@@ -20,7 +20,10 @@ class Parameters(NamedTuple):
     """The stops and their contact."""
 
     lower_m: Annotated[
-        float, Parameter("position of the lower stop", -100.0, 100.0, off=-100.0, starts=(0.0, 0.1), scale="stroke_m")
+        float,
+        Parameter(
+            "position of the lower stop", -100.0, 100.0, off=-100.0, starts=(0.0, 0.1), scale="stroke_m", seen="lowest"
+        ),
     ]
     travel_m: Annotated[
         float,
@@ -31,6 +34,7 @@ class Parameters(NamedTuple):
             off=200.0,
             starts=(1.0, 0.9, 0.75, 0.5),
             scale="stroke_m",
+            seen="swept",
         ),
     ]
     stiffness_n_per_m: Annotated[

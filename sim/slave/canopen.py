@@ -17,7 +17,7 @@ from sim.slave.clocks import Clock, clock_of
 from sim.slave.device import Device
 from sim.slave.modbus import device_of
 
-LISTEN_S = 0.1
+LISTEN_S = 0.2
 """How long a newcomer waits for another node of its id."""
 IDLE_S = 5e-3
 """Longest wait for a frame, so that heartbeats leave on time."""

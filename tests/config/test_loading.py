@@ -1,5 +1,6 @@
 """Files that people write: each fault is one line that names file, key, value and what is allowed."""
 
+import pickle
 from pathlib import Path
 
 import pytest
@@ -93,3 +94,9 @@ def test_the_daemon_file_is_held_to_its_schema(tmp_path: Path, text: str, said: 
     with pytest.raises(InputError) as caught:
         load_daemon(path)
     assert str(caught.value).removeprefix(f"{path}: ").startswith(said)
+
+
+def test_an_error_passes_between_processes() -> None:
+    error = InputError("valve.toml", "stroke_m: must be greater than 0")
+    passed = pickle.loads(pickle.dumps(error))
+    assert (str(passed), passed.source, passed.problem) == (str(error), error.source, error.problem)

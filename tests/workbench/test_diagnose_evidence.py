@@ -1,7 +1,5 @@
 """What a candidate is held against: block errors, the meter of structure, algebraic classes, what is held out."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -60,21 +58,20 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "there"),
+    ("train_rmse", "test_rmse", "train_block", "test_block", "there"),
     [
-        ({}, True),
-        ({"train_rmse_m": 2.0 * NOISE_M}, False),
-        ({"test_rmse_m": 20.0 * NOISE_M}, True),
-        ({"train_block_m": 1.3 * NOISE_M}, False),
-        ({"test_block_m": 1.3 * NOISE_M}, False),
+        (1.0, 1.0, 1.0, 1.0, True),
+        (2.0, 1.0, 1.0, 1.0, False),
+        (1.0, 20.0, 1.0, 1.0, True),
+        (1.0, 1.0, 1.3, 1.0, False),
+        (1.0, 1.0, 1.0, 1.3, False),
     ],
 )
 def test_the_floor_is_missed_by_many_blocks_or_by_far_in_what_was_fitted(
-    changed: dict[str, float], there: bool
+    train_rmse: float, test_rmse: float, train_block: float, test_block: float, there: bool
 ) -> None:
     none = np.zeros(0)
-    fitted = Errors(NOISE_M, NOISE_M, NOISE_M, NOISE_M, none, none, 0.0)
-    assert replace(fitted, **changed).at_floor(NOISE_M) is there
+    assert Errors(train_rmse, test_rmse, train_block, test_block, none, none, 0.0).at_floor(1.0) is there
 
 
 def errors_of(logs: np.ndarray) -> Errors:

@@ -27,19 +27,30 @@ def test_a_sound_recording_has_nothing_to_tell() -> None:
     assert record.judged.all()
 
 
-def test_a_gap_a_clock_set_back_and_lost_samples_begin_new_segments() -> None:
+def test_a_gap_a_clock_set_back_and_unrecorded_rows_begin_new_segments() -> None:
     columns = plain()
     columns["time_s"] = columns["time_s"].copy()
     columns["time_s"][300:] += 2.0
     columns["time_s"][600:] -= 5.0
-    columns["lost_samples"] = np.where(np.arange(1000) < 800, 0.0, 3.0)
+    columns["unrecorded"] = np.where(np.arange(1000) < 800, 0.0, 3.0)
     record = ready(Recording(columns))
     assert record.segments == ((0, 300), (300, 600), (600, 800), (800, 1000))
     assert [note.partition(":")[0] for note in record.notes] == [
         "before sample 301 a gap of 2.01 s",
         "before sample 601 the clock is set back by 4.99 s",
-        "before sample 801 lost_samples rises by 3",
+        "before sample 801 unrecorded rises by 3",
     ]
+
+
+def test_lost_samples_are_a_longer_period_told_once() -> None:
+    kept = np.flatnonzero(np.arange(1000) % 50 != 7)
+    columns = {name: column[kept] for name, column in plain().items()}
+    columns["lost_samples"] = (kept - np.arange(kept.size)).astype(float)
+    record = ready(Recording(columns))
+    assert record.segments == ((0, kept.size),)
+    assert record.notes[0] == (
+        "lost_samples rises by 20 in 20 places, the first before sample 8: the command before is held"
+    )
 
 
 def test_a_missing_command_is_held_and_missing_positions_and_spikes_are_not_judged() -> None:
