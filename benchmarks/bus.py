@@ -11,8 +11,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
@@ -23,6 +24,7 @@ from config.device import SIMULATED_MAP, ModbusTcpDevice
 from drivers.modbus_tcp import ModbusTcpDriver
 
 CYCLES, WARM_UP = 4000, 200
+BLOCK, STRETCH = 50, 100
 PUSH_PA = 60e3
 SLAVE = "[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n"
 COMMAND = SIMULATED_MAP.command_pa
@@ -68,16 +70,42 @@ def ways(port: int, independent: ModbusTcpClient) -> dict[str, Callable[[], obje
 
 
 def measured(
-    cycles: dict[str, Callable[[], object]], number: int = CYCLES, warm_up: int = WARM_UP
+    cycles: dict[str, Callable[[], object]], number: int = CYCLES, warm_up: int = WARM_UP, block: int = 1
 ) -> dict[str, list[float]]:
-    """Return the times taken by each, in us, cycle by cycle in turn."""
+    """Return the times taken by each, in us; in turn, each for a block of cycles. `number` and `warm_up` are of cycles.
+
+    Cycle by cycle, whatever a device still does behind its answer is done in another's time; in a block it counts.
+    """
     times: dict[str, list[float]] = {name: [] for name in cycles}
-    for _ in range(warm_up + number):
+    for _ in range((warm_up + number) // block):
         for name, cycle in cycles.items():
-            start_ns = time.perf_counter_ns()
-            cycle()
-            times[name].append((time.perf_counter_ns() - start_ns) / 1e3)
-    return {name: taken[warm_up:] for name, taken in times.items()}
+            for _ in range(block):
+                start_ns = time.perf_counter_ns()
+                cycle()
+                times[name].append((time.perf_counter_ns() - start_ns) / 1e3)
+    return {name: taken[-number:] for name, taken in times.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """How often one way goes round while another does once: the middle of all stretches' ratios, and where half lie."""
+
+    middle: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.middle:.2f} (half of the time {self.low:.2f} to {self.high:.2f})"
+
+
+def ratio(over: Sequence[float], under: Sequence[float]) -> Ratio:
+    """Return the ratio of two ways' times taken in turn, stretch by stretch, since machines are busy at times."""
+    each = [
+        statistics.median(over[start : start + STRETCH]) / statistics.median(under[start : start + STRETCH])
+        for start in range(0, len(over), STRETCH)
+    ]
+    low, middle, high = statistics.quantiles(each, n=4)
+    return Ratio(middle, low, high)
 
 
 def driver_alone(port: int) -> list[float]:

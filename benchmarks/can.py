@@ -2,7 +2,8 @@
 
 A bare loop is canopen's own: RPDO and SYNC sent, the TPDOs of the sample awaited by its receiving thread. The two buses
 are compared by the driver's cycle. Every slave is a process of its own in lockstep; the ways take turns cycle by cycle,
-so the ratios hold on a noisy machine.
+so the ratios hold on a noisy machine; the two buses do in blocks, in which what a bus still does behind an answer
+(`udp_multicast` hears its own frames) counts.
 """
 
 import statistics
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import canopen
 
-from benchmarks.bus import PUSH_PA, measured
+from benchmarks.bus import BLOCK, CYCLES, PUSH_PA, measured, ratio
 from benchmarks.cycle import DAEMON, FIRST, full_loop
 from config.canopen import ACTIVATE, SHIPPED_EDS, CanBus, CanopenDevice
 from config.eds import read_eds
@@ -30,6 +31,7 @@ from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 
 TARGET_BUS, TARGET_DAEMON = 1.5, 0.8
+ROUNDS = 5
 REPLY_TIMEOUT_S = 1.0
 MULTICAST = CanBus(
     interface="udp_multicast", channel="239.74.163.2", node=1, options={"port": 43120, "hop_limit": 0, "fd": False}
@@ -60,12 +62,31 @@ def report() -> list[str]:
         lines.append(
             f"{name:32}{middles[name]:10.1f}{late:10.1f}{1e6 / middles[name]:10.0f}{bare / middles[name]:12.2f}"
         )
-    full = bare / middles["the daemon's full cycle"]
-    lines.append(f"the daemon against the bare loop {full:.2f} (target at least {TARGET_DAEMON})")
+    full = ratio(times["bare canopen, loopback bus"], times["the daemon's full cycle"])
+    lines.append(f"the daemon against the bare loop {full}, target at least {TARGET_DAEMON}")
     if unusable:
         return [*lines, unusable]
-    ratio = middles["driver, udp_multicast"] / middles["driver, loopback bus"]
-    return [*lines, f"loopback bus against udp_multicast {ratio:.2f} (target at least {TARGET_BUS})"]
+    buses = ratio(*of_both_buses())
+    return [*lines, f"loopback bus against udp_multicast {buses}, target at least {TARGET_BUS}"]
+
+
+def of_both_buses() -> tuple[list[float], list[float]]:
+    """Return the times of the driver's cycle on udp_multicast and on the loopback bus, us.
+
+    New processes each round: where the machine puts them may favour one bus for as long as they live.
+    """
+    multicast, loopback = [], []
+    for _ in range(ROUNDS):
+        with (
+            node(MULTICAST) as bus,
+            node() as other_bus,
+            driver_loop(bus) as on_multicast,
+            driver_loop(other_bus) as on_loopback,
+        ):
+            times = measured({"multicast": on_multicast, "loopback": on_loopback}, CYCLES // 4, block=BLOCK)
+        multicast += times["multicast"]
+        loopback += times["loopback"]
+    return multicast, loopback
 
 
 def device_on(bus: CanBus) -> CanopenDevice:

@@ -1,7 +1,8 @@
 """The daemon's full cycle against a bare pymodbus loop on the same slave, and the control core alone.
 
 Full cycle: sample to command on the wire, with supervision, states, law, estimation, publishing and recording. The
-slave is a process of its own in lockstep; the ways take turns cycle by cycle, so the ratio holds on a noisy machine.
+slave is a process of its own in lockstep; the ways take turns cycle by cycle, so the ratio holds on a noisy machine and
+each begins, as in real time, with the caches of others' work. Half of the time the daemon identifies.
 """
 
 import itertools
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from pymodbus.client import ModbusTcpClient
 
-from benchmarks.bus import COMMAND, PUSH_PA, measured, slave
+from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio, slave
 from config.daemon import DaemonFile
 from config.device import ModbusTcpDevice
 from config.registers import Mode
@@ -37,31 +38,35 @@ STROKE_M = 0.1016
 DAEMON = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}})
 FIRST = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44e3, beta_pa=13e3)
 TURN_S = 1.0
-TARGET_RATIO, TARGET_US = 0.7, 40.0
+TARGET_RATIO, TARGET_US = 0.8, 40.0
 
 
 def report() -> list[str]:
     """Return lines: rates of the bare loop and the full cycle, their ratio, and the core's time a step."""
     bare_us, full_us = full_cycle()
-    ratio = statistics.median(bare_us) / statistics.median(full_us)
     core_us = sorted(core_alone())
     return [
         f"bare pymodbus, function 23        {1e6 / statistics.median(bare_us):7.0f} cycles/s",
         f"the daemon's full cycle           {1e6 / statistics.median(full_us):7.0f} cycles/s",
-        f"ratio                             {ratio:7.2f} (target at least {TARGET_RATIO})",
+        f"ratio                             {ratio(bare_us, full_us)}, target at least {TARGET_RATIO}",
         f"control core alone                {statistics.fmean(core_us):7.1f} us a step on average, median "
         f"{statistics.median(core_us):.1f}, 99 % {core_us[int(0.99 * len(core_us))]:.1f} (target below {TARGET_US:g})",
     ]
 
 
 def busy_dcs() -> Script:
-    """Identify for a second, step for a second, and so on: what a working daemon does, and more of it."""
+    """Identify for a second, step for a second, and so on: what a working daemon does, and more of it.
+
+    It writes when something changes, as a DCS does: its writes are no part of the cycle's work.
+    """
 
     def ask(snapshot: Snapshot, requests: Requests) -> Requests:
         turn = int(snapshot.sample.time_s / TURN_S)
         if turn % 2 == 0:
-            return replace(requests, eta=(0, 0, 0))
+            return requests if requests.eta == (0, 0, 0) else replace(requests, eta=(0, 0, 0))
         reference_m = (0.65 if turn % 4 == 1 else 0.4) * STROKE_M
+        if (requests.eta, requests.reference_m) == (QUIET, reference_m):
+            return requests
         new = requests.reference_m != reference_m
         return replace(
             requests, eta=QUIET, reference_m=reference_m, reference_writes=requests.reference_writes + int(new)

@@ -10,13 +10,13 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from pymodbus.client import ModbusSerialClient
 
-from benchmarks.bus import COMMAND, PUSH_PA, measured
+from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio
 from benchmarks.cycle import DAEMON, FIRST, full_loop
 from config.device import ModbusRtuDevice
 from config.rtu import Baud, SerialPort
@@ -30,7 +30,7 @@ from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 
 BAUD: Baud = 115200
-BLOCKS, BLOCK = 60, 20
+CYCLES, BLOCK = 1200, 20
 TARGET_RATIO = 0.8
 
 
@@ -52,28 +52,18 @@ def report() -> list[str]:
                 ),
                 "full": full_loop(cycle),
             }
-            times = measured({name: in_blocks(cycle) for name, cycle in ways.items()}, BLOCKS, warm_up=3)
+            times = measured(ways, CYCLES, warm_up=3 * BLOCK, block=BLOCK)
         recorder.stop()
         link.release()
-    bare_us, full_us = (statistics.median(times[name]) / BLOCK for name in ("bare", "full"))
+    bare_us, full_us = (statistics.median(times[name]) for name in ("bare", "full"))
     characters = 17 + 5 + 2 * COMMAND.address
     line_s = characters * port.character_s + 2 * port.silence_s
     return [
         f"bare pymodbus RTU, function 23    {1e6 / bare_us:7.0f} cycles/s",
         f"the daemon's full cycle           {1e6 / full_us:7.0f} cycles/s",
-        f"ratio                             {bare_us / full_us:7.2f} (target at least {TARGET_RATIO})",
+        f"ratio                             {ratio(times['bare'], times['full'])}, target at least {TARGET_RATIO}",
         f"a real line of {BAUD} baud      {1 / line_s:7.0f} cycles/s at most: {characters} characters, two silences",
     ]
-
-
-def in_blocks(cycle: Callable[[], object]) -> Callable[[], object]:
-    """Return a block of cycles."""
-
-    def block() -> None:
-        for _ in range(BLOCK):
-            cycle()
-
-    return block
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from enum import IntEnum, IntFlag
 from importlib.util import find_spec
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from config.device import QUANTITIES, WRITABLE, ActionName, Device
 from config.errors import InputError
@@ -29,6 +29,8 @@ CONTROL_WORD, STATUS_WORD, DEVICE_MODE = 0x6040, 0x6041, 0x6042
 PDO_BYTES = 8
 MOST_PDOS = 4
 """By the predefined connection set, of each direction."""
+SYNC_IDS = (range(0x80, 0x101), range(0x181, 0x581), range(0x680, 0x6E0))
+"""Where CiA 301 lets SYNC be; of these, those of PDOs and emergencies are free where no node has them."""
 SHIPPED_EDS = SHIPPED / "profiles" / "positioner.eds"
 
 
@@ -179,6 +181,17 @@ class CanBus(Schema):
         rate = {} if self.bitrate_bit_per_s is None else {"bitrate": self.bitrate_bit_per_s}
         return {"interface": self.interface, "channel": self.channel, "ignore_config": True, **rate, **self.options}
 
+    @property
+    def own_ids(self) -> frozenset[int]:
+        """The arbitration ids of the node's emergencies and PDOs, by the predefined connection set."""
+        return frozenset(first + self.node for first in (0x80, *range(0x180, 0x580, 0x80)))
+
+
+def _sync_id(value: int) -> int:
+    if not any(value in each for each in SYNC_IDS):
+        raise ValueError("must be 0x80 to 0x100, 0x181 to 0x580 or 0x680 to 0x6df")
+    return value
+
 
 class CanopenDevice(CanBus, Device):
     """Table `[device]` of the daemon: a device on CANopen."""
@@ -186,8 +199,8 @@ class CanopenDevice(CanBus, Device):
     bus: Literal["canopen"] = "canopen"
     eds: NearFile = SHIPPED_EDS
     """Its electronic data sheet; by default that of the simulated device."""
-    sync_cob_id: Annotated[int, Field(ge=1, le=0x7FF)] = 0x80
-    """Several valves on one bus need one each, since each cycle has its own SYNC."""
+    sync_cob_id: Annotated[int, AfterValidator(_sync_id)] = 0x80
+    """Several valves on one bus need one each, since each cycle has its own SYNC; 0x680 to 0x6DF are nobody's."""
     heartbeat_s: Annotated[float, Field(ge=1e-3, le=65)] = 0.05
     """Told to the node; `heartbeats_missed` of it without one is a fault."""
     heartbeats_missed: Annotated[float, Field(ge=1.5, le=100)] = 2.5
@@ -201,6 +214,28 @@ class CanopenDevice(CanBus, Device):
     def untouched(self) -> Self:
         """Return the same device for one who only watches."""
         return self.model_copy(update={"only_watch": True})
+
+    def clash(self, other: Device) -> str | None:
+        """Say so if the other is the same node, or its SYNC would be taken for this one's, or for a frame of it."""
+        if not isinstance(other, CanopenDevice) or self._bus != other._bus:
+            return None
+        where = f"on {self.interface} {self.channel}"
+        if self.node == other.node:
+            return f"node {self.node} {where}"
+        if self.sync_cob_id == other.sync_cob_id:
+            return f"sync_cob_id {self.sync_cob_id:#x} {where}"
+        taken = {self.sync_cob_id, other.sync_cob_id} & (self.own_ids | other.own_ids)
+        return f"arbitration id {min(taken):#x} {where}, as sync_cob_id and as one of the node's own" if taken else None
+
+    @property
+    def _bus(self) -> tuple[object, ...]:
+        return self.interface, self.channel, tuple(sorted(self.options.items()))
+
+    @model_validator(mode="after")
+    def _sync_is_none_of_its_own(self) -> Self:
+        if self.sync_cob_id in self.own_ids:
+            raise ValueError(f"sync_cob_id must be none of node {self.node}'s own ids, it is {self.sync_cob_id:#x}")
+        return self
 
     @property
     def heartbeat_timeout_s(self) -> float:

@@ -251,8 +251,8 @@ def _clash(files: Sequence[DaemonFile]) -> str | None:
             return f"valve.name: two valves have {first.valve.name!r}, allowed is one each"
         if first.supervisory.unit == second.supervisory.unit:
             return f"valve.unit: {names} have {first.supervisory.unit}, allowed is one each"
-        if first.device == second.device:
-            return f"valve.device: {names} have the same device, allowed is one each"
+        if problem := first.device.clash(second.device):
+            return f"valve.device: {names} have {problem}, allowed is one each"
     return None
 
 

@@ -207,6 +207,10 @@ class Device(Schema):
         """Return the same device as one who only watches wants it: opening it sets nothing in it."""
         return self
 
+    def clash(self, other: "Device") -> str | None:
+        """Say what this valve's device and another's have in common that each must have for itself; None if nothing."""
+        return "the same device" if self == other else None
+
 
 class ModbusDevice(Device):
     """What table `[device]` says of a device on any Modbus."""
@@ -246,6 +250,15 @@ class ModbusTcpDevice(ModbusDevice):
     tls: Tls | None = None
     """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
 
+    def clash(self, other: Device) -> str | None:
+        """Say so if the other is the same device, however it is described."""
+        same = isinstance(other, ModbusTcpDevice) and _at(self) == _at(other)
+        return f"the same device, unit {self.unit} at {self.host}:{self.port}" if same else None
+
+
+def _at(device: ModbusTcpDevice) -> tuple[str, int, int]:
+    return device.host, device.port, device.unit
+
 
 class ModbusRtuDevice(ModbusDevice):
     """Table `[device]` of the daemon: a device on a serial line, on Modbus RTU."""
@@ -258,6 +271,14 @@ class ModbusRtuDevice(ModbusDevice):
     def line(self) -> str:
         """The serial line."""
         return self.serial.path
+
+    def clash(self, other: Device) -> str | None:
+        """Say so if the other is the same device, or takes the same line for another kind."""
+        if not isinstance(other, ModbusRtuDevice) or other.line != self.line:
+            return None
+        if other.unit == self.unit:
+            return f"the same device, unit {self.unit} on {self.line}"
+        return None if other.serial == self.serial else f"the line {self.line} with other characters"
 
     @property
     def turn_s(self) -> float:

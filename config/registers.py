@@ -7,6 +7,7 @@ as on the wire; many tools print them from 1.
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import chain
 from typing import Literal
 
 from config.errors import InputError
@@ -207,17 +208,21 @@ _ESTIMATE_UNITS = {
 }
 
 
+def _estimate_registers_of(name: str, base: int, unit: str, text: str) -> tuple[Register, ...]:
+    return (
+        Register(f"{name}_e", base, "float32", unit, text),
+        Register(f"{name}_std", base + 2, "float32", unit, f"standard deviation of {name}_e"),
+        Register(f"{name}_valid", base + 4, "uint16", "1", "1 when the estimate may be used"),
+        Register(f"{name}_reason", base + 5, "uint16", "1", "0 valid, else why not (positioner map --reasons)"),
+    )
+
+
 def _estimate_registers() -> tuple[Register, ...]:
-    registers: list[Register] = []
-    for index, name in enumerate(ESTIMATED):
-        base, unit = 200 + 6 * index, _ESTIMATE_UNITS[name]
-        registers += [
-            Register(f"{name}_e", base, "float32", unit, f"{name}, estimated"),
-            Register(f"{name}_std", base + 2, "float32", unit, f"standard deviation of {name}_e"),
-            Register(f"{name}_valid", base + 4, "uint16", "1", "1 when the estimate may be used"),
-            Register(f"{name}_reason", base + 5, "uint16", "1", "0 valid, else why not (positioner map --reasons)"),
-        ]
-    return tuple(registers)
+    numbered = enumerate(ESTIMATED)
+    each = (
+        _estimate_registers_of(name, 200 + 6 * i, _ESTIMATE_UNITS[name], f"{name}, estimated") for i, name in numbered
+    )
+    return tuple(chain.from_iterable(each))
 
 
 ESTIMATES = (
@@ -229,6 +234,7 @@ ESTIMATES = (
     Register("identifications", 248, "uint16", "1", "how many identifications were applied, wraps"),
     Register("refusals", 249, "uint16", "1", "how many were refused, wraps"),
     Register("refusal", 250, "uint16", "1", "why the last one was refused, as in *_reason; 0: it was applied"),
+    *_estimate_registers_of("breakaway", 252, "Pa", "static friction F_s / A, from where the stem broke away"),
 )
 
 STATISTICS = (

@@ -272,7 +272,7 @@ class _Node:
         if message is not None and message.is_error_frame:
             if message.arbitration_id & CAN_ERROR_BUS_OFF:
                 raise self._off("the controller says so")
-            return None
+            return self._receive(0.0)  # of no node; what lies behind it counts
         return message
 
     def _open_bus(self) -> can.BusABC:
@@ -477,16 +477,17 @@ class CanopenDriver(_Node):
         missing = dict(self._by_id)
         values: dict[str, float] = {}
         end_s = time.monotonic() + self._config.reply_timeout_s
+        rest_s = self._config.reply_timeout_s
         while missing:
-            message = self._receive(max(0.0, end_s - time.monotonic()))
-            if message is None:
-                if time.monotonic() >= end_s:
+            message = self._receive(max(0.0, rest_s))
+            rest_s = end_s - time.monotonic()
+            if message is None or message.arbitration_id not in missing:
+                if message is not None:
+                    self._heed(message)
+                if rest_s <= 0:
                     raise self._silent(len(missing))
                 continue
-            pdo = missing.pop(message.arbitration_id, None)
-            if pdo is None:
-                self._heed(message)
-                continue
+            pdo = missing.pop(message.arbitration_id)
             if len(message.data) < pdo.layout.size:
                 self.close()
                 raise BadReply(

@@ -7,6 +7,8 @@ once that echo is back, or is refused as an unknown function, everything asked b
 be, however late it is. What comes before it is thrown away.
 """
 
+import time
+
 from config.device import ModbusRtuDevice
 from config.rtu import ECHO, framed, is_whole
 from config.serial_line import SerialLine
@@ -57,6 +59,8 @@ class ModbusRtuDriver(ModbusDriver):
             last = heard[-EXCEPTION_FRAME:]
             if heard.endswith(echo) or (last.startswith(refusal) and is_whole(last)):
                 return
+            if time.monotonic() > until_s:  # somebody who never stops must not keep us
+                break
         said = f" (but {heard.hex(' ')})" if heard else ""
         raise NoConnection(f"{self._who}: nobody answers within {1e3 * self._reply_timeout_s:g} ms{said}")
 

@@ -65,13 +65,14 @@ def _pressure(recording: "Recording", arguments: argparse.Namespace) -> tuple[An
 
 def _lines(path: Path, found: "Recorded", samples: int) -> list[str]:
     lines = [f"{path}: {samples} samples, {found.stretches} motions fitted, {found.left_out} left out"]
-    lines.append(f"  noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples")
+    stamps = "; time stamps jitter: samples taken as even" if found.evened else ""
+    lines.append(f"  noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples{stamps}")
     lines.append(f"  {'':10}{'value':>14}{'std':>12}  {'unit':12}")
     for name, unit in UNITS.items():
         each = getattr(found.estimates, name)
         said = "" if each.valid else f"refused: {each.reason.text}"
         lines.append(f"  {name:10}{each.value:14.6g}{each.std:12.3g}  {unit:12}{said}".rstrip())
-    each = found.breakaway
+    each = found.estimates.breakaway
     lines.append(f"  {'F_s/A':10}{each.value:14.6g}{each.std:12.3g}  {'Pa':12}{'' if each.valid else each.reason.text}")
     if found.fit is not None:
         lines.append(
@@ -84,11 +85,12 @@ def as_json(found: "Recorded") -> dict[str, object]:
     """Return the numbers: per name value, std, valid and reason; null where there is none."""
     numbers: dict[str, object] = {name: _one(getattr(found.estimates, name)) for name in UNITS}
     return numbers | {
-        "breakaway_pa": _one(found.breakaway),
+        "breakaway_pa": _one(found.estimates.breakaway),
         "noise_std_m": found.noise_std_m,
         "residual_std_m": found.fit.residual_std_m if found.fit is not None else None,
         "condition": _finite(found.condition),
         "pressure": found.pressure,
+        "time_stamps_evened": found.evened,
         "motions": found.stretches,
         "left_out": found.left_out,
     }

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="draw the figures there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there")
-    parser.add_argument("--seeds", type=int, default=60, help="runs per cell of the noise table (60; fewer at 10 us)")
+    parser.add_argument("--seeds", type=int, default=100, help="runs per cell of the noise table (100)")
 
 
 def run(arguments: argparse.Namespace) -> int:

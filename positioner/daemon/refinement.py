@@ -2,7 +2,8 @@
 
 A job goes down a pipe, its result comes back up another, pickled: both ends are this file. A thread waits for it; the
 control thread only looks whether a result lies there. Jobs of several valves are done one after another. The process
-is as nice as can be and leaves the terminal's Ctrl-C to the daemon; it ends when its pipe does. If it dies, jobs are
+is started at once, and does a small job of its own first, so that the first window is answered as fast as any. It is
+as nice as can be and leaves the terminal's Ctrl-C to the daemon; it ends when its pipe does. If it dies, jobs are
 refused from then on and the algebraic estimates stand: one line in the log says so.
 
     python -m positioner.daemon.refinement      is what it runs
@@ -18,8 +19,10 @@ from queue import SimpleQueue
 from threading import Event, Thread
 from typing import IO, cast
 
+import numpy as np
+
 from positioner.daemon.logs import say
-from positioner.estimation.recorded import Recorded
+from positioner.estimation.recorded import Recorded, RecordSettings
 from positioner.estimation.refiner import Job
 
 log = logging.getLogger(__name__)
@@ -50,6 +53,7 @@ class RefinementProcess:
         self._thread.join(ENDING_S)
         if self._process is None:
             return
+        self._process.terminate()  # it may be starting still, and holds nothing that would be lost
         try:
             self._process.wait(ENDING_S)
         except subprocess.TimeoutExpired:
@@ -71,12 +75,10 @@ class RefinementProcess:
         )
 
     def _serve(self) -> None:
-        """Start the process when the first job comes, and hand it one after another."""
-        task = self._jobs.get()
-        if task is None:
-            return
+        """Start the process, and hand it one job after another."""
         self._process = process = self._started()
         down, up = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
+        task = self._jobs.get()
         with suppress(OSError), down, up:
             while task is not None:
                 refiner, job = task
@@ -132,9 +134,18 @@ class ProcessRefiner:
         self._there.set()
 
 
+def _warm_up() -> None:
+    """Do a small job, of a jump's answer: what is loaded at first use is loaded then."""
+    time_s = np.arange(0.0, 0.2, 1e-3)
+    pressure_pa = np.where(time_s > 0.05, 1.0, 0.0)
+    moved = np.maximum(time_s - 0.05, 0.0)
+    Job(time_s, moved**2, pressure_pa, RecordSettings(noise_std_m=1e-5, pressure_held=True)).done()
+
+
 def _work() -> None:
     """Do the jobs that come down the pipe until it closes."""
     os.nice(19)
+    _warm_up()
     down, up = sys.stdin.buffer, sys.stdout.buffer
     while True:
         try:

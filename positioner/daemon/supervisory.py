@@ -253,7 +253,7 @@ def _estimate_getters() -> dict[str, Getter]:
         "refusals": lambda s, _: s.decision.applied.refusals & 0xFFFF,
         "refusal": lambda s, _: s.decision.applied.refused,
     }
-    for name in ESTIMATED:
+    for name in (*ESTIMATED, "breakaway"):
         getters |= _estimate_getters_of(name)
     return getters
 

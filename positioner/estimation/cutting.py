@@ -18,7 +18,7 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 from positioner.estimation.stretch import Stretch
 
 FEWEST = 6

@@ -25,7 +25,7 @@ The price of the end of the window is noise, that of its middle a delay of T / 2
 
 import numpy as np
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 
 EVEN = 1e-5
 """Steps whose differences from their mean have a norm below this share of it count as even."""

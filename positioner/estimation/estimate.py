@@ -45,7 +45,9 @@ _TEXTS = {
     Reason.MOTION_ENDED: "the stem stopped or turned round before it had moved for long enough",
     Reason.RECORD_BROKEN: "the samples had a gap or their clock jumped back; waiting for a new stretch of motion",
     Reason.ILL_CONDITIONED: "pressure or position varied too little while the stem moved to tell a, b and c apart",
-    Reason.NOISE_DOMINATES: "noise of the sensors outweighs what tells a, b and c apart: the value is biased",
+    Reason.NOISE_DOMINATES: (
+        "noise of the sensors, or what lies between the samples, outweighs what tells a, b and c apart: biased"
+    ),
     Reason.TOO_UNCERTAIN: "the standard deviation is larger than allowed",
     Reason.PARAMETERS_MISSING: "friction needs a, b and c, and none have been identified yet",
     Reason.A_POSITIVE: "a came out positive: viscous friction would drive the stem",
@@ -83,6 +85,10 @@ def none(reason: Reason) -> Estimate:
     return Estimate(nan, nan, reason)
 
 
+NO_BREAKAWAY = none(Reason.WAITING_FOR_MOTION)
+"""Nothing has been seen to break away yet."""
+
+
 @dataclass(frozen=True, slots=True)
 class Estimates:
     """All of them.
@@ -96,6 +102,7 @@ class Estimates:
         k_over_c: -F_c / A, in Pa.
         progress: of the window that is being filled, 0 to 1.
         time_s: of the last sample used, by the device's clock; NaN when none was.
+        breakaway: F_s / A, in Pa; from where the stem broke away, which only a whole record shows.
     """
 
     a: Estimate
@@ -106,6 +113,7 @@ class Estimates:
     k_over_c: Estimate
     progress: float
     time_s: float
+    breakaway: Estimate = NO_BREAKAWAY
 
     @property
     def law_ready(self) -> bool:
@@ -121,6 +129,12 @@ class Estimates:
         return kept if friction else replace(kept, k=unasked, k_over_c=unasked)
 
     @property
+    def doubt(self) -> float:
+        """Sum of the variances, relative, of the numbers of the control law that were asked for."""
+        asked = [each for each in (self.b_over_c, self.k_over_c) if each.reason is not Reason.NOT_ASKED]
+        return sum((each.std / each.value) ** 2 for each in asked)
+
+    @property
     def acceptable(self) -> bool:
         """Whether each number of the control law that was asked for, one at least, is valid."""
         asked = [each for each in (self.b_over_c, self.k_over_c) if each.reason is not Reason.NOT_ASKED]
@@ -130,4 +144,4 @@ class Estimates:
 def no_estimates(reason: Reason) -> Estimates:
     """Return estimates of which only is known why there are none."""
     nothing = none(reason)
-    return Estimates(nothing, nothing, nothing, nothing, nothing, nothing, progress=0.0, time_s=nan)
+    return Estimates(nothing, nothing, nothing, nothing, nothing, nothing, progress=0.0, time_s=nan, breakaway=nothing)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 
 
 def friction(

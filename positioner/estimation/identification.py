@@ -12,14 +12,15 @@ with what the moves before it told as the prior (`moves`).
 """
 
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import inf, isfinite, nan
 
 import numpy as np
 
+from positioner.estimation.breaking_away import followed, judged
 from positioner.estimation.derivatives import Derivatives
-from positioner.estimation.estimate import Estimate, Estimates, Reason, no_estimates, none
+from positioner.estimation.estimate import NO_BREAKAWAY, Estimate, Estimates, Reason, no_estimates, none
 from positioner.estimation.friction import RunningMeans
-from positioner.estimation.identifier import Identifier, Solution
+from positioner.estimation.identifier import Identifier
 from positioner.estimation.judgement import Judge
 from positioner.estimation.motion import Motion, beginning
 from positioner.estimation.moves import Known, absorbed
@@ -27,8 +28,9 @@ from positioner.estimation.noise import PositionNoise
 from positioner.estimation.record import Record
 from positioner.estimation.recorded import Recorded, RecordSettings
 from positioner.estimation.refiner import Job, Refiner
+from positioner.estimation.solution import Solution
 
-READINGS = 40
+READINGS = 16
 """Times per window at which (13) is solved."""
 ALMOST = 0.99
 """Progress while the refinement is awaited."""
@@ -96,6 +98,7 @@ class Identification:
         self._kept: list[tuple[float, float, float]] = []
         self._awaited_since_s: float | None = None
         self._known: Known | None = None
+        self._broke_away, self._broke_away_s = NO_BREAKAWAY, 0.0
         self._passive = False
         self.moves = 0
         self._rest_in: int | None = None  # samples until a move's rest is long enough
@@ -109,6 +112,7 @@ class Identification:
         self._means = RunningMeans()
         self._solution: Solution | None = None  # the last whose b/c was valid
         self._asked = (False, False)
+        self._doubt = inf  # of the estimates, by what was asked for last
         self._age = 0  # of the oldest sample in the record, in samples since the motion began
         self._clear_record()
         self._restart_window()
@@ -126,6 +130,7 @@ class Identification:
         self._restart_window()
         self._kept.clear()
         self._awaited_since_s = self._rest_in = None
+        self._doubt = inf
         self.estimates = no_estimates(Reason.WAITING_FOR_MOTION)
 
     def update(
@@ -216,13 +221,17 @@ class Identification:
         parameters, friction = self._asked
         refined = result.estimates.only(parameters=parameters, friction=friction)
         if refined.acceptable:
-            self.estimates = refined
+            before = self._broke_away if self._passive else NO_BREAKAWAY
+            broke_away = followed(before, refined.breakaway, time_s - self._broke_away_s)
+            self._broke_away, self._broke_away_s = broke_away, time_s
+            self.estimates = replace(refined, breakaway=judged(broke_away, self._settings.largest_relative_std))
             self.moves += self._passive
         elif not self._passive:
             self.estimates = replace(self.estimates, progress=1.0)
 
     def _ask(self, parameters: bool, friction: bool) -> None:
         self._asked = (parameters, friction)
+        self._doubt = inf  # what was known before gives way to whatever is acceptable
         self._restart_window()
         if any(self._asked) and not self.estimates.acceptable:
             self.estimates = no_estimates(Reason.WAITING_FOR_MOTION)
@@ -334,9 +343,11 @@ class Identification:
         return Judge(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
 
     def _publish(self, fresh: Estimates) -> None:
-        """Take fresh estimates, unless they are worse than what an earlier stretch of motion has given."""
-        if fresh.acceptable or not self.estimates.acceptable:
-            self.estimates = fresh
+        """Take fresh estimates, unless what an earlier stretch of motion has given is known better."""
+        doubt = fresh.doubt if fresh.acceptable else inf
+        if doubt < self._doubt or not self.estimates.acceptable:
+            self.estimates = replace(fresh, breakaway=self.estimates.breakaway)
+            self._doubt = doubt
         else:
             self.estimates = replace(self.estimates, progress=fresh.progress)
 

@@ -18,39 +18,19 @@ Each of the four columns is a chain of six integrators, (29)-(33), fed at level 
 A step of the chain is exact for x linear between the samples, and for u held or linear (see `Identifier`). In units
 of the step itself it is the same matrix for every step; π_n carries the weight h^(n + e_1).
 
-White sensor noise ν of standard deviation σ enters every entry through a polynomial kernel,
-
-    δπ_n(T) = ∫_0^T K_n(τ; T) ν(τ) dτ,    K_n(τ; T) = Σ_l g_l τ^(e_l) (T - τ)^(n - l) / (n - l)!
-
-With K = K_q - a K_p1 - b K_p2 and δθ = P^-1 ∫ K ν dτ, θ = (a, b, c), the first order is
-
-    cov θ = σ^2 h P^-1 ∫ K K' dτ P^-T          h: mean step, Σ h^2 / Σ h when uneven
-
-and since ν is in P as well (errors in variables), the second order is a bias, -E[P^-1 δP δθ]. Noise of the pressure
-enters in the same way through K_p3.
+The columns are kept whenever the time since zero has doubled, from a 32nd of the window on. The windows that end
+there, and the one that ends now, are solved together, by the weight that noise leaves each: see `solution`.
 
 Inside, time counts in windows, x in strokes, u in units of a pressure; time zero is the restart.
 """
 
-from dataclasses import dataclass
+from dataclasses import replace
 from math import comb, factorial
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Feeds = tuple[tuple[int, int], ...]
-
-LEVELS = 6
-ROWS = (4, 5, 6)
-"""The levels that are read: (9)-(12), their integral and their double integral."""
-
-Q: Feeds = ((6, 0), (-18, 1), (9, 2), (-1, 3))
-P_A: Feeds = ((-6, 1), (6, 2), (-1, 3))
-P_B: Feeds = ((3, 2), (-1, 3))
-P_C: Feeds = P_B
-CHAINS = (Q, P_A, P_B, P_C)
-"""Per column the feeds (g_l, e_l) of its levels l = 1, 2, ...; the first three take x, the last takes u."""
+from positioner.estimation.array import Array
+from positioner.estimation.solution import CHAINS, LEVELS, ROWS, Solution, Window, solve
 
 STATES = LEVELS * len(CHAINS)
 FEEDS = 8
@@ -83,48 +63,12 @@ _STEP = _step_matrix()
 _WEIGHTS = np.array([n + feeds[0][1] for feeds in CHAINS for n in range(1, LEVELS + 1)], dtype=float)
 _READ = np.array([[LEVELS * chain + n - 1 for n in ROWS] for chain in range(len(CHAINS))])
 
-# Gauss-Legendre on (0, 1): eight nodes integrate the product of two kernels of degree 7 exactly.
-_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(8)
-_NODES, _NODE_WEIGHTS = (_NODES + 1) / 2, _NODE_WEIGHTS / 2
-
-
-def kernel(feeds: Feeds, n: int, tau: Array, T: float) -> Array:
-    """Return K_n(τ; T), the weight of the signal at τ in level n of a chain at T."""
-    levels = enumerate(feeds[:n], start=1)
-    terms = [g * tau**e * (T - tau) ** (n - level) / factorial(n - level) for level, (g, e) in levels]
-    return np.asarray(np.sum(terms, axis=0))
-
-
-_KERNELS = np.array([[kernel(feeds, n, _NODES, 1.0) for n in ROWS] for feeds in CHAINS])
-_SIZES = np.sqrt(_KERNELS**2 @ _NODE_WEIGHTS)
-"""What a row of a column is for a signal of one unit: the kernel's length."""
-
 GAP = 4.0
 """A step longer than this many mean steps has missed commands."""
-LARGEST_CONDITION = 1e10
-"""Beyond this (13) is singular to rounding: the pressure, or the stem, did not move."""
-
-
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """What the identifier says, SI units.
-
-    Attributes:
-        theta: a in 1/s, b in 1/s^2, c in m/(s^2 Pa).
-        covariance: of theta by noise, first order, 3 x 3.
-        bias: of theta by noise in P, second order, 3.
-        noise_share: expected size of P^-1 δP in units of the parameters; the orders above mean something only while
-            it is well below 1.
-        condition: of P in its own units.
-        gaps: steps over which commands were missed.
-    """
-
-    theta: Array
-    covariance: Array
-    bias: Array
-    noise_share: float
-    condition: float
-    gaps: int
+FIRST, AGAIN = 1 / 32, 2.0
+"""The columns are kept at this share of the window, and whenever time has grown by this factor since."""
+FEWEST = 6
+"""Samples before which no columns are kept."""
 
 
 class Identifier:
@@ -149,8 +93,12 @@ class Identifier:
         """Forget everything; the next sample is time zero."""
         self._z[:] = 0
         self._started = False
-        self._t = self._h = self._squared_steps = 0.0
-        self._gaps = 0
+        self._t = self._h = self._squared_steps = self._bends = 0.0
+        self._slope: float | None = None
+        self._h_before = 0.0
+        self._gaps = self._count = 0
+        self._kept: list[Window] = []
+        self._theta: Array | None = None
 
     @property
     def elapsed_s(self) -> float:
@@ -188,13 +136,34 @@ class Identifier:
             u0, k * u0, k2 * u0, k3 * u0, du, k * du, k2 * du, k3 * du,
         )  # fmt: skip
         z[:STATES] = _STEP.dot(z)
+        self._bend(dx / h, h)
         self._t, self._x, self._u = t, x, u
         self._squared_steps += h * h
+        self._count += 1
+        if self._count >= FEWEST and t >= (AGAIN * self._kept[-1].end if self._kept else FIRST):
+            self._kept.append(self._window())
+
+    def _bend(self, slope: float, h: float) -> None:
+        """Count what a straight line leaves out over this step; over the first it is as over the second."""
+        if self._slope is not None:
+            before = self._h_before
+            # A short step before tells noise, not slope: what follows it counts for less.
+            left_out = h * h * min(h, before) / 6 * (slope - self._slope) / (h + before)
+            self._bends += left_out * left_out * (2 if self._count == 1 else 1)
+        self._slope, self._h_before = slope, h
 
     def integrals(self) -> tuple[Array, Array]:
         """Return q (3) and P (3 x 3) of (13), in windows, strokes and units of pressure."""
-        columns = (self._z[:STATES] * self._h**_WEIGHTS)[_READ]
+        columns = self._window().columns
         return columns[0], columns[1:].T
+
+    def windows(self) -> list[Window]:
+        """Return the windows that are solved together, the longest last; in windows, strokes and units of pressure."""
+        return [each for each in self._kept if AGAIN**0.5 * each.end <= self._t] + [self._window()]
+
+    def _window(self) -> Window:
+        columns = (self._z[:STATES] * self._h**_WEIGHTS)[_READ]
+        return Window(self._t, columns, self._squared_steps, self._bends)
 
     def solve(self, position_noise_m: float, pressure_noise_pa: float = 0.0) -> Solution | None:
         """Solve (13) for a, b, c.
@@ -206,30 +175,15 @@ class Identifier:
         Returns:
             The solution; None when (13) is singular, as under a constant pressure.
         """
-        q, P = self.integrals()
-        degrees = _WEIGHTS[_READ] - 1
-        sizes = (_SIZES * self._t ** (degrees + 1))[1:].T
-        condition = float(np.linalg.cond(P / sizes)) if self._t else np.inf
-        if not condition < LARGEST_CONDITION:
+        noise = position_noise_m / self._stroke_m, pressure_noise_pa / self._pressure_pa
+        found = solve(self.windows(), *noise, guess=self._theta, gaps=self._gaps)
+        if found is None:
             return None
-        inverse = np.linalg.inv(P / sizes[:, :1]) / sizes[:, 0]
-        theta = inverse @ q
-
-        # P^-1 applied to the noise of (q, p_1, p_2, p_3), node by node of the window.
-        unit_noise = np.sqrt(self._squared_steps * _NODE_WEIGHTS)
-        kernels = _KERNELS * (self._t**degrees)[:, :, None] * unit_noise
-        stem = inverse @ kernels[:3] * (position_noise_m / self._stroke_m)
-        drive = inverse @ kernels[3] * (pressure_noise_pa / self._pressure_pa)
-        error = stem[0] - theta[0] * stem[1] - theta[1] * stem[2]
-        drive_error = -theta[2] * drive
-        bias = -(stem[1] @ error[0] + stem[2] @ error[1] + drive @ drive_error[2])
-        noise_in_columns = np.sqrt((np.array([stem[1], stem[2], drive]) ** 2).sum(axis=2))
+        self._theta = found.theta
         unit = self._unit
-        return Solution(
-            theta=theta * unit,
-            covariance=(error @ error.T + drive_error @ drive_error.T) * np.outer(unit, unit),
-            bias=bias * unit,
-            noise_share=float(np.linalg.norm(noise_in_columns * theta[:, None] / theta)),
-            condition=condition,
-            gaps=self._gaps,
+        return replace(
+            found,
+            theta=found.theta * unit,
+            covariance=found.covariance * np.outer(unit, unit),
+            bias=found.bias * unit,
         )

@@ -14,11 +14,12 @@ from math import sqrt
 
 import numpy as np
 
+from positioner.estimation.array import Array
 from positioner.estimation.estimate import Estimate, Reason
 from positioner.estimation.friction import Means, friction
-from positioner.estimation.identifier import Array, Solution
+from positioner.estimation.solution import Solution
 
-LARGEST_NOISE_SHARE = 0.2
+LARGEST_NOISE_SHARE = 0.05
 """Beyond this share of noise in P, a, b and c are biased by more than their standard deviation tells."""
 
 

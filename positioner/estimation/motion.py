@@ -11,7 +11,7 @@ seen at the latest one window after it was. The beginning is then found in the p
 
 import numpy as np
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 
 CERTAIN = 5.0
 """Standard deviations by which a velocity stands out: once in some million windows by chance."""

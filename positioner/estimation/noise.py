@@ -12,7 +12,7 @@ from statistics import median
 
 import numpy as np
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 
 _MEDIAN_OF_THIRD_DIFFERENCE = 0.6744897502 * 20**0.5
 
@@ -31,6 +31,12 @@ class PositionNoise:
         """Take a block of at least four positions, evenly sampled or nearly so."""
         differences = np.abs(np.diff(position_m, 3))
         self._blocks.append(float(np.median(differences)) / _MEDIAN_OF_THIRD_DIFFERENCE)
+
+    def add_all(self, position_m: Array, length: int) -> None:
+        """Take all the whole blocks of that length that a record has."""
+        count = len(position_m) // length
+        blocks = np.abs(np.diff(position_m[: count * length].reshape(count, length), 3, axis=1))
+        self._blocks += (np.median(blocks, axis=1) / _MEDIAN_OF_THIRD_DIFFERENCE).tolist()
 
     @property
     def std_m(self) -> float:

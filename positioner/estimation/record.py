@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from positioner.estimation.array import Array
 from positioner.estimation.derivatives import SHORTEST
-from positioner.estimation.identifier import Array
 
 COLUMNS = 5
 _TURNS = 8

@@ -4,6 +4,8 @@ The daemon's refinement and `positioner estimate` are this one function. What is
 
 - how the pressure goes between the samples, when nobody says: held (the value at a sample is that of the interval
   before it), held ahead (of the interval after it) or linear; each is fitted and the likeliest taken;
+- whether stamps that jitter tell when the samples were taken, or when they arrived of samples taken evenly: the stem
+  moves by more than its sensor's noise within a tenth of a period of its jerk. Both are fitted, the likelier taken;
 - a, b, c and k hang on μ = m/k_s, g and q do not. When the standard deviation of ln μ exceeds what is allowed, or more
   than three quarters of what is known of it hangs on a single sample, the mass is not identifiable: a, b, c, k are
   refused singly, b/c = -1/g and k/c = q/g stand on their own;
@@ -14,18 +16,21 @@ The daemon's refinement and `positioner estimate` are this one function. What is
   model leaves out. The mass must then be identifiable from what follows after five of the stem's time constants.
 
 Break-away: F_s/A lies between the largest force at which the stem was seen to rest and the force at which it left,
-both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; an event is worth its
-interval's width / sqrt(12).
+both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
+their intervals share (`breaking_away`).
 """
 
 from dataclasses import dataclass, replace
+from functools import reduce
 from math import nan, sqrt
 
 import numpy as np
 
+from positioner.estimation.array import Array
+from positioner.estimation.breaking_away import between, narrowed
+from positioner.estimation.breaking_away import judged as judged_breakaway
 from positioner.estimation.cutting import Cut, cut
 from positioner.estimation.estimate import Estimate, Estimates, Reason, no_estimates, none
-from positioner.estimation.identifier import Array
 from positioner.estimation.noise import PositionNoise
 from positioner.estimation.refinement import CLEAR, Fit, Prior, refine
 from positioner.estimation.stretch import Stretch
@@ -41,6 +46,8 @@ LARGEST_LEVERAGE = 0.75
 SETTLED = 5.0
 """Time constants after which nothing is left of how a motion began."""
 FEWEST_LATER = 12
+LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
+"""Of time stamps about an even grid, shares of the period, between which they may be those of samples taken evenly."""
 SEEN_WITHIN = 3
 """Samples after which a stem that left its rest is seen to have."""
 LEAST_MISFIT = 2e-4
@@ -72,18 +79,18 @@ class Recorded:
 
     Attributes:
         estimates: with standard deviations and reasons.
-        breakaway: F_s/A in Pa.
         fit: behind them; None when nothing could be fitted.
         pressure: how it was taken between the samples: "held", "held ahead" or "linear".
+        evened: whether the time stamps were taken to jitter about samples taken evenly.
         noise_std_m: of the position, as given or measured.
         stretches: motions fitted, and how many were seen but cut out.
         condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
     """
 
     estimates: Estimates
-    breakaway: Estimate
     fit: Fit | None
     pressure: str
+    evened: bool
     noise_std_m: float
     stretches: int
     left_out: int
@@ -112,16 +119,20 @@ def identify(
         noise_std_m = settings.noise_std_m
     tries = [_fitted(t, x, shown, u_taken, noise_std_m, settings, prior) for shown, u_taken in _taken(u, settings)]
     best = min(tries, key=_misses_m)
+    even_s = evened(t) if best.fit is not None else None
+    if even_s is not None and best.fit is not None:
+        again = _fitted(even_s, x, best.shown, best.pressure_pa, noise_std_m, settings, prior, near=best.fit.p[:2])
+        best = min((best, replace(again, evened=True)), key=_misses_m)
     if best.fit is None:
         reason = Reason.WAITING_FOR_MOTION if best.cut.moving_share == 0 else Reason.WINDOW_TOO_SHORT
         nothing = no_estimates(reason)
-        return Recorded(nothing, none(reason), None, best.shown, noise_std_m, 0, best.cut.too_short, nan)
+        return Recorded(nothing, None, best.shown, False, noise_std_m, 0, best.cut.too_short, nan)
     estimates = _judged(best, noise_std_m, settings, float(t[-1]))
     return Recorded(
-        estimates=estimates,
-        breakaway=_breakaway(best, estimates),
+        estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
         fit=best.fit,
         pressure=best.shown,
+        evened=best.evened,
         noise_std_m=noise_std_m,
         stretches=len(best.chosen),
         left_out=best.cut.too_short + len(best.cut.stretches) - len(best.chosen),
@@ -129,12 +140,28 @@ def identify(
     )
 
 
+def evened(time_s: Array) -> Array | None:
+    """Return the even instants about which time stamps jitter; None when they do not, or are not even at all.
+
+    Samples that are missing leave their instants out.
+    """
+    if len(time_s) < FEWEST_LATER:
+        return None
+    steps = np.diff(time_s)
+    number = np.append(0.0, np.cumsum(np.round(steps / np.median(steps))))
+    if number[-1] < len(steps):
+        return None
+    period_s, start_s = np.polyfit(number, time_s, 1)
+    even_s = start_s + period_s * number
+    off = np.abs(time_s - even_s) / period_s
+    jitters = off.std() > LEAST_JITTER and off.max() < LARGEST_JITTER and np.diff(number).min() > 0
+    return np.asarray(even_s) if jitters else None
+
+
 def measured_noise_m(position_m: Array) -> float:
     """Return the standard deviation of the position's white noise, as `PositionNoise` finds it."""
     noise = PositionNoise()
-    block = max(8, min(64, len(position_m) // 4))
-    for start in range(0, len(position_m) - block + 1, block):
-        noise.add(position_m[start : start + block])
+    noise.add_all(position_m, max(8, min(64, len(position_m) // 4)))
     return noise.std_m
 
 
@@ -160,6 +187,7 @@ class _Try:
     cut: Cut
     chosen: tuple[Stretch, ...]
     fit: Fit | None
+    evened: bool = False
 
 
 def _misses_m(each: _Try) -> float:
@@ -175,11 +203,18 @@ def _misfits(each: _Try, noise_std_m: float) -> bool:
 
 
 def _fitted(
-    t: Array, x: Array, shown: str, u: Array, noise_std_m: float, settings: RecordSettings, prior: Prior | None
+    t: Array,
+    x: Array,
+    shown: str,
+    u: Array,
+    noise_std_m: float,
+    settings: RecordSettings,
+    prior: Prior | None,
+    near: Array | None = None,
 ) -> _Try:
     found = cut(t, x, u, noise_std_m, settings.moving_threshold_m_per_s)
     chosen = _farthest(found.stretches)
-    fit = refine(list(chosen), held=shown != "linear", prior=prior) if chosen else None
+    fit = refine(list(chosen), held=shown != "linear", prior=prior, near=near) if chosen else None
     return _Try(shown, u, found, chosen, fit)
 
 
@@ -262,7 +297,7 @@ def _mass_shows_later(best: _Try, fit: Fit, largest: float) -> bool:
     return again is not None and float(again.covariance[1, 1]) ** 0.5 <= largest
 
 
-def _breakaway(best: _Try, estimates: Estimates) -> Estimate:
+def _breakaway(best: _Try, estimates: Estimates, largest: float) -> Estimate:
     """Return F_s/A from the rests and what ended them."""
     if not estimates.b_over_c.valid:
         return none(estimates.b_over_c.reason)
@@ -286,8 +321,5 @@ def _breakaway(best: _Try, estimates: Estimates) -> Estimate:
     events = [(max(low, least_pa), high, std) for low, high, std in bounds if high > max(low, least_pa)]
     if not events:
         return none(Reason.WAITING_FOR_MOTION)
-    variances = np.array([(high - low) ** 2 / 12 + std**2 for low, high, std in events])
-    middles = np.array([(high + low) / 2 for low, high, _ in events])
-    weight = 1 / np.maximum(variances, 1e-12)
-    value, std = float(middles @ weight / weight.sum()), float(weight.sum() ** -0.5)
-    return Estimate(value, std, Reason.VALID if std <= 0.05 * value else Reason.TOO_UNCERTAIN)
+    together = reduce(narrowed, (between(low, high, std) for low, high, std in events))
+    return judged_breakaway(together, largest)

@@ -22,7 +22,7 @@ from math import exp, log
 
 import numpy as np
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 from positioner.estimation.response import responses
 from positioner.estimation.stretch import Stretch
 
@@ -148,7 +148,12 @@ class FreeStart:
 
 
 def refine(
-    stretches: list[Stretch], *, held: bool, guess: Array | None = None, prior: Prior | None = None
+    stretches: list[Stretch],
+    *,
+    held: bool,
+    guess: Array | None = None,
+    prior: Prior | None = None,
+    near: Array | None = None,
 ) -> Fit | None:
     """Fit all stretches together.
 
@@ -157,6 +162,7 @@ def refine(
         held: whether the pressure is held between the samples; else it is linear.
         guess: (ln τ, ln μ) to start from, beside those of the search.
         prior: what is known beforehand.
+        near: (ln τ, ln μ) near enough to need no search.
 
     Returns:
         The fit; None when the samples are fewer than the unknowns, or carry no motion.
@@ -164,7 +170,7 @@ def refine(
     motions = [_ready(each, _jump(each, held), held) for each in stretches]
     if sum(len(each.position_m) for each in motions) < 6 + 2 * len(motions):
         return None
-    start = _searched(motions, guess, prior)
+    start = near if near is not None else _searched(motions, guess, prior)
     if start is None:
         return None
     placed = [_in_a_gap(each, motion, start) for each, motion in zip(stretches, motions, strict=True)]

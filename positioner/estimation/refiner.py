@@ -8,7 +8,7 @@ of milliseconds has no place in a cycle of one.
 from dataclasses import dataclass
 from typing import Protocol
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 from positioner.estimation.recorded import Recorded, RecordSettings, identify
 from positioner.estimation.refinement import Prior
 

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 
 Modes = npt.NDArray[Any]
 """A row per root: real for an overdamped stem, complex for one that rings."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 
 
 @dataclass(frozen=True, slots=True)

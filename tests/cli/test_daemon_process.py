@@ -41,11 +41,15 @@ def slave_file(folder: Path, port: int = 5020) -> Path:
     return path
 
 
-def daemon_file(folder: Path, device_port: int, more: str = "") -> Path:
+PATIENT = "reply_timeout_s = 2.0\n"
+"""Where the device's promptness is no matter, so that a busy machine is none."""
+
+
+def daemon_file(folder: Path, device_port: int, more: str = "", device: str = "") -> Path:
     path = folder / "daemon.toml"
     path.write_text(
         "[valve]\nname = 'FV-101'\nstroke_m = 0.1016\n"
-        f"[device]\nport = {device_port}\n[cycle]\nperiod_s = 2e-3\n[supervisory]\nport = 0\n{LAW}{more}"
+        f"[device]\nport = {device_port}\n{device}[cycle]\nperiod_s = 2e-3\n[supervisory]\nport = 0\n{LAW}{more}"
     )
     return path
 
@@ -60,10 +64,10 @@ class Site:
 
 
 @contextmanager
-def site(folder: Path, more: str = "") -> Iterator[Site]:
+def site(folder: Path, more: str) -> Iterator[Site]:
     with running("sim", slave_file(folder), "--port", "0") as slave:
         device_port = port_in(slave)
-        with running("run", daemon_file(folder, device_port, more)) as daemon:
+        with running("run", daemon_file(folder, device_port, more, PATIENT)) as daemon:
             yield Site(device_port, port_in(daemon), folder)
 
 

@@ -6,8 +6,13 @@ from pathlib import Path
 import pytest
 
 from config.recording import read_recording
-from positioner.cli.demo import LARGEST_ERROR_PU, Identified, Outcome, Step
+from config.registers import Fault, Mode
+from config.valve import load_valve, shipped_valve
+from positioner.cli.demo import LARGEST_ERROR_PU, Identified, Outcome, Step, started
 from positioner.cli.main import main
+from positioner.cli.parts.children import port_in
+from positioner.dcs import Dcs
+from tests.cli.test_daemon_process import until
 
 
 def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True) -> Outcome:
@@ -44,3 +49,18 @@ def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
     (recording,) = (tmp_path / "out" / "recordings").glob("*.csv")
     states = set(read_recording(recording).columns["state"].tolist())
     assert states == {0.0, 1.0, 2.0, 3.0}
+
+
+@pytest.mark.parametrize(
+    ("bus", "where"), [("canopen", "listening on loopback node 1 on channel:"), ("rtu", "listening on /dev/pts/")]
+)
+def test_on_the_other_buses_the_same_files_bring_up_a_valve_that_obeys(bus: str, where: str, tmp_path: Path) -> None:
+    """What the command does on every bus alike, playing the DCS, is shown by the test above."""
+    with started(bus, tmp_path, load_valve(shipped_valve("seed")).valve) as site:
+        assert site.slave.startswith(where)
+        with Dcs("127.0.0.1", port_in(site.daemon)) as dcs:
+            assert dcs.get_all("fault", "position_m") == pytest.approx({"fault": Fault.NONE, "position_m": 0}, abs=1e-3)
+            dcs.set_all({"mode": Mode.MANUAL, "manual_pressure": 60e3})
+            until(lambda: dcs.get("position") > 0.3, "the stem's motion")
+    (recording,) = (tmp_path / "recordings").glob("*.csv")
+    assert read_recording(recording).columns["command_pa"].max() == pytest.approx(60e3)

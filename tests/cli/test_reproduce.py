@@ -122,11 +122,10 @@ def test_without_noise_the_law_brings_the_stem_to_both_references(quiet: Course)
     assert all(solved.worst_error < 0.03 for solved in found.solved)
 
 
-def test_at_a_fieldbus_sample_time_white_noise_spoils_a_b_c_but_not_the_law(slow: Findings) -> None:
+def test_at_a_fieldbus_sample_time_white_noise_spoils_the_seeds_a_b_c_but_not_ours(slow: Findings) -> None:
     assert all(solved.worst_error > 1 for solved in slow.solved)
-    reasons = {one.name: one.reason for one in slow.identified}
-    assert {reasons[name] for name in "abck"} == {Reason.NOISE_DOMINATES.name}
-    assert reasons["b_over_c"] == reasons["k_over_c"] == Reason.VALID.name
+    assert {one.reason for one in slow.identified} == {Reason.VALID.name}
+    assert all(abs(one.value / one.true - 1) < 0.02 for one in slow.identified)
     assert holds(slow) == {"a": False, "b": True, "c": True, "c daemon": True}
 
 

@@ -70,7 +70,10 @@ def test_the_valves_are_found_by_name(tmp_path: Path) -> None:
     [
         (FIRST + SECOND.replace("'B'", "'A'"), "valve.name: two valves have 'A', allowed is one each"),
         (FIRST + SECOND.replace("unit = 2", "unit = 1"), "valve.unit: A and B have 1, allowed is one each"),
-        (FIRST + SECOND.replace("port = 2", "port = 1"), "valve.device: A and B have the same device, allowed is one"),
+        (
+            FIRST + SECOND.replace("port = 2", "port = 1\nreply_timeout_s = 0.3"),
+            "valve.device: A and B have the same device, unit 1 at 127.0.0.1:1, allowed is one each",
+        ),
         (FIRST + SECOND.replace("unit = 2\n", ""), "valve 2 (B): valve.unit: is required and missing"),
         (FIRST + SECOND.replace("name = 'B'\n", ""), "valve 2: valve.name: is required and missing"),
         (FIRST + SECOND.replace("unit = 2", "unit = 0"), "valve 2 (B): supervisory.unit: Input should be greater"),
@@ -93,6 +96,59 @@ def test_a_line_needs_a_period_with_room_for_every_devices_time_out(tmp_path: Pa
     assert len(load_valves(written(tmp_path, on_a_line(0.06, 0, 1) + on_a_line(0.06, 1, 2)))) == 2, "a line each"
     uneven = problem(tmp_path, on_a_line(0.2, 0, 1) + on_a_line(0.3, 0, 2))
     assert uneven == "L2: cycle must be that of L1, which is on the same line /dev/ttyS0"
+
+
+def nodes(first: str, second: str) -> str:
+    """Return a file of two valves on one CAN bus."""
+    valve = "[[valve]]\nname = '{0}'\nunit = {1}\nstroke_m = 0.1\n[valve.device]\n{2}\n"
+    return "[device]\nbus = 'canopen'\n" + valve.format("A", 1, first) + valve.format("B", 2, second)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "said"),
+    [
+        ("node = 7", "node = 7\nsync_cob_id = 0x681", "node 7 on loopback 29500"),
+        ("node = 7", "node = 8", "sync_cob_id 0x80 on loopback 29500"),
+        ("node = 7", "node = 8\nsync_cob_id = 0x87", "arbitration id 0x87 on loopback 29500, as sync_cob_id and as"),
+        ("node = 7\nsync_cob_id = 0x188", "node = 8", "arbitration id 0x188 on loopback 29500, as sync_cob_id and as"),
+    ],
+)
+def test_on_one_can_bus_each_has_its_node_and_its_sync(tmp_path: Path, first: str, second: str, said: str) -> None:
+    assert problem(tmp_path, nodes(first, second)).startswith(f"valve.device: A and B have {said}")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("node = 7", "node = 8\nsync_cob_id = 0x680"),
+        ("node = 7", "node = 7\nchannel = '29516'"),
+        ("node = 7", "node = 7\ninterface = 'socketcan'"),
+        ("node = 7", "node = 7\noptions = { port = 43113 }"),
+    ],
+)
+def test_nodes_that_cannot_be_taken_for_each_other_are_no_clash(tmp_path: Path, first: str, second: str) -> None:
+    assert len(load_valves(written(tmp_path, nodes(first, second)))) == 2
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("0x84", "device: sync_cob_id must be none of node 4's own ids, it is 0x84"),
+        ("0x65", "device.sync_cob_id: must be 0x80 to 0x100, 0x181 to 0x580 or 0x680 to 0x6df"),
+        ("0x604", "device.sync_cob_id: must be 0x80 to 0x100"),
+    ],
+)
+def test_a_sync_that_would_be_taken_for_another_frame_is_refused(tmp_path: Path, value: str, said: str) -> None:
+    text = f"[valve]\nstroke_m = 0.1\n[device]\nbus = 'canopen'\nnode = 4\nsync_cob_id = {value}\n"
+    assert problem(tmp_path, text).startswith(said)
+
+
+def test_two_valves_on_one_line_have_their_units_and_the_same_characters(tmp_path: Path) -> None:
+    first, second = on_a_line(0.2, 0, 1), on_a_line(0.2, 0, 2)
+    same = problem(tmp_path, first + second.replace("unit = 2 }", "unit = 1 }"))
+    assert same == "valve.device: L1 and L2 have the same device, unit 1 on /dev/ttyS0, allowed is one each"
+    other = problem(tmp_path, first + second.replace("115200", "57600"))
+    assert other == "valve.device: L1 and L2 have the line /dev/ttyS0 with other characters, allowed is one each"
 
 
 def test_the_shipped_fleet_is_valid() -> None:

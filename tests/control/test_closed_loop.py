@@ -133,4 +133,4 @@ def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) ->
     assert ratios.b_over_c == pytest.approx(B_OVER_C, rel=0.01)
     assert ratios.k_over_c == pytest.approx(K_OVER_C, rel=0.01)
     singly = {decisions[-1].estimates.a.reason, decisions[-1].estimates.k.reason}
-    assert singly == {Reason.COMMANDS_MISSED if spoil is interrupted else Reason.NOISE_DOMINATES}
+    assert singly == {Reason.COMMANDS_MISSED if spoil is interrupted else Reason.VALID}

@@ -38,6 +38,19 @@ def test_a_job_is_done_elsewhere_exactly_as_here(process: RefinementProcess) -> 
     assert refiner.collect() is None, "a result is given once"
 
 
+def test_it_is_started_before_there_is_a_job_and_ends_at_once() -> None:
+    made = RefinementProcess()
+    until = time.monotonic() + 20
+    while made._process is None and time.monotonic() < until:
+        time.sleep(0.005)
+    assert made._process is not None
+    assert made._process.poll() is None
+    begin = time.monotonic()
+    made.stop()
+    assert made._process.poll() is not None
+    assert time.monotonic() - begin < 2.0
+
+
 def test_asking_does_not_wait(process: RefinementProcess) -> None:
     refiner = process.refiner()
     assert refiner.submit(job())

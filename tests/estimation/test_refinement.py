@@ -9,7 +9,7 @@ import pytest
 from config.valve import load_valve, shipped_valve
 from positioner.estimation.cutting import cut
 from positioner.estimation.estimate import Reason
-from positioner.estimation.recorded import Recorded, RecordSettings, identify
+from positioner.estimation.recorded import Recorded, RecordSettings, evened, identify
 from positioner.estimation.refinement import refine
 from positioner.estimation.response import responses, roots
 from sim.valve import Valve
@@ -98,19 +98,29 @@ def test_it_reaches_the_bound_and_says_so(period_s: float, noise_pu: float) -> N
     assert (np.abs(off) < np.array(said)).mean() == pytest.approx(0.68, abs=0.15)
 
 
-def test_jitter_lost_samples_and_an_unseen_rest_cost_no_more_than_half_the_bound() -> None:
-    rng = np.random.default_rng(3)
-    off, unseen = [], []
-    rested = moved(rest_s=0.0)
-    for _ in range(8):
-        time_s = grid(1e-3, -0.1, 0.8) + 1e-4 * rng.uniform(-1, 1, 901)
-        time_s -= time_s[100]
-        whole = at_once(time_s).noisy(rng)
-        off.append(errors(found(whole.kept(rng.uniform(size=901) >= 0.01))))
-        unseen.append(errors(found(rested.noisy(rng))))
-    at = bounds(moved(), NOISE)
-    for each in (np.array(off), np.array(unseen)):
-        assert (np.sqrt((each**2).mean(axis=0)) < 1.5 * 1.75 * at).all()
+def test_stamps_that_jitter_are_taken_for_what_they_are() -> None:
+    """Samples taken evenly whose stamps are off, and samples taken unevenly whose stamps are true."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        even = at_once(grid(1e-3, -0.1, 0.8)).noisy(rng)
+        off = Run(even.time_s + 1e-4 * rng.uniform(-1, 1, 901), even.position_m, even.pressure_pa)
+        uneven_s = grid(1e-3, -0.1, 0.8) + 1e-4 * rng.uniform(-1, 1, 901)
+        uneven = at_once(uneven_s - uneven_s[100]).noisy(rng)
+        kept = rng.uniform(size=901) >= 0.01
+        assert [found(each.kept(kept)).evened for each in (even, off, uneven)] == [False, True, False]
+        assert max(map(abs, errors(found(off.kept(kept))))) < 5e-3
+
+
+def test_evened_stamps_keep_the_gaps() -> None:
+    rng = np.random.default_rng(0)
+    even_s = grid(1e-3, 0.0, 0.5)
+    keep = rng.uniform(size=501) >= 0.05
+    stamps_s = (even_s + 5e-5 * rng.uniform(-1, 1, 501))[keep]
+    again_s = evened(stamps_s)
+    assert again_s is not None
+    np.testing.assert_allclose(again_s, even_s[keep], atol=1e-5)
+    assert evened(even_s) is None
+    assert evened(np.cumsum(rng.exponential(1e-3, 500))) is None
 
 
 def test_the_sample_at_which_it_broke_away_is_lost() -> None:
@@ -191,9 +201,10 @@ def test_breaking_away_under_a_ramp_tells_the_static_friction() -> None:
         np.concatenate(pair) for pair in ((whole.time_s, swings.time_s + shift), (whole.position_m, swings.position_m))
     ]
     each = identify(both[0], both[1], np.concatenate((whole.pressure_pa, swings.pressure_pa)), HELD)
-    assert each.breakaway.valid
-    assert each.breakaway.value == pytest.approx(STATIC / 0.0645, abs=4 * each.breakaway.std + 20)
-    assert each.breakaway.value > 1.1 * COULOMB / 0.0645
+    known = each.estimates.breakaway
+    assert known.valid
+    assert known.value == pytest.approx(STATIC / 0.0645, abs=4 * known.std + 20)
+    assert known.value > 1.1 * COULOMB / 0.0645
 
 
 def test_nothing_moves_nothing_is_known() -> None:

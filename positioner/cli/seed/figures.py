@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from positioner.estimation.identifier import Array
+    from positioner.estimation.array import Array
 
 mpl.use("Agg")
 

@@ -23,7 +23,7 @@ from positioner.cli.seed.formulas import (
 from positioner.cli.seed.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, Course
 from positioner.control.law import balance_pa
 from positioner.estimation import Ratios
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 from sim.valve import Valve
 
 SETTLED_S = 0.2

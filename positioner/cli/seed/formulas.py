@@ -30,8 +30,8 @@ from positioner.cli.seed.scenario import (
 )
 from positioner.control.law import balance_pa
 from positioner.estimation import Ratios
+from positioner.estimation.array import Array
 from positioner.estimation.derivatives import weights
-from positioner.estimation.identifier import Array
 from sim.valve import Valve
 
 GRAPHS_FROM_S = 0.4

@@ -28,7 +28,7 @@ from sim.valve import Valve
 
 if TYPE_CHECKING:
     from positioner.daemon.snapshot import Snapshot
-    from positioner.estimation.identifier import Array
+    from positioner.estimation.array import Array
 
 PSI = 6894.757
 ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S = 6.4 * PSI, 1.92 * PSI, 1.0

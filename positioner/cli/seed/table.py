@@ -6,6 +6,9 @@ The bound is that of four unknowns a, b, c, k with the start known, J the deriva
 
     cov θ >= σ^2 (J'J)^-1
 
+Where the start is not known, x_0 and v_0 are columns of J besides, and the bound is the inverse's first four rows and
+columns.
+
 The seed's identifier is its (13), corrected, by the trapezoidal rule, at 0.8 s; ours is what `positioner estimate` and
 the daemon's refinement do. The stem is the simulator's.
 """
@@ -19,7 +22,7 @@ import numpy as np
 from config.valve import ValveFile
 from positioner.cli.seed.formulas import solved
 from positioner.cli.seed.scenario import ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S
-from positioner.estimation.identifier import Array
+from positioner.estimation.array import Array
 from positioner.estimation.recorded import RecordSettings, identify
 from positioner.estimation.response import responses
 from sim.valve import Valve
@@ -28,8 +31,6 @@ PERIODS_S = (1e-5, 1e-3, 5e-3)
 NOISES_PU = (1e-4, 1e-3, 0.01 / sqrt(2))
 REST_S, WINDOW_S = 0.1, 0.8
 NAMES = ("a", "b", "c", "k", "b_over_c", "k_over_c")
-SLOW_SEEDS = 6
-"""At 10 us a run costs as much as so many of the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,31 +60,39 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Time, true position and the pressure held up to each sample, SI units; `start` is the row at which it begins."""
+    """Time, true position and the pressure held up to each sample, SI units; `start` is the row at which it begins.
+
+    `known` says what is known of that beginning: 2 where and how fast, 1 how fast, 0 nothing.
+    """
 
     time_s: Array
     position_m: Array
     pressure_pa: Array
     start: int
+    velocity_m_per_s: Array
+    known: int = 2
 
 
 def table(file: ValveFile, seeds: int) -> Iterator[Cell]:
     """Yield the cells."""
     for period_s in PERIODS_S:
         moved = motion(file, period_s)
-        runs = max(2, seeds // SLOW_SEEDS) if period_s < 1e-4 else seeds
         for noise_pu in NOISES_PU:
-            yield cell(file, moved, period_s, noise_pu, runs)
+            yield cell(file, moved, period_s, noise_pu, seeds)
 
 
 def motion(file: ValveFile, period_s: float) -> Motion:
     """Return the motion without noise."""
     rest, rows = round(REST_S / period_s), round(WINDOW_S / period_s)
-    t = period_s * np.arange(rows, dtype=np.float64)
-    swing = ALPHA_PA + BETA_PA * np.sin(OMEGA_RAD_PER_S * t)
-    response = Valve.from_file(file).run(np.concatenate((np.zeros(rest), swing)), period_s)
-    time_s = period_s * np.arange(-rest, rows + 1, dtype=np.float64)
-    return Motion(time_s, response.position_m, np.concatenate((np.zeros(rest + 1), swing)), rest)
+    return motion_at(file, period_s * np.arange(-rest, rows + 1, dtype=np.float64), rest)
+
+
+def motion_at(file: ValveFile, time_s: Array, start: int) -> Motion:
+    """Return the motion sampled, and commanded, at these instants; it begins at row `start`."""
+    swing = ALPHA_PA + BETA_PA * np.sin(OMEGA_RAD_PER_S * time_s[start:-1])
+    held = np.concatenate((np.zeros(start), swing))
+    response = Valve.from_file(file).run(held, np.diff(time_s))
+    return Motion(time_s, response.position_m, np.append(0.0, held), start, response.velocity_m_per_s)
 
 
 def true_values(file: ValveFile) -> Array:
@@ -96,19 +105,20 @@ def true_values(file: ValveFile) -> Array:
 
 
 def bound(file: ValveFile, moved: Motion, noise_m: float) -> Array:
-    """Return the Cramér-Rao bounds, shares of the true values, (6)."""
+    """Return the Cramér-Rao bounds, shares of the true values, six of them."""
     true = true_values(file)
     rows = slice(moved.start, None)
     t, u = moved.time_s[rows], moved.pressure_pa[rows]
+    x_0, v_0 = moved.position_m[moved.start], moved.velocity_m_per_s[moved.start]
 
-    def position_m(logs: Array) -> Array:
-        a, b, c, k = (true[:4] * np.exp(logs)).tolist()
-        X_g, X_q, _, _ = responses(t, u, 1, a / b, -1 / b, held=True)
-        return np.asarray(-c / b * X_g - k / b * X_q)
+    def position_m(off: Array) -> Array:
+        a, b, c, k = (true[:4] * np.exp(off[:4])).tolist()
+        X_g, X_q, X_0, X_1 = responses(t, u, 1, a / b, -1 / b, held=True)
+        return np.asarray(-c / b * X_g - k / b * X_q + (x_0 + off[4]) * X_0 + (v_0 + off[5]) * X_1)
 
-    steps = 1e-5 * np.eye(4)
+    steps = 1e-5 * np.eye(6)[: 6 - moved.known]
     J = np.array([(position_m(each) - position_m(-each)) / 2e-5 for each in steps]).T
-    covariance = noise_m**2 * np.linalg.inv(J.T @ J)
+    covariance = noise_m**2 * np.linalg.inv(J.T @ J)[:4, :4]
     gradients = np.vstack((np.eye(4), [[0, 1, -1, 0], [0, 0, -1, 1]]))
     return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients)))
 
@@ -118,7 +128,8 @@ def cell(file: ValveFile, moved: Motion, period_s: float, noise_pu: float, seeds
     noise_m, true = noise_pu * file.valve.stroke_m, true_values(file)
     ours, reported, valid, theirs = [], [], [], []
     for seed in range(seeds):
-        measured = moved.position_m + np.random.default_rng(seed).normal(0, noise_m, len(moved.position_m))
+        rng = np.random.default_rng((seed, round(1e6 * period_s), round(1e6 * noise_pu)))
+        measured = moved.position_m + rng.normal(0, noise_m, len(moved.position_m))
         found = identify(moved.time_s, measured, moved.pressure_pa, RecordSettings(pressure_held=True)).estimates
         each = [getattr(found, name) for name in NAMES]
         ours.append([one.value for one in each])
