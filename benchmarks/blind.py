@@ -35,8 +35,17 @@ from workbench.confounding import algebraic_class
 from workbench.diagnosis import Diagnosis, diagnose
 from workbench.hiding import hide
 
-FIRST_SEED = {"clean": 1000, "dirty": 2000, "nothing": 3000, "two": 4000, "removed": 5000, "others": 0, "outside": 0}
-PLANNED = {"clean": 96, "dirty": 64, "nothing": 64, "two": 16, "removed": 32, "others": 24, "outside": 20}
+FIRST_SEED = {
+    "clean": 11000,
+    "dirty": 12000,
+    "nothing": 13000,
+    "two": 14000,
+    "removed": 15000,
+    "others": 600,
+    "outside": 700,
+}
+"""Nobody has looked at a case from here on before the rules stood."""
+PLANNED = {"clean": 48, "dirty": 32, "nothing": 60, "two": 6, "removed": 8, "others": 12, "outside": 8}
 FOLDER = Path("blind-out")
 """Where the lines are kept."""
 
@@ -77,7 +86,7 @@ def _other(family: str, number: int) -> Problem:
     kinds = [name for name in kinds if name not in {"nothing", "presliding"}]
     law = sorted(LAWS)[number % len(LAWS)]
     kind = kinds[number % len(kinds)]
-    made = case(kind, law=law, seed=number)
+    made = case(kind, law=law, seed=FIRST_SEED[family] + number)
     return Problem(made.fit, made.test, made.base, shipped_effects(), (kind,), True, 5e-5, law)
 
 

@@ -41,6 +41,7 @@ class Cell:
         bound: Cramér-Rao, standard deviations.
         seed_std, seed_bias: of the seed's identifier, a, b, c, and b/c (nothing for k).
         std, bias: of ours, over the seeds.
+        reported: standard deviation that ours reports, in the mean.
         covered: how often the truth lies within one reported standard deviation; 0.683 is honest.
         valid: how often the value is valid.
         seeds: runs.
@@ -53,6 +54,7 @@ class Cell:
     seed_bias: tuple[float | None, ...]
     std: tuple[float, ...]
     bias: tuple[float, ...]
+    reported: tuple[float, ...]
     covered: tuple[float, ...]
     valid: tuple[float, ...]
     seeds: int
@@ -150,6 +152,7 @@ def cell(file: ValveFile, moved: Motion, period_s: float, noise_pu: float, seeds
         seed_bias=_spread(seed_errors.mean(axis=0)),
         std=_numbers(errors.std(axis=0, ddof=1)),
         bias=_numbers(errors.mean(axis=0)),
+        reported=_numbers((np.array(reported) / np.abs(true)).mean(axis=0)),
         covered=_numbers(covered.mean(axis=0)),
         valid=_numbers(np.array(valid).mean(axis=0)),
         seeds=seeds,
@@ -170,8 +173,8 @@ def lines(cells: list[Cell]) -> list[str]:
     """Return the table for people."""
     said = [
         "",
-        "white noise by sample time, shares of the true values: Cramér-Rao bound; ours as multiples of it (standard",
-        "deviation, bias, and how often the truth lies within one reported deviation); the seed's: rms of its error",
+        "white noise by sample time, shares of the true values: Cramér-Rao bound; ours as multiples of it: standard",
+        "deviation, bias, the deviation it reports; how often the truth lies within that; the seed's: rms of its error",
         f"{'noise p.u.':11}{'sample':>8}{'seeds':>6}  {'':10}" + "".join(f"{name:>10}" for name in NAMES),
     ]
     for each in cells:
@@ -185,6 +188,7 @@ def lines(cells: list[Cell]) -> list[str]:
             ("bound", [f"{100 * value:.3f} %" for value in each.bound]),
             ("ours std", [f"{std / at:.2f}" for std, at in zip(each.std, each.bound, strict=True)]),
             ("ours bias", [f"{bias / at:+.2f}" for bias, at in zip(each.bias, each.bound, strict=True)]),
+            ("reported", [f"{std / at:.2f}" for std, at in zip(each.reported, each.bound, strict=True)]),
             ("in 68 %", [f"{100 * share:.0f} %" for share in each.covered]),
             ("valid", [f"{100 * share:.0f} %" for share in each.valid]),
             ("the seed's", ["-" if one is None else f"{100 * one:.3g} %" if one < 1 else "lost" for one in size]),
