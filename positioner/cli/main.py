@@ -1,10 +1,12 @@
 """`positioner COMMAND ...`: finds the command, runs it, turns bad input into one line and an exit status.
 
-Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input.
+Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input; 130 and 141, as shells have it, when broken off
+by Ctrl-C and when nobody reads what is printed any more (`| head`).
 """
 
 import argparse
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -40,7 +42,9 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     arguments = _parser().parse_args(words)
     try:
-        return int(arguments.run(arguments))
+        status = int(arguments.run(arguments))
+        sys.stdout.flush()
+        return status
     except InputError as error:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 2
@@ -58,6 +62,20 @@ def main(words: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    except BrokenPipeError:
+        if not _unread():
+            raise
+        return 141
+
+
+def _unread() -> bool:
+    """Return whether nobody reads standard output any more; what is left of it is then dropped."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 def _parser() -> argparse.ArgumentParser:

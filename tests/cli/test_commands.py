@@ -35,6 +35,16 @@ def one_line(capture: Capture) -> str:
     return err.strip()
 
 
+def test_output_that_nobody_reads_ends_a_command_without_a_word() -> None:
+    reads, writes = os.pipe()
+    os.close(reads)
+    mapped = subprocess.run(
+        [sys.executable, "-m", "positioner.cli", "map"], stdout=writes, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(writes)
+    assert (mapped.returncode, mapped.stderr) == (141, "")
+
+
 def test_help_names_every_command_and_each_has_an_example() -> None:
     everything = subprocess.run(
         [sys.executable, "-m", "positioner.cli", "--help"], capture_output=True, text=True, check=True
