@@ -305,7 +305,7 @@ class _Search:
         found = gain(before.fit, model.fit, before.errors, model.errors)
         beyond = _beyond(name, model.fit, self._library[name])
         same = bare_parameter(name, self._library)
-        why_not = beyond or found.short
+        why_not = beyond or found.short(before.explained)
         if same and not why_not:
             why_not = f"no record of pressure and position tells it from {same}"
         return Candidate(number, name, model, found, not beyond, why_not)

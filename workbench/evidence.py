@@ -22,7 +22,8 @@ from workbench.structure import structure
 BLOCK_S = 1.0
 LEAST_BIC = 10.0
 LEAST_GAIN = 0.05
-LEAST_STANDARD_ERRORS = 2.0
+LEAST_STANDARD_ERRORS, WHERE_EXPLAINED = 2.0, 3.0
+"""More where nothing is left to explain: of some twenty candidates one falls by two deviations of pure chance."""
 ALIKE_STANDARD_ERRORS = 1.0
 ALIKE_GAIN = 0.02
 AT_FLOOR, RARELY_OFF = 1.25, 1.75
@@ -70,18 +71,19 @@ class Gain:
     standard_errors: float
     """The same in its own standard errors."""
 
-    @property
-    def short(self) -> str:
-        """Say what is missing to accept the candidate; empty if nothing is."""
+    def short(self, explained: bool) -> str:
+        """Say what is missing to accept the candidate; empty if nothing is.
+
+        Args:
+            explained: whether the model before leaves nothing to explain.
+        """
+        least = WHERE_EXPLAINED if explained else LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
         if self.held_out <= LEAST_GAIN:
             return f"the held-out error falls by {100 * self.held_out:.2g} %, more than {100 * LEAST_GAIN:g} % needed"
-        if self.standard_errors <= LEAST_STANDARD_ERRORS:
-            return (
-                f"the held-out error falls by {self.standard_errors:.2g} standard errors, "
-                f"more than {LEAST_STANDARD_ERRORS:g} needed"
-            )
+        if self.standard_errors <= least:
+            return f"the held-out error falls by {self.standard_errors:.2g} standard errors, more than {least:g} needed"
         return ""
 
 

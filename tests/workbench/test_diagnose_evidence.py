@@ -95,11 +95,13 @@ def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_
     ],
 )
 def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> None:
-    assert said in gain.short
+    assert said in gain.short(explained=False)
 
 
 def test_what_passes_every_part_is_not_refused() -> None:
-    assert not Gain(11.0, 0.06, 2.1).short
+    assert not Gain(11.0, 0.06, 2.1).short(explained=False)
+    assert "more than 3 needed" in Gain(11.0, 0.06, 2.9).short(explained=True)
+    assert not Gain(11.0, 0.06, 3.1).short(explained=True)
 
 
 def test_noise_has_no_structure() -> None:
