@@ -134,8 +134,8 @@ def named(each: Line, hidden: str) -> bool:
 
 
 def first(each: Line, hidden: str) -> bool:
-    """Whether it is the first one added, or in the set with that."""
-    return bool(each["sets"]) and bool(_same(hidden) & set(each["sets"][0]))
+    """Whether it is the first one added, or in the set with that; where none was, the first by evidence."""
+    return bool(_same(hidden) & set((each["sets"] or [each["ranked"][:1]])[0]))
 
 
 def single(each: Line) -> bool:
@@ -174,6 +174,7 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         return
     known = [each for each in seen if not any("." not in name and name in _bare() for name in each["hidden"])]
     yield share("true effect first, or in the set with it", [first(each, each["hidden"][0]) for each in known])
+    yield share("true effect named", [named(each, each["hidden"][0]) for each in known])
     if family == "two":
         yield share("both named", [all(named(each, name) for name in each["hidden"]) for each in known])
     ones = [each for each in known if single(each)]

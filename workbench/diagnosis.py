@@ -6,7 +6,7 @@ the best of those with: an optimiser's failure must not look like physics. The b
 added. Steps go on until the result is explained (it reaches the floor and leaves no structured residual), nothing more
 is accepted, or three effects are added.
 
-    adequate      nothing is missing: no effect is accepted, and the valve is at the floor without
+    adequate      nothing is missing: no effect is accepted, and the valve explains the record without
     missing       these effects, and with them all is explained
     one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
     unexplained   something is missing that the library does not have; what lowered the error so far is still named
@@ -361,10 +361,10 @@ def _at_end(value: float, declared: Parameter, valve: ValveParameters) -> bool:
 
 def _verdict(best: Model, steps: Sequence[Step]) -> Verdict:
     added = [step for step in steps if step.added]
-    if best.explained and added:
-        return "one_of" if any(len(step.alike) > 1 for step in added) else "missing"
-    if best.at_floor and not added:
+    if best.explained and not added:
         return "adequate"
+    if best.explained:
+        return "one_of" if any(len(step.alike) > 1 for step in added) else "missing"
     return "unexplained" if best.fit.trusted else "untrusted"
 
 
