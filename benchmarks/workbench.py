@@ -1,0 +1,45 @@
+"""How long a person waits for the workbench: compare, preview and diagnosis of 60 s at 200 Hz, the whole library tried.
+
+`python -m benchmarks.workbench [SEED]`. The kernels are compiled beforehand: once per machine, about a minute for all.
+"""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+from sim.effect import shipped_effect, shipped_effects
+from workbench import compare, diagnose, fit
+from workbench.held_out import split
+from workbench.hiding import hide
+from workbench.preview import preview
+
+DURATION_S, PERIOD_S, SEED = 60.0, 0.005, 20001
+TARGETS_S = {"compare": 3.0, "preview": 2.0, "diagnose": 60.0}
+
+
+def report(seed: int = SEED) -> Iterator[str]:
+    """Yield one line a target."""
+    hidden = hide(seed, duration_s=DURATION_S, period_s=PERIOD_S)
+    library = {name: shipped_effect(name, "library") for name in shipped_effects()}
+    parts = split([hidden.fit], hidden.test)
+    bare = fit(parts.train.recording, hidden.base, profile=False)
+    preview(bare, parts, library)  # compiles what is not in the cache
+    yield f"{len(hidden.fit)} samples, {DURATION_S:g} s, seed {seed}"
+    yield _line("compare", _seconds(lambda: compare(hidden.fit, hidden.base)))
+    yield _line("preview", _seconds(lambda: preview(bare, parts, library)))
+    yield _line("diagnose", _seconds(lambda: diagnose(hidden.fit, hidden.base, test=hidden.test)))
+
+
+def _seconds(does: Callable[[], object]) -> float:
+    began_s = time.perf_counter()
+    does()
+    return time.perf_counter() - began_s
+
+
+def _line(name: str, seconds: float) -> str:
+    return f"{name:10}{seconds:7.2f} s, target {TARGETS_S[name]:g} s"
+
+
+if __name__ == "__main__":
+    for line in report(*map(int, sys.argv[1:2])):
+        print(line, flush=True)
