@@ -44,7 +44,8 @@ FIRST_SEED = {
     "others": 600,
     "outside": 700,
 }
-"""Nobody has looked at a case from here on before the rules stood."""
+LOOKED_AT = {("nothing", 7), ("nothing", 17), ("outside", 1)}
+"""Nobody has looked at a case before the rules stood, but for these, which changed the rules: they do not count."""
 PLANNED = {"clean": 48, "dirty": 32, "nothing": 60, "two": 6, "removed": 8, "others": 12, "outside": 8}
 FOLDER = Path("blind-out")
 """Where the lines are kept."""
@@ -222,7 +223,7 @@ def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, i
     planned = [
         ((number + 0.5) / PLANNED[family], family, number) for family in families for number in range(PLANNED[family])
     ]
-    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there]
+    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there | LOOKED_AT]
 
 
 def main() -> None:

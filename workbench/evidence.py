@@ -1,6 +1,7 @@
 """Whether one fit is better than another: robust BIC on what was fitted, block errors on what was held out.
 
     BIC = n log(2 C / n) + k log n             C soft-L1 cost, k free parameters; the gain is base less candidate
+    rho = corr(r_i, r_i+1),  (1 - rho) / (1 + rho) of the samples are independent
     l_b = log rms of the error in block b      blocks of 1 s: within one the errors hang together
     d_b = l_b(base) - l_b(candidate)           held within +-log 2
     gain = 1 - exp(-mean d_b),                 its standard error from the spread of d_b over the blocks
@@ -17,7 +18,7 @@ import numpy as np
 from config.recording import Column
 from workbench.fitting import Fit
 from workbench.held_out import Split, residual_m
-from workbench.structure import structure
+from workbench.structure import clipped, structure
 
 BLOCK_S = 1.0
 LEAST_BIC = 10.0
@@ -51,6 +52,8 @@ class Errors:
     """l_b of the fitted and the held-out blocks."""
     structure: float
     """How much of the residual hangs on the state, fitted or held out, whichever is more (`structure`)."""
+    independent: float
+    """Share of the fitted samples that are independent."""
 
     def at_floor(self, floor_m: float) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -70,6 +73,8 @@ class Gain:
     """Relative fall of the held-out block error."""
     standard_errors: float
     """The same in its own standard errors."""
+    independent: float
+    """Share of the samples that are independent: the evidence is worth so much of `bic`."""
 
     def short(self, explained: bool) -> str:
         """Say what is missing to accept the candidate; empty if nothing is.
@@ -80,6 +85,11 @@ class Gain:
         least = WHERE_EXPLAINED if explained else LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
+        if self.independent * self.bic <= LEAST_BIC:
+            return (
+                f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent:.2g} % are "
+                f"independent: {self.independent * self.bic:.2g}, more than {LEAST_BIC:g} needed"
+            )
         if self.held_out <= LEAST_GAIN:
             return f"the held-out error falls by {100 * self.held_out:.2g} %, more than {100 * LEAST_GAIN:g} % needed"
         if self.standard_errors <= least:
@@ -104,6 +114,7 @@ def errors(fit: Fit, split: Split) -> Errors:
         logs=logs,
         all_logs=np.concatenate([fitted_logs, logs]),
         structure=max(structure(train.record, fitted_m), structure(judged.record, held_out_m)),
+        independent=independent(fitted_m),
     )
 
 
@@ -115,10 +126,19 @@ def block_logs(time_s: Column, error_m: Column, negligible_m: float) -> Column:
     return np.asarray(0.5 * np.log(squares + negligible_m**2 + np.finfo(float).tiny))
 
 
+def independent(error_m: Column) -> float:
+    """Return the share of samples that are independent, at most 1; the error clipped at 5 robust deviations."""
+    e = clipped(error_m)
+    pairs = np.isfinite(e[1:]) & np.isfinite(e[:-1])
+    power = float(np.nanmean(e**2)) if pairs.any() else 0.0
+    rho = float(np.mean(e[1:][pairs] * e[:-1][pairs])) / power if power > 0.0 else 0.0
+    return float(np.clip((1.0 - rho) / (1.0 + rho), 0.0, 1.0)) if rho > 0.0 else 1.0
+
+
 def gain(base: Fit, candidate: Fit, base_errors: Errors, candidate_errors: Errors) -> Gain:
     """Compare a candidate with its base."""
     held_out, standard_errors = fall(base_errors.logs, candidate_errors.logs)
-    return Gain(bic(base) - bic(candidate), held_out, standard_errors)
+    return Gain(bic(base) - bic(candidate), held_out, standard_errors, candidate_errors.independent)
 
 
 def bic(fit: Fit) -> float:

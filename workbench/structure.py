@@ -33,7 +33,7 @@ def structure(record: Record, residual_m: Column) -> float:
     if rows.size < FEWEST:
         return 0.0
     matrix = _regressors(record)[rows]
-    error = _clipped(residual_m[rows])
+    error = clipped(residual_m[rows])
     fold = np.arange(rows.size) * FOLDS // rows.size
     left = np.empty(rows.size)
     spread = np.empty(rows.size)
@@ -46,9 +46,10 @@ def structure(record: Record, residual_m: Column) -> float:
     return 1.0 - float(np.sum(left**2)) / total if total > 0.0 else 0.0
 
 
-def _clipped(error_m: Column) -> Column:
-    middle = float(np.median(error_m))
-    deviation = 1.4826 * float(np.median(np.abs(error_m - middle)))
+def clipped(error_m: Column) -> Column:
+    """Return the error about its median, clipped at 5 of its robust deviations; NaN stays."""
+    middle = float(np.nanmedian(error_m))
+    deviation = 1.4826 * float(np.nanmedian(np.abs(error_m - middle)))
     return np.clip(error_m - middle, -CLIPPED * deviation, CLIPPED * deviation)
 
 

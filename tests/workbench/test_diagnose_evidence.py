@@ -7,7 +7,7 @@ from config.errors import InputError
 from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
 from workbench.confounding import algebraic_class, bare_parameter, classes
-from workbench.evidence import Errors, Gain, alike, block_logs, fall
+from workbench.evidence import Errors, Gain, alike, block_logs, fall, independent
 from workbench.held_out import joined, residual_m, split
 from workbench.record import ready
 from workbench.structure import STRUCTURED, structure
@@ -71,11 +71,11 @@ def test_the_floor_is_missed_by_many_blocks_or_by_far_in_what_was_fitted(
     train_rmse: float, test_rmse: float, train_block: float, test_block: float, there: bool
 ) -> None:
     none = np.zeros(0)
-    assert Errors(train_rmse, test_rmse, train_block, test_block, none, none, 0.0).at_floor(1.0) is there
+    assert Errors(train_rmse, test_rmse, train_block, test_block, none, none, 0.0, 1.0).at_floor(1.0) is there
 
 
 def errors_of(logs: np.ndarray) -> Errors:
-    return Errors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0)
+    return Errors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0)
 
 
 def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_worse_throughout() -> None:
@@ -86,12 +86,25 @@ def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_
     assert not alike(errors_of(best), errors_of(best + 0.1))
 
 
+def test_what_hangs_together_is_few_independent_samples() -> None:
+    white = noise(20000)
+    assert independent(white) == pytest.approx(1.0, abs=0.03)
+    wandering = np.zeros(20000)
+    for i in range(1, wandering.size):
+        wandering[i] = 0.9 * wandering[i - 1] + white[i]
+    assert independent(wandering) == pytest.approx(0.1 / 1.9, rel=0.15)
+    wandering[::7] = np.nan
+    assert independent(wandering) == pytest.approx(0.1 / 1.9, rel=0.2)
+    assert independent(np.zeros(100)) == 1.0
+
+
 @pytest.mark.parametrize(
     ("gain", "said"),
     [
-        (Gain(9.0, 0.5, 9.0), "evidence 9"),
-        (Gain(90.0, 0.04, 9.0), "falls by 4 %"),
-        (Gain(90.0, 0.5, 1.9), "1.9 standard errors"),
+        (Gain(9.0, 0.5, 9.0, 1.0), "evidence 9"),
+        (Gain(90.0, 0.5, 9.0, 0.1), "10 % are independent: 9, more than 10"),
+        (Gain(90.0, 0.04, 9.0, 1.0), "falls by 4 %"),
+        (Gain(90.0, 0.5, 1.9, 1.0), "1.9 standard errors"),
     ],
 )
 def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> None:
@@ -99,9 +112,9 @@ def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> 
 
 
 def test_what_passes_every_part_is_not_refused() -> None:
-    assert not Gain(11.0, 0.06, 2.1).short(explained=False)
-    assert "more than 3 needed" in Gain(11.0, 0.06, 2.9).short(explained=True)
-    assert not Gain(11.0, 0.06, 3.1).short(explained=True)
+    assert not Gain(11.0, 0.06, 2.1, 1.0).short(explained=False)
+    assert "more than 3 needed" in Gain(11.0, 0.06, 2.9, 1.0).short(explained=True)
+    assert not Gain(11.0, 0.06, 3.1, 1.0).short(explained=True)
 
 
 def test_noise_has_no_structure() -> None:
