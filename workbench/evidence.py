@@ -24,7 +24,7 @@ BLOCK_S = 1.0
 LEAST_BIC = 10.0
 LEAST_GAIN = 0.05
 LEAST_STANDARD_ERRORS, WHERE_EXPLAINED = 2.0, 3.0
-"""More where nothing is left to explain: of some twenty candidates one falls by two deviations of pure chance."""
+"""More where nothing is left to explain: of twenty candidates one falls by two deviations by pure chance."""
 ALIKE_STANDARD_ERRORS = 1.0
 ALIKE_GAIN = 0.02
 AT_FLOOR, RARELY_OFF = 1.25, 1.75
@@ -85,7 +85,7 @@ class Gain:
         least = WHERE_EXPLAINED if explained else LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
-        if self.independent * self.bic <= LEAST_BIC:
+        if explained and self.independent * self.bic <= LEAST_BIC:
             return (
                 f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent:.2g} % are "
                 f"independent: {self.independent * self.bic:.2g}, more than {LEAST_BIC:g} needed"
