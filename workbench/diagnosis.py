@@ -270,12 +270,14 @@ class _Search:
                 return error.problem
             return self._model(found)
 
+        # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
+        dearest_first = sorted(names, key=lambda name: -len(self._library[name].parameters))
         models: dict[str, Model | str] = {}
         with ThreadPoolExecutor(self._workers) as pool:
-            for name, model in zip(names, pool.map(refitted, names), strict=True):
+            for name, model in zip(dearest_first, pool.map(refitted, dearest_first), strict=True):
                 models[name] = model
                 self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
-        return models
+        return {name: models[name] for name in names}
 
     def _profiled(self, model: Model) -> Model:
         return replace(model, fit=profiled(model.fit, self._split.train.recording))
