@@ -40,4 +40,4 @@ docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/python docs/notebook.py docs/tutorial/source.md docs/tutorial.md
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out blind-out build dist
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out build dist

@@ -47,7 +47,7 @@ FIRST_SEED = {
 LOOKED_AT = {("nothing", 7), ("nothing", 17), ("outside", 1)}
 """Nobody has looked at a case before the rules stood, but for these, which changed the rules: they do not count."""
 PLANNED = {"clean": 48, "dirty": 32, "nothing": 60, "two": 6, "removed": 8, "others": 12, "outside": 8}
-FOLDER = Path("blind-out")
+FOLDER = Path("docs/blind")
 """Where the lines are kept."""
 
 Line = Mapping[str, Any]
