@@ -173,8 +173,9 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         yield share("called unexplained", [each["verdict"] in {"unexplained", "untrusted"} for each in seen])
         yield share("a wrong effect named as all there is", [each["verdict"] in {"missing", "one_of"} for each in seen])
         return
-    known = [each for each in seen if not set(each["hidden"]) & _bare()]
-    same = [each for each in seen if set(each["hidden"]) & _bare()]
+    bare = _bare()
+    known = [each for each in seen if not set(each["hidden"]) & bare]
+    same = [each for each in seen if set(each["hidden"]) & bare]
     if same:
         yield share("the bare valve by another name: nothing named", [not each["missing"] for each in same])
     yield share("true effect first, or in the set with it", [first(each, each["hidden"][0]) for each in known])

@@ -40,7 +40,7 @@ from functools import cache
 from itertools import product, zip_longest
 from pathlib import Path
 from textwrap import dedent
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -49,6 +49,7 @@ from config.errors import InputError
 from config.valve import ValveParameters
 
 Memory = npt.NDArray[np.float64]
+Seen = Literal["", "lowest", "swept", "quantum"]
 
 EVERYWHERE = ("t", "x", "v", "p", "q", "z")
 PLACES: Mapping[str, tuple[str, ...]] = {
@@ -83,7 +84,7 @@ class Parameter:
     """Parameters of the bare valve, multiplied and divided, such as "spring_n_per_m * stroke_m"; empty: 1."""
     given: bool = False
     """Read from a drawing or a data sheet: a fit leaves it at its start."""
-    seen: str = ""
+    seen: Seen = ""
     """What a record's positions suggest for it, "lowest", "swept" or "quantum": a fit begins there too. Searches that
     begin elsewhere would not find it."""
 

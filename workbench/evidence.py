@@ -132,7 +132,8 @@ def independent(error_m: Column) -> float:
     pairs = np.isfinite(e[1:]) & np.isfinite(e[:-1])
     power = float(np.nanmean(e**2)) if pairs.any() else 0.0
     rho = float(np.mean(e[1:][pairs] * e[:-1][pairs])) / power if power > 0.0 else 0.0
-    return float(np.clip((1.0 - rho) / (1.0 + rho), 0.0, 1.0)) if rho > 0.0 else 1.0
+    rho = min(max(rho, 0.0), 1.0)
+    return (1.0 - rho) / (1.0 + rho)
 
 
 def gain(base: Fit, candidate: Fit, base_errors: Errors, candidate_errors: Errors) -> Gain:

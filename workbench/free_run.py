@@ -87,12 +87,12 @@ class FreeRun:
         load_n = self.record.load_n
         drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
         rows = np.full((4, len(self.record)), np.nan)
-        fine = self._accuracy
+        accuracy = self._accuracy
         for (first, end), begin in zip(self.record.segments, self._starts, strict=True):
             state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
             periods = np.diff(self.record.time_s[first:end])
             held_pa = drive_pa[first : end - 1]
-            path = follow(self._composition, vector, state, held_pa, periods, fine.step_s, fine.tolerance)
+            path = follow(self._composition, vector, state, held_pa, periods, accuracy.step_s, accuracy.tolerance)
             rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
         return Run(*rows)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from config.errors import InputError
 from sim.composition import BASE, Composition
+from sim.effect import Seen
 from sim.karnopp import Vector
 
 DEFAULT = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
@@ -36,7 +37,7 @@ class Parameter:
     most: float
     starts: tuple[float, ...] = ()
     """Where a fit may begin, as an effect declares it."""
-    seen: str = ""
+    seen: Seen = ""
     """What the record's positions suggest for it, as an effect declares it."""
 
     def coordinate(self, theta: Vector) -> float:

@@ -38,7 +38,7 @@ class Hardship:
     Attributes:
         bound: mean over the runs' own bounds.
         clean: the bound without hardship, start known.
-        rms, bias: of the errors.
+        rms: of the errors.
         covered: how often the truth lies within one reported standard deviation.
         valid: how often the value is valid.
     """
@@ -48,7 +48,6 @@ class Hardship:
     bound: Array
     clean: Array
     rms: Array
-    bias: Array
     covered: Array
     valid: Array
 
@@ -105,7 +104,6 @@ def hardships(file: ValveFile, noise_pu: float, seeds: int) -> Iterator[Hardship
             bound=np.mean(bounds, axis=0),
             clean=clean,
             rms=np.sqrt((off**2).mean(axis=0)),
-            bias=off.mean(axis=0),
             covered=np.mean(within, axis=0),
             valid=np.mean(valid, axis=0),
         )
