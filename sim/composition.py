@@ -72,6 +72,11 @@ class Composition:
         """Name the entries of theta."""
         return BASE + tuple(f"{each.name}.{key}" for each in self.effects for key in each.parameters)
 
+    @property
+    def any_step(self) -> bool:
+        """Whether one long step of the integration does as well as many short ones."""
+        return all(each.any_step for each in self.effects)
+
     def changed(self, theta: Vector, parameters: Mapping[str, float]) -> Vector:
         """Return theta with some parameters, by name, replaced.
 

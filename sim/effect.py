@@ -7,6 +7,8 @@ It defines
 
     class Parameters(NamedTuple)    each field an Annotated[float, Parameter(text, least, most)], unit in its name
     MEMORY = n                      number of its state variables, if it has any
+    ANY_STEP = True                 its memory comes out as well over one long step as over many short ones; without a
+                                    memory that goes without saying
     LOOKS = text                    what it looks like in a record
     CONFOUNDED = {name: text}       effects and parameters of the bare valve that look alike, and what record tells
                                     them apart; an empty text: none of pressure and position does
@@ -118,6 +120,8 @@ class Effect:
     text: str
     parameters: Mapping[str, Parameter]
     memory: int
+    any_step: bool
+    """Whether it does as well over one long step as over many short ones."""
     functions: Mapping[str, tuple[str, ...]]
     """Its functions on the path and the arguments each names."""
     equation: str
@@ -246,6 +250,7 @@ def _declared(path: Path, source: str) -> Effect:
         text=said.partition("\n")[0],
         parameters=_parameters(path, namespace),
         memory=namespace.get("MEMORY", 0),
+        any_step=namespace.get("ANY_STEP", not namespace.get("MEMORY", 0)),
         functions=functions,
         equation=_equation(said),
         looks=namespace.get("LOOKS", ""),
@@ -306,6 +311,8 @@ def _check_places(effect: Effect) -> None:
 
 
 def _check_words(effect: Effect) -> None:
+    if not isinstance(effect.any_step, bool):
+        raise InputError(str(effect.path), f"ANY_STEP: must be True or False, got {effect.any_step!r}")
     if not isinstance(effect.looks, str):
         raise InputError(str(effect.path), f"LOOKS: must be a text, got {effect.looks!r}")
     is_table = isinstance(effect.confounded, dict)

@@ -21,13 +21,25 @@ every change of mode is bisected to h / 2^30, and the motion is integrated by Bo
 The Stribeck slope near v_s grows deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the
 sub-steps are some 0.1 us; away from it one sub-step is one step.
 
+Sliding over more than LEAP / sqrt(k_s / m) goes by leaps: with lambda = F_v / m and kappa = k_s / m,
+
+    x'' + lambda x' + kappa x = n,      n = v' + lambda v + kappa x,  a quadratic in time through start, middle and end
+
+is solved exactly, however stiff, by the response g to an impulse (g(0) = 0, g'(0) = 1), h = g' + lambda g, and
+
+    I_0 = (1 - h) / kappa,  I_1 = (1 - (g + lambda I_0) / s) / kappa,  I_2 = (1 - 2 (I_0 + lambda s I_1) / s^2) / kappa
+    x(s) = h x + g v + I_0 n_0 + I_1 n_1 + I_2 n_2,     v(s) = -kappa g x + g' v + g n_0 + (I_0 n_1 + 2 I_1 n_2) / s
+
+for n = n_0 + n_1 tau / s + n_2 (tau / s)^2. On the bare valve beyond the Stribeck range n is a straight line: there a
+leap has no error. The error told is what the quadratic term changes of v.
+
 The file is plain Python and runs as it stands: the bare valve. `sim.compiled` compiles this text after putting the
 effects of a valve file into the places at its end, which stand empty here. All that is compiled must stand in
 this file or in an effect's own: a kernel is cached under the digest of these texts.
 """
 
 # ruff: noqa: ARG001 -- an empty place takes what a full one needs.
-from math import ceil, exp
+from math import ceil, cos, exp, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,10 +55,14 @@ TOLERANCE = 1e-5
 """Of one sub-step on the velocity, relative to |v| + v_s, where nothing else is asked for."""
 SHORTEST = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
+LEAP = 0.15
+"""Angle, rad, of the undamped stem from which a sub-step is a leap: below it the pair is cheaper, and leaps cancel."""
 BISECTIONS = 30
 NINTH = 1.0 / 9.0
 NEGLIGIBLE = 40.0
 """(v / v_s)^2 beyond which exp(-(v / v_s)^2) < 5e-18 is lost in the rounding of F_c."""
+HOLDS = 1.0 + 1e-10
+"""F_s at break-away, in F_s at the end of a creep. Were they one, a stem pressed on a stop would creep for ever."""
 DIFFERENCE_M = 1e-7
 """Half-width of the central difference that gives the stiffness -dF_e/dx."""
 
@@ -114,11 +130,11 @@ def external_force(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
 
 
 def excess(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
-    """|F_e| - F_s, N: positive when the stuck stem breaks away."""
+    """|F_e| - F_s, N, but for HOLDS: positive when the stuck stem breaks away."""
     F_e = external_force(valve, stem, q, z)
     direction = 1.0 if F_e > 0.0 else -1.0
     _, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
-    return direction * F_e - F_s
+    return direction * F_e - HOLDS * F_s
 
 
 def acceleration(valve: Karnopp, mode: int, sigma: float, stem: Stem, q: Any, z: Any) -> float:
@@ -167,6 +183,76 @@ def bogacki_shampine(
     return x1, v1, a1, s * 0.125 * NINTH * abs(5.0 * a - 6.0 * a2 - 8.0 * a3 + 9.0 * a1)
 
 
+class Response(NamedTuple):
+    """Of x'' + lambda x' + kappa x = n after s: g, g', h of an impulse; I_0, I_1, I_2 of n = 1, tau / s, (tau / s)^2."""
+
+    g: float
+    slope: float
+    h: float
+    I_0: float
+    I_1: float
+    I_2: float
+
+
+def impulse(damping: float, kappa: float, s: float) -> tuple[float, float]:
+    """Return g and g' after s, of lambda and kappa."""
+    half = 0.5 * damping
+    square = half * half - kappa
+    if square > 0.0:
+        root = sqrt(square)
+        slow, fast = exp((root - half) * s), exp(-(root + half) * s)
+        g = 0.5 * (slow - fast) / root
+        return g, 0.5 * (slow + fast) - half * g
+    root = sqrt(-square)
+    decay = exp(-half * s)
+    g = decay * (sin(root * s) / root if root > 0.0 else s)
+    return g, decay * cos(root * s) - half * g
+
+
+def response(damping: float, kappa: float, s: float, g: float, slope: float) -> Response:
+    """Complete g and g' after s."""
+    per_kappa, per_s = 1.0 / kappa, 1.0 / s
+    h = slope + damping * g
+    I_0 = (1.0 - h) * per_kappa
+    I_1 = (1.0 - (g + damping * I_0) * per_s) * per_kappa
+    return Response(g, slope, h, I_0, I_1, (1.0 - 2.0 * (I_0 * per_s + damping * I_1) * per_s) * per_kappa)
+
+
+def leap(
+    valve: Karnopp,
+    sigma: float,
+    drive: Drive,
+    tau: float,
+    s: float,
+    x: float,
+    v: float,
+    a: float,
+    q: Any,
+    z: Any,
+) -> tuple[float, float, float, float]:
+    """Slide over s from (x, v) with v' = a; return x, v, v' at its end and what the quadratic term changes of v."""
+    damping, kappa = valve.F_v * valve.per_m, valve.k_s * valve.per_m
+    g, slope = impulse(damping, kappa, 0.5 * s)
+    half = response(damping, kappa, 0.5 * s, g, slope)
+    # Twice the half is the whole.
+    whole = response(damping, kappa, s, g * (half.h + slope), slope * slope - kappa * g * g)
+    n0 = a + damping * v + kappa * x
+    x2 = half.h * x + g * v + half.I_0 * n0
+    v2 = slope * v - kappa * g * x + g * n0
+    a2 = acceleration(valve, SLIP, sigma, stem_at(drive, tau + 0.5 * s, x2, v2), q, z)
+    n2 = a2 + damping * v2 + kappa * x2
+    per_s = 1.0 / s
+    x3 = whole.h * x + whole.g * v + whole.I_0 * n0 + whole.I_1 * 2.0 * (n2 - n0)
+    v3 = whole.slope * v - kappa * whole.g * x + whole.g * n0 + whole.I_0 * per_s * 2.0 * (n2 - n0)
+    a3 = acceleration(valve, SLIP, sigma, stem_at(drive, tau + s, x3, v3), q, z)
+    n3 = a3 + damping * v3 + kappa * x3
+    bend = n0 - 2.0 * n2 + n3
+    x1 = x3 + (2.0 * whole.I_2 - whole.I_1) * bend
+    change = (4.0 * whole.I_1 - whole.I_0) * per_s * bend
+    v1 = v3 + change
+    return x1, v1, acceleration(valve, SLIP, sigma, stem_at(drive, tau + s, x1, v1), q, z), abs(change)
+
+
 def wait(valve: Karnopp, drive: Drive, tau: float, h: float, x: float, q: Any, z: Any) -> tuple[float, int, float]:
     """Hold the stuck stem until it breaks away or the step ends; return tau, mode, sigma."""
     if excess(valve, stem_at(drive, h, x, 0.0), q, z) <= 0.0:
@@ -202,13 +288,21 @@ def move(
     """Integrate until the moving mode is over or the step ends; return tau, x, v and whether the mode is over."""
     a = acceleration(valve, mode, sigma, stem_at(drive, tau, x, v), q, z)
     s = h - tau
+    longest = LEAP / sqrt(valve.k_s * valve.per_m)
     while tau < h:
-        x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
+        leaps = mode == SLIP and s > longest
+        if leaps:
+            x1, v1, a1, error = leap(valve, sigma, drive, tau, s, x, v, a, q, z)
+        else:
+            x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
         allowed = tolerance * (abs(v1) + valve.v_s)
         if error > allowed and s > SHORTEST * h:
             s *= 0.5
             continue
         if margin(valve, mode, sigma, stem_at(drive, tau + s, x1, v1), q, z) < 0.0:
+            if leaps:
+                s *= 0.5
+                continue
             s, x1, v1 = end_of_mode(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
             return min(tau + s, h), x1, v1, True
         tau = h if s >= h - tau else tau + s

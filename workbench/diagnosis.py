@@ -26,7 +26,7 @@ from config.valve import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect, Parameter, find_effect, shipped_effects
 from workbench.confounding import algebraic_class, bare_parameter, classes, imitation, told_apart
-from workbench.evidence import LEAST_BIC, Errors, Gain, alike, bic, errors, gain
+from workbench.evidence import LEAST_BIC, Errors, Gain, alike, bic, errors, gain, lead
 from workbench.experiment import Experiment, experiment
 from workbench.fitting import Fit, fit, profiled
 from workbench.free_run import FreeRun
@@ -43,6 +43,8 @@ BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
 
 REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
+LEFT_BEHIND = 1.0
+"""Of BIC: less is nothing."""
 SAME = 1.01
 """Factor on the cost within which two members of a class came out as the one they are."""
 
@@ -98,6 +100,8 @@ class Step:
     before: Model
     candidates: tuple[Candidate, ...]
     added: Candidate | None
+    renamed: Candidate | None
+    """What would be accepted but that it is the bare valve by another name: a parameter that is kept is off."""
     alike: tuple[Candidate, ...]
     """The added one and all that the block errors do not tell from it, by evidence; classes stand together."""
 
@@ -224,10 +228,13 @@ class _Search:
         models = self._refitted(number, before, names)
         before = self._seeded_by(before, [each for each in models.values() if isinstance(each, Model)])
         # No effect makes a valve worse: what the base has left behind is refitted from it.
-        behind = [name for name, each in models.items() if isinstance(each, Model) and each.fit.cost > before.fit.cost]
+        fitted = {name: each.fit for name, each in models.items() if isinstance(each, Model)}
+        behind = [name for name, each in fitted.items() if lead(before.fit, each) > LEFT_BEHIND]
         models |= self._refitted(number, before, behind)
-        candidates, added = self._judged(number, before, models)
-        return Step(before, candidates, added, self._alike(candidates, added) if added else ())
+        candidates = tuple(self._candidate(number, name, before, model) for name, model in models.items())
+        renamed = self._renamed(candidates, before.explained)
+        candidates, added = self._judged(_better_than(renamed, candidates) if renamed else candidates)
+        return Step(before, candidates, added, renamed, self._alike(candidates, added) if added else ())
 
     def _seeded_by(self, before: Model, models: Sequence[Model]) -> Model:
         """Return the model before, fitted again where a search from a better one's parameters ends below it."""
@@ -286,12 +293,9 @@ class _Search:
         judged = errors(found, self._split)
         return Model(found, judged, judged.at_floor(self._split.floor_m))
 
-    def _judged(
-        self, number: int, before: Model, models: Mapping[str, Model | str]
-    ) -> tuple[tuple[Candidate, ...], Candidate | None]:
-        """Hold every candidate against the model before; the best accepted one, or the first of its class."""
-        candidates = tuple(self._candidate(number, name, before, model) for name, model in models.items())
-        ordered = tuple(sorted(candidates, key=lambda each: -each.gain.bic if each.gain else float("inf")))
+    def _judged(self, candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], Candidate | None]:
+        """Return the candidates by evidence, and the best accepted one, or the first of its class."""
+        ordered = tuple(sorted(candidates, key=_evidence, reverse=True))
         accepted = {each.name: each for each in ordered if each.accepted}
         if not accepted:
             return ordered, None
@@ -311,6 +315,11 @@ class _Search:
         if same and not why_not:
             why_not = f"no record of pressure and position tells it from {same}"
         return Candidate(number, name, model, found, not beyond, why_not)
+
+    def _renamed(self, candidates: Sequence[Candidate], explained: bool) -> Candidate | None:
+        """Return the best that would be accepted but that it is the bare valve by another name, if there is one."""
+        passing = [each for each in candidates if each.physical and each.gain and not each.gain.short(explained)]
+        return max((each for each in passing if bare_parameter(each.name, self._library)), key=_evidence, default=None)
 
     def _alike(self, candidates: Sequence[Candidate], added: Candidate) -> tuple[Candidate, ...]:
         assert added.model
@@ -338,6 +347,19 @@ class _Search:
                 record = self._split.judged.record
                 return experiment(apart, record, seed=self._seed, workers=self._workers)
         return None
+
+
+def _better_than(renamed: Candidate, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Refuse what does no better than the bare valve by another name: no imitation of it is to be named."""
+    least = _evidence(renamed) + LEAST_BIC
+    why_not = f"explains no better than {renamed.name}, the bare valve with other parameters"
+    return tuple(
+        replace(each, why_not=why_not) if each.accepted and _evidence(each) <= least else each for each in candidates
+    )
+
+
+def _evidence(candidate: Candidate) -> float:
+    return candidate.gain.bic if candidate.gain else -float("inf")
 
 
 def _beyond(name: str, found: Fit, effect: Effect) -> str:
@@ -377,6 +399,13 @@ def _sentence(
     before, after = 1e3 * steps[0].before.errors.test_rmse_m, 1e3 * best.errors.test_rmse_m
     fell = f"the held-out error falls from {before:.3g} to {after:.3g} mm"
     repeat = "" if repeats else REPEAT
+    renamed = steps[0].renamed
+    if verdict == "adequate" and renamed and renamed.model:
+        after = 1e3 * renamed.model.errors.test_rmse_m
+        return (
+            f"No effect is missing, but a parameter that was kept is off: with {renamed.name}, the bare valve by "
+            f"another name, the held-out error falls from {before:.3g} to {after:.3g} mm. Fit again with the mass free."
+        )
     if verdict == "adequate":
         return f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
     if verdict == "missing":

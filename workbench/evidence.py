@@ -148,6 +148,12 @@ def bic(fit: Fit) -> float:
     return float(n * np.log(2.0 * max(fit.cost, np.finfo(float).tiny) / n) + len(fit.parameters) * np.log(n))
 
 
+def lead(one: Fit, other: Fit) -> float:
+    """Return how much better one fits than another, as BIC counts it but for the parameters: n log(C_other / C_one)."""
+    least = np.finfo(float).tiny
+    return float(one.count * np.log(max(other.cost, least) / max(one.cost, least)))
+
+
 def fall(before: Column, after: Column) -> tuple[float, float]:
     """Return the relative fall of the block error, and that in its standard errors."""
     d = np.clip(before - after, -MOST, MOST)

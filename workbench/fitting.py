@@ -29,7 +29,7 @@ from workbench.measures import fit_percent
 from workbench.motion import slips
 from workbench.parameters import COULOMB, DEFAULT, STATIC, Parameter, free_parameters, strengths
 from workbench.record import Record, ready, require_fittable, require_units
-from workbench.simulation_error import MIDDLE, NARROW, STRIDES, WIDE, SimulationError
+from workbench.simulation_error import FINAL, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
 from workbench.starts import drawn, forces_regressed, values_seen, with_plays
 from workbench.uncertainty import Uncertainty, uncertainty
 
@@ -329,20 +329,20 @@ def _searched(
     tell = progress or (lambda _: None)
     wide = partial(error.rough.descended_at, WIDE)
 
-    def middle(z: Vector) -> Vector:
-        return error.rough.polled(error.rough.descended_at(MIDDLE, z), STRIDES, MIDDLE.scale)
-
+    middle = partial(error.rough.descended_at, MIDDLE)
     narrow = partial(error.descended_at, NARROW)
 
     begun = _each(wide, begins, workers, lambda done: tell(0.3 * done))
-    carried = _each(middle, _screened(error, begun, effort.carried), workers, lambda done: tell(0.3 + 0.2 * done))
+    carried = _each(middle, _screened(error, begun, effort.carried), workers, lambda done: tell(0.3 + 0.1 * done))
+    carried = _polled(error.rough, carried, STRIDES, MIDDLE.scale, workers, lambda done: tell(0.4 + 0.1 * done))
     # The first start as it is stays in the race: descent at a wide scale may lose it.
     down = _each(narrow, [*carried, begins[0]], workers, lambda done: tell(0.5 + 0.2 * done))
     down.sort(key=error.cost)
     ends: list[Vector] = []
     while len(ends) < effort.polled and _agreeing(error, ends) < effort.agreeing:
         pair = down[len(ends) : min(len(ends) + 2, effort.polled)]
-        ends = sorted([*ends, *_each(error.polled, pair, workers, lambda done: tell(0.7 + 0.2 * done))], key=error.cost)
+        ends += _polled(error, pair, POLLS, FINAL, workers, lambda done: tell(0.7 + 0.2 * done))
+        ends.sort(key=error.cost)
     if _agreeing(error, ends) < effort.agreeing:
         ends = sorted([*ends, error.polled(narrow(ends[0]))], key=error.cost)
     best = _centred(error, ends[0])
@@ -364,6 +364,21 @@ def _searched(
         error.run.from_pressure,
         tuple(error.theta(z) for z in (best, *_elsewhere(ends))),
     )
+
+
+def _polled(
+    error: SimulationError,
+    searches: Sequence[Vector],
+    steps: Sequence[float],
+    scale: float,
+    workers: int | None,
+    tell: Progress,
+) -> list[Vector]:
+    """Poll the searches; of those that fit equally well the first for all."""
+    fresh = [i for i, z in enumerate(searches) if not any(error.alike(z, other, scale) for other in searches[:i])]
+    polled = _each(lambda i: error.polled(searches[i], steps, scale), fresh, workers, tell)
+    at = dict(zip(fresh, polled, strict=True))
+    return [at.get(i, z) for i, z in enumerate(searches)]
 
 
 def _elsewhere(ends: Sequence[Vector]) -> list[Vector]:

@@ -23,15 +23,18 @@ from workbench.record import Record
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """How finely a run is integrated: longest step, s, and the tolerance of `sim.karnopp`."""
+    """How finely a run is integrated.
+
+    The tolerance is that of `sim.karnopp`. Steps are a sample long where the effects bear any, else at most step_s.
+    """
 
     step_s: float
     tolerance: float
 
 
-FINE = Accuracy(2.5e-4, 1e-4)
-"""Within 0.5 um of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
-ROUGH = Accuracy(1e-3, 1e-3)
+FINE = Accuracy(1e-3, 1e-4)
+"""Within 0.5 um rms of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
+ROUGH = Accuracy(2e-3, 1e-3)
 """Within 50 um, in a third of the time."""
 STILL = 4.0
 """Standard deviations of the noise within which the stem stands still."""
@@ -92,7 +95,8 @@ class FreeRun:
             state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
             periods = np.diff(self.record.time_s[first:end])
             held_pa = drive_pa[first : end - 1]
-            path = follow(self._composition, vector, state, held_pa, periods, accuracy.step_s, accuracy.tolerance)
+            step_s = float(periods.max()) if self._composition.any_step else accuracy.step_s
+            path = follow(self._composition, vector, state, held_pa, periods, step_s, accuracy.tolerance)
             rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
         return Run(*rows)
 

@@ -106,13 +106,20 @@ class SimulationError:
             self._costs[key] = soft(self.residuals(z), scale)
         return self._costs[key]
 
+    def alike(self, z: Vector, other: Vector, scale: float = FINAL) -> bool:
+        """Whether two places fit equally well: their costs differ by less than one unit of BIC, n log(C_1 / C_2)."""
+        costs = self.cost(z, scale), self.cost(other, scale)
+        return self.count * (max(costs) - min(costs)) < max(costs)
+
     def rms_m(self, z: Vector) -> float:
         """Return the plain rms error, m."""
         return self.sigma_m * float(np.sqrt(np.mean(self.residuals(z) ** 2)))
 
-    def jacobian(self, z: Vector, step: float) -> NDArray[np.float64]:
-        """Return dr/dz by differences of that step, forward but for the upper bound: (judged samples, parameters)."""
-        here = self.residuals(z)
+    def jacobian(self, z: Vector, here: Vector, step: float) -> NDArray[np.float64]:
+        """Return dr/dz at z, where r is `here`: (judged samples, parameters).
+
+        By differences of that step, forward but for the upper bound.
+        """
         columns = []
         for i in range(z.size):
             there = z.copy()
@@ -133,7 +140,7 @@ class SimulationError:
         cost = soft(residuals, level.scale)
         for _ in range(MOST_ITERATIONS):
             weights = 1.0 / np.sqrt(1.0 + (residuals / level.scale) ** 2)
-            J = self.jacobian(z, level.difference)
+            J = self.jacobian(z, residuals, level.difference)
             gradient = J.T @ (weights * residuals)
             curvature = (J.T * weights) @ J
             ridge = np.diag(np.maximum(np.diag(curvature), 1e-9))
@@ -157,7 +164,7 @@ class SimulationError:
         The directions are the coordinates and the eigenvectors of J'J, which follow the valleys.
         """
         best = self.cost(z, scale)
-        J = self.jacobian(z, WIDE.difference)
+        J = self.jacobian(z, self.residuals(z), WIDE.difference)
         _, vectors = np.linalg.eigh(J.T @ J)
         ways = [*np.eye(z.size), *(vectors / np.max(np.abs(vectors), axis=0)).T]
         sweeps = iter(range(MOST_SWEEPS))

@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
+ANY_STEP = True
 
 
 LOOKS = "After every reversal the indication stays while the stem already moves; a slow cycle's branches part by w."

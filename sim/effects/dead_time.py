@@ -13,9 +13,11 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 STRETCHES = 4096
-MEMORY = 1 + 3 * STRETCHES
-COUNT, TIME, VALUE, SLOPE = 0, 1, 1 + STRETCHES, 1 + 2 * STRETCHES
-"""Stretches written so far, and where the columns of the ring begin."""
+MEMORY = 2 + 3 * STRETCHES
+COUNT, READ = 0, 1
+"""Stretches written so far, and which of them was read last."""
+TIME, VALUE, SLOPE = 2, 2 + STRETCHES, 2 + 2 * STRETCHES
+"""Where the columns of the ring begin."""
 LONG_AGO_S = -1e9
 LOOKS = "Everything is late by the same time: after each change of the command nothing happens for T, then all of it."
 CONFOUNDED = {
@@ -33,6 +35,7 @@ class Parameters(NamedTuple):
 def start(t: float, signal: float, z: Memory) -> None:
     """Held since long ago."""
     z[COUNT] = 1.0
+    z[READ] = 0.0
     z[TIME] = t + LONG_AGO_S
     z[VALUE] = signal
     z[SLOPE] = 0.0
@@ -47,16 +50,16 @@ def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> flo
 
 
 def stretch_at(time: float, z: Memory) -> int:
-    """Return the place in the ring of the stretch that holds at a time, or of the oldest; found by bisection."""
+    """Return the place in the ring of the stretch that holds at a time, or of the oldest; sought from the last read."""
     newest = int(z[COUNT]) - 1
-    early, late = max(0, newest + 1 - STRETCHES), newest
-    while early < late:
-        between = (early + late + 1) // 2
-        if z[TIME + between % STRETCHES] <= time:
-            early = between
-        else:
-            late = between - 1
-    return early % STRETCHES
+    oldest = max(0, newest + 1 - STRETCHES)
+    k = max(oldest, int(z[READ]))
+    while k < newest and z[TIME + (k + 1) % STRETCHES] <= time:
+        k += 1
+    while k > oldest and z[TIME + k % STRETCHES] > time:
+        k -= 1
+    z[READ] = k
+    return k % STRETCHES
 
 
 def advance(t: float, before: float, after: float, h: float, q: Parameters, z: Memory) -> None:

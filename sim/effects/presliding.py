@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 2
+ANY_STEP = True
 HELD, BALANCED_N = 0, 1
 """Whether the packing holds the stem, and the force it balances, F_h + k_p (x - x_h)."""
 

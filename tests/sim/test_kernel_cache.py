@@ -67,7 +67,7 @@ def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:
 def test_edited_physics_is_another_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = Composition.from_file(SEED).kernel.digest
     edited = tmp_path / "karnopp.py"
-    edited.write_text(compiled.BASE.read_text().replace("direction * F_e - F_s", "direction * F_e - 2.0 * F_s"))
+    edited.write_text(compiled.BASE.read_text().replace("direction * F_e - HOLDS * F_s", "direction * F_e - 2.0 * F_s"))
     monkeypatch.setattr(compiled, "BASE", edited)
     composition = Composition.from_file(SEED)
     valve = Valve(composition)
