@@ -184,7 +184,7 @@ def bogacki_shampine(
 
 
 class Response(NamedTuple):
-    """Of x'' + lambda x' + kappa x = n after s: g, g', h of an impulse; I_0, I_1, I_2 of n = 1, tau / s, (tau / s)^2."""
+    """Of x'' + lambda x' + kappa x = n: g, g', h of an impulse after s; I_0, I_1, I_2 of n = 1, tau / s, its square."""
 
     g: float
     slope: float

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from sim.composition import Composition
+from sim.open_loop import at_rest, follow
 from sim.valve import Valve
 from tests.sim.reference import Reference, Series
 
@@ -101,6 +103,63 @@ def test_coarse_steps_keep_the_accuracy() -> None:
     fine = Valve.from_file(SEED, step_s=1e-5).run(commands, 1e-3).position_m
     coarse = Valve.from_file(SEED, step_s=1e-3).run(commands, 1e-3).position_m
     assert np.abs(coarse - fine).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        pytest.param(changed(viscous_ns_per_m=100.0), id="it swings"),
+        pytest.param(SEED, id="barely damped"),
+        pytest.param(changed(viscous_ns_per_m=2000.0), id="stiff"),
+        pytest.param(changed(viscous_ns_per_m=30e3), id="so stiff that the pair would take 0.1 ms"),
+    ],
+)
+def test_leaps_over_whole_periods_keep_the_accuracy(file: ValveFile) -> None:
+    commands = np.repeat(staircase(6e3), 20)
+    expected = Valve.from_file(file, step_s=1e-5).run(commands, 0.01).position_m
+    leaping = follow(Composition.from_file(file), file_theta(file), state_of(file), commands, 0.01, 0.01, 1e-4)
+    assert np.abs(leaping.position_m - expected).max() < 2e-6
+
+
+def test_a_leap_through_a_bent_force_is_checked() -> None:
+    bent = ValveFile(
+        valve=changed(viscous_ns_per_m=2000.0).valve,
+        effect=(EffectTable.model_validate({"name": "spring_hardening", "cubic_n_per_m3": 3e7}),),
+    )
+    commands = np.repeat(staircase(6e3), 20)
+    expected = Valve.from_file(bent, step_s=1e-5).run(commands, 0.01).position_m
+    leaping = follow(Composition.from_file(bent), file_theta(bent), state_of(bent), commands, 0.01, 0.01, 1e-4)
+    assert np.abs(leaping.position_m - expected).max() < 5e-6
+
+
+def file_theta(file: ValveFile) -> Series:
+    return Composition.from_file(file).theta.copy()
+
+
+def state_of(file: ValveFile) -> Series:
+    return at_rest(Composition.from_file(file), file_theta(file), 0.0, 0.0, 0.0)
+
+
+def test_a_stem_pressed_on_a_stop_comes_to_rest() -> None:
+    stop = {"lower_m": 0.0, "travel_m": 0.03, "stiffness_n_per_m": 1e8, "damping_ns_per_m": 4e4}
+    stopped = ValveFile(valve=SEED.valve, effect=(EffectTable.model_validate({"name": "end_stop", **stop}),))
+    valve = Valve.from_file(stopped)
+    valve.advance(60e3, 0.5)
+
+    def external_n() -> float:
+        contact_n = 1e8 * (valve.position_m - 0.03)
+        return (
+            SEED.valve.diaphragm_area_m2 * valve.pressure_pa - SEED.valve.spring_n_per_m * valve.position_m - contact_n
+        )
+
+    # Pressed a little harder than static friction bears, it creeps without ever leaving the band.
+    harder_pa = (SEED.valve.static_n + 3.0 - external_n()) / SEED.valve.diaphragm_area_m2
+    valve.advance(60e3 + harder_pa, 0.5)
+    assert external_n() == pytest.approx(SEED.valve.static_n, abs=1e-5)
+    assert valve.velocity_m_per_s == 0.0
+    at_rest_m = valve.position_m
+    valve.advance(60e3 + harder_pa, 0.5)
+    assert valve.position_m == at_rest_m
 
 
 def test_a_stuck_stem_does_not_move_at_all() -> None:

@@ -15,6 +15,7 @@ from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis_json import as_json
 from workbench.experiment import MENU, experiment
+from workbench.hiding import hide
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.05)
@@ -84,13 +85,13 @@ class Parameters(NamedTuple):
     push_ns2_per_m2: Annotated[float, Parameter("push", 0.0, 1e6)]
 
 def force(v: float, q: Parameters) -> float:
-    return q.push_ns2_per_m2 * v * min(abs(v), 0.1)
+    return q.push_ns2_per_m2 * v * min(abs(v), 0.5)
 '''
 
 
 def test_an_effect_that_would_have_to_be_negative_is_refused_and_said_so(tmp_path: Path) -> None:
     (tmp_path / "push.py").write_text(PUSH)
-    pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=1e3)
+    pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=300.0)
     found = diagnose(record_of(pushed, 6, COUNT), SEED, effects=("quadratic_drag",))
     (drag,) = found.candidates
     assert not drag.physical
@@ -108,6 +109,19 @@ def test_one_class_is_not_ranked_inside(tmp_path: Path) -> None:
     assert said["indistinguishable"] == [["preload", "sensor_offset"]]
     assert said["missing"] == ["preload"]
     assert said["experiment"] is None
+
+
+def test_no_imitation_of_the_bare_valve_is_named() -> None:
+    # A gain of 0.89 is the bare valve with another spring, viscous friction and mass; a lag of 0.3 ms imitates the mass.
+    hidden = hide(11015)
+    assert [each.name for each in hidden.truth.effect] == ["sensor_gain"]
+    found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("sensor_lag", "sensor_gain"))
+    why_not = {each.name: each.why_not for each in found.candidates}
+    assert found.verdict == "adequate"
+    assert why_not["sensor_gain"] == "no record of pressure and position tells it from spring_n_per_m"
+    assert why_not["sensor_lag"] == "explains no better than sensor_gain, the bare valve with other parameters"
+    assert "a parameter that was kept is off: with sensor_gain" in found.sentence
+    assert "mm. Fit again with the mass free." in found.sentence
 
 
 def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
