@@ -112,7 +112,7 @@ def test_one_class_is_not_ranked_inside(tmp_path: Path) -> None:
 
 
 def test_no_imitation_of_the_bare_valve_is_named() -> None:
-    # A gain of 0.89 is the bare valve with another spring, viscous friction and mass; a lag of 0.3 ms imitates the mass.
+    # A gain of 0.89 is the bare valve with another spring, damping and mass; a lag of 0.3 ms imitates the mass.
     hidden = hide(11015)
     assert [each.name for each in hidden.truth.effect] == ["sensor_gain"]
     found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("sensor_lag", "sensor_gain"))
