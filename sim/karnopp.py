@@ -16,7 +16,7 @@
 
 x stem position, m; v velocity, m/s; p actuator pressure, Pa; t time, s; the command u, Pa, is held over a period.
 A period is cut into equal steps h. Over a step the pressure goes straight from its start to its end value; inside it
-every change of mode is bisected to h / 2^30, and the motion is integrated by Bogacki and Shampine's pair of orders
+every change of mode is found to h / 2^30, and the motion is integrated by Bogacki and Shampine's pair of orders
 3 and 2, the sub-step halved until the pair agrees on v to tolerance (|v| + v_s), TOLERANCE unless another is asked for.
 The Stribeck slope near v_s grows deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the
 sub-steps are some 0.1 us; away from it one sub-step is one step.
@@ -57,6 +57,8 @@ SHORTEST = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
 LEAP = 0.15
 """Angle, rad, of the undamped stem from which a sub-step is a leap: below it the pair is cheaper, and leaps cancel."""
+FIRST = 0.2
+"""Change of v, in |v| + v_s, that the first sub-step in the Stribeck range is made for: longer ones are refused."""
 BISECTIONS = 30
 NINTH = 1.0 / 9.0
 NEGLIGIBLE = 40.0
@@ -288,6 +290,8 @@ def move(
     """Integrate until the moving mode is over or the step ends; return tau, x, v and whether the mode is over."""
     a = acceleration(valve, mode, sigma, stem_at(drive, tau, x, v), q, z)
     s = h - tau
+    if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST * (abs(v) + valve.v_s):
+        s = FIRST * (abs(v) + valve.v_s) / abs(a)
     longest = LEAP / sqrt(valve.k_s * valve.per_m)
     while tau < h:
         leaps = mode == SLIP and s > longest
@@ -326,16 +330,31 @@ def end_of_mode(
     q: Any,
     z: Any,
 ) -> tuple[float, float, float]:
-    """Bisect the sub-step after which the mode is just over; return it with x and v there."""
+    """Find the sub-step after which the mode is just over, to s / 2^30; return it with x and v there.
+
+    By false position as in the Illinois method: an end that stays twice counts for half.
+    """
+    closest = s * 0.5**BISECTIONS
     early, late = 0.0, s
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (early + late)
-        x1, v1, _, _ = bogacki_shampine(valve, mode, sigma, drive, tau, middle, x, v, a, q, z)
-        if margin(valve, mode, sigma, stem_at(drive, tau + middle, x1, v1), q, z) < 0.0:
-            late = middle
-        else:
-            early = middle
     x1, v1, _, _ = bogacki_shampine(valve, mode, sigma, drive, tau, late, x, v, a, q, z)
+    left = max(margin(valve, mode, sigma, stem_at(drive, tau, x, v), q, z), 0.0)
+    right = margin(valve, mode, sigma, stem_at(drive, tau + late, x1, v1), q, z)
+    moved = 0
+    for _ in range(2 * BISECTIONS):
+        if late - early <= 2.0 * closest:
+            break
+        middle = early + (late - early) * left / (left - right)
+        middle = min(max(middle, early + closest), late - closest)
+        x2, v2, _, _ = bogacki_shampine(valve, mode, sigma, drive, tau, middle, x, v, a, q, z)
+        between = margin(valve, mode, sigma, stem_at(drive, tau + middle, x2, v2), q, z)
+        if between < 0.0:
+            late, right, x1, v1 = middle, between, x2, v2
+            left *= 0.5 if moved > 0 else 1.0
+            moved = 1
+        else:
+            early, left = middle, between
+            right *= 0.5 if moved < 0 else 1.0
+            moved = -1
     return late, x1, v1
 
 

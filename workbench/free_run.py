@@ -32,7 +32,7 @@ class Accuracy:
     tolerance: float
 
 
-FINE = Accuracy(1e-3, 1e-4)
+FINE = Accuracy(1e-3, 3e-4)
 """Within 0.5 um rms of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
 ROUGH = Accuracy(2e-3, 1e-3)
 """Within 50 um, in a third of the time."""
