@@ -33,6 +33,10 @@ from sim.wiring import wiring
 BASE = Path(karnopp.__file__)
 OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
 """numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
+INNER: Mapping[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Of functions that only compiled ones call: to make them callable from Python would take a third of the time."""
+APART = ("bogacki_shampine",)
+"""Left to the compiler to inline: large, and called from two places."""
 NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
 ENTRIES: Mapping[str, tuple[str, ...]] = {
@@ -116,10 +120,10 @@ def _module(name: str) -> ModuleType:
 
 
 def _inlined(namespace: dict[str, Any]) -> None:
-    """Make the functions of a namespace compiled ones; inlining all of them triples the speed."""
+    """Make the functions of a namespace compiled ones; inlining them triples the speed."""
     for name, value in list(namespace.items()):
         if isinstance(value, FunctionType) and value.__globals__ is namespace:
-            namespace[name] = numba.njit(forceinline=True, **OPTIONS)(value)
+            namespace[name] = numba.njit(forceinline=name not in APART, **INNER)(value)
 
 
 def written(digest: str, text: str) -> Path:
