@@ -37,17 +37,16 @@ from workbench.hiding import VISIBLE, hide
 from workbench.trial import NOISE_M
 
 FIRST_SEED = {
-    "clean": 11000,
-    "dirty": 12000,
-    "nothing": 13000,
-    "two": 14000,
-    "removed": 15000,
-    "others": 600,
-    "outside": 700,
+    "clean": 21000,
+    "dirty": 22000,
+    "nothing": 23000,
+    "two": 24000,
+    "removed": 25000,
+    "others": 2600,
+    "outside": 2700,
 }
-LOOKED_AT = {("nothing", 7), ("nothing", 17), ("outside", 1)}
-"""Nobody has looked at a case before the rules stood, but for these, which changed the rules: they do not count."""
-PLANNED = {"clean": 48, "dirty": 32, "nothing": 60, "two": 6, "removed": 8, "others": 12, "outside": 8}
+"""Nobody has looked at a case before the rules stood."""
+PLANNED = {"clean": 72, "dirty": 48, "nothing": 120, "two": 6, "removed": 12, "others": 12, "outside": 12}
 FOLDER = Path("docs/blind")
 """Where the lines are kept."""
 
@@ -239,7 +238,7 @@ def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, i
     planned = [
         ((number + 0.5) / PLANNED[family], family, number) for family in families for number in range(PLANNED[family])
     ]
-    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there | LOOKED_AT]
+    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there]
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ the file; an effect's parameter is named `effect.parameter`.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, Self
 
 import numpy as np
@@ -73,9 +74,9 @@ class Composition:
         return BASE + tuple(f"{each.name}.{key}" for each in self.effects for key in each.parameters)
 
     @property
-    def any_step(self) -> bool:
-        """Whether one long step of the integration does as well as many short ones."""
-        return all(each.any_step for each in self.effects)
+    def step_s(self) -> float:
+        """Longest step of the integration that its effects bear, s; infinite if any."""
+        return min((each.step_s for each in self.effects), default=inf)
 
     def changed(self, theta: Vector, parameters: Mapping[str, float]) -> Vector:
         """Return theta with some parameters, by name, replaced.

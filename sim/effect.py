@@ -7,8 +7,8 @@ It defines
 
     class Parameters(NamedTuple)    each field an Annotated[float, Parameter(text, least, most)], unit in its name
     MEMORY = n                      number of its state variables, if it has any
-    ANY_STEP = True                 its memory comes out as well over one long step as over many short ones; without a
-                                    memory that goes without saying
+    STEP_S = h                      longest step over which its memory comes out well, s; FINE_STEP_S if not given, and
+                                    any step without a memory
     LOOKS = text                    what it looks like in a record
     CONFOUNDED = {name: text}       effects and parameters of the bare valve that look alike, and what record tells
                                     them apart; an empty text: none of pressure and position does
@@ -40,6 +40,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product, zip_longest
+from math import inf
 from pathlib import Path
 from textwrap import dedent
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -68,6 +69,7 @@ UPKEEP: Mapping[str, tuple[str, ...]] = {
 }
 """What keeps a memory, and the arguments it may name."""
 AT_STEM = ("force", "friction", "motion")
+FINE_STEP_S = 2.5e-4
 SHIPPED = Path(__file__).parent / "effects"
 
 
@@ -120,8 +122,8 @@ class Effect:
     text: str
     parameters: Mapping[str, Parameter]
     memory: int
-    any_step: bool
-    """Whether it does as well over one long step as over many short ones."""
+    step_s: float
+    """Longest step of the integration that it bears, s; infinite if any."""
     functions: Mapping[str, tuple[str, ...]]
     """Its functions on the path and the arguments each names."""
     equation: str
@@ -250,7 +252,7 @@ def _declared(path: Path, source: str) -> Effect:
         text=said.partition("\n")[0],
         parameters=_parameters(path, namespace),
         memory=namespace.get("MEMORY", 0),
-        any_step=namespace.get("ANY_STEP", not namespace.get("MEMORY", 0)),
+        step_s=namespace.get("STEP_S", FINE_STEP_S if namespace.get("MEMORY", 0) else inf),
         functions=functions,
         equation=_equation(said),
         looks=namespace.get("LOOKS", ""),
@@ -311,8 +313,8 @@ def _check_places(effect: Effect) -> None:
 
 
 def _check_words(effect: Effect) -> None:
-    if not isinstance(effect.any_step, bool):
-        raise InputError(str(effect.path), f"ANY_STEP: must be True or False, got {effect.any_step!r}")
+    if not isinstance(effect.step_s, float) or not effect.step_s > 0.0:
+        raise InputError(str(effect.path), f"STEP_S: must be a time in seconds above 0.0, got {effect.step_s!r}")
     if not isinstance(effect.looks, str):
         raise InputError(str(effect.path), f"LOOKS: must be a text, got {effect.looks!r}")
     is_table = isinstance(effect.confounded, dict)

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from config.recording import Recording
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from workbench.fitting import Fit
-from workbench.free_run import FINE, FreeRun
+from workbench.free_run import FreeRun
 from workbench.parameters import free_parameters
 from workbench.record import Record, ready
 from workbench.simulation_error import SimulationError
@@ -146,7 +147,7 @@ def _answers(
 ) -> Iterator[tuple[Fit, Record]]:
     for truth in fits:
         composition = Composition.from_file(truth.valve)
-        response = respond(composition, composition.theta, command_pa[:-1], np.diff(time_s), step_s=FINE.step_s)
+        response = respond(composition, composition.theta, command_pa[:-1], np.diff(time_s), step_s=FINE_STEP_S)
         noise = noise_m * np.random.default_rng(seed).standard_normal(time_s.size)
         columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m + noise}
         # The first hold brings the valve from rest to where the input begins: a free run starts after it.

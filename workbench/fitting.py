@@ -29,7 +29,7 @@ from workbench.measures import fit_percent
 from workbench.motion import slips
 from workbench.parameters import COULOMB, DEFAULT, STATIC, Parameter, free_parameters, strengths
 from workbench.record import Record, ready, require_fittable, require_units
-from workbench.simulation_error import FINAL, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
+from workbench.simulation_error import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
 from workbench.starts import drawn, forces_regressed, values_seen, with_plays
 from workbench.uncertainty import Uncertainty, uncertainty
 
@@ -61,6 +61,8 @@ AGREE = 1.01
 FLAT = 0.5
 """Rise of the cost that is nothing: within it static friction is put in the middle."""
 AT_BOUND = 1e-3
+WANTS_OUT = 2.0
+"""Slope of the cost at the bound times the deviation, in rises of 95 %: the least lies four deviations beyond it."""
 LEAST_SLIPS = 3
 
 Progress = Callable[[float], None]
@@ -345,7 +347,7 @@ def _searched(
         ends.sort(key=error.cost)
     if _agreeing(error, ends) < effort.agreeing:
         ends = sorted([*ends, error.polled(narrow(ends[0]))], key=error.cost)
-    best = _centred(error, ends[0])
+    best = _centred(error, error.descended_at(LAST, ends[0]))
     judged = uncertainty(error, best, ends, profile=profile)
     tell(1.0)
     valve = _fitted_file(composition, error.theta(best))
@@ -427,7 +429,8 @@ def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> F
     near = AT_BOUND * (high - low)
     at_bound = bool(z[i] < low + near or z[i] > high - near)
     inward = 10.0 * near if z[i] < low + near else -10.0 * near
-    wants_out = at_bound and error.cost(_moved(error, z, i, inward)) > error.cost(z) + judged.rise
+    steepness = (error.cost(_moved(error, z, i, inward)) - error.cost(z)) / abs(inward)
+    wants_out = at_bound and steepness * float(judged.std[i]) > WANTS_OUT * judged.rise
     slope = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
     return Fitted(
         value(z[i]),

@@ -25,17 +25,18 @@ from workbench.record import Record
 class Accuracy:
     """How finely a run is integrated.
 
-    The tolerance is that of `sim.karnopp`. Steps are a sample long where the effects bear any, else at most step_s.
+    Steps are as long as a sample where the effects bear that, else so many times the longest they bear. The tolerance
+    is that of `sim.karnopp`.
     """
 
-    step_s: float
+    steps: float
     tolerance: float
 
 
-FINE = Accuracy(1e-3, 3e-4)
+FINE = Accuracy(1.0, 3e-4)
 """Within 0.5 um rms of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
-ROUGH = Accuracy(2e-3, 1e-3)
-"""Within 50 um, in a third of the time."""
+ROUGH = Accuracy(2.0, 1e-3)
+"""Within 50 um, in half the time."""
 STILL = 4.0
 """Standard deviations of the noise within which the stem stands still."""
 LONGEST_START = 50
@@ -95,7 +96,7 @@ class FreeRun:
             state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
             periods = np.diff(self.record.time_s[first:end])
             held_pa = drive_pa[first : end - 1]
-            step_s = float(periods.max()) if self._composition.any_step else accuracy.step_s
+            step_s = min(float(periods.max()), accuracy.steps * self._composition.step_s)
             path = follow(self._composition, vector, state, held_pa, periods, step_s, accuracy.tolerance)
             rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
         return Run(*rows)

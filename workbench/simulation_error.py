@@ -35,6 +35,8 @@ class Level:
 
 
 WIDE, MIDDLE, NARROW = Level(100.0, 1e-3, 1e-2), Level(30.0, 3e-4, 1e-3), Level(5.0, 1e-4, 1e-4)
+LAST = Level(5.0, 1e-3, 1e-4)
+"""From where polling ends: the valleys are bent there, and too wide for the narrow differences."""
 FINAL = NARROW.scale
 STRIDES = (0.5, 0.2, 0.07)
 POLLS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)

@@ -5,12 +5,13 @@
 w width of the play, m; x position that enters, y position that leaves.
 """
 
+from math import inf
 from typing import Annotated, NamedTuple
 
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
-ANY_STEP = True
+STEP_S = inf
 
 
 LOOKS = "After every reversal the indication stays while the stem already moves; a slow cycle's branches part by w."

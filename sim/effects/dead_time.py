@@ -5,7 +5,7 @@
 T dead time, s; u entering pressure, p leaving pressure, Pa. What entered is kept as stretches of straight lines,
 (time, value, slope) each, in a ring of STRETCHES; a held command is one stretch. Stretches shorter than
 T / (STRETCHES - 1) are joined, so that the ring always reaches back to t - T: a command held for longer than that comes
-out exact. A jump comes out at the nearest end of a step; hence T below half a step is none.
+out exact. In a step during which one stretch follows another, p is held at its mean.
 """
 
 from typing import Annotated, NamedTuple
@@ -14,11 +14,14 @@ from sim.effect import Memory, Parameter
 
 STRETCHES = 4096
 MEMORY = 2 + 3 * STRETCHES
+STEP_S = 5e-4
 COUNT, READ = 0, 1
 """Stretches written so far, and which of them was read last."""
 TIME, VALUE, SLOPE = 2, 2 + STRETCHES, 2 + 2 * STRETCHES
 """Where the columns of the ring begin."""
 LONG_AGO_S = -1e9
+NO_TIME = 1e-6
+"""Of half a step: a stretch that reaches no farther into it does not count."""
 LOOKS = "Everything is late by the same time: after each change of the command nothing happens for T, then all of it."
 CONFOUNDED = {
     "ip_lag": "the first moments after a step: the dead time answers not at all, the lag at once",
@@ -42,15 +45,35 @@ def start(t: float, signal: float, z: Memory) -> None:
 
 
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
-    """Return p, on the stretch that holds in the middle of the step."""
-    if q.dead_time_s <= abs(middle - t):
+    """Return p, its mean over the step if that is of more than one stretch."""
+    T, half = q.dead_time_s, abs(middle - t)
+    if T <= 0.0:
         return u
-    k = stretch_at(middle - q.dead_time_s, z)
-    return float(z[VALUE + k] + z[SLOPE + k] * (t - q.dead_time_s - z[TIME + k]))
+    begins, ends, written = middle - half - T, middle + half - T, middle - half
+    k = stretch_at(begins + NO_TIME * half, z)
+    until = z[TIME + (k + 1) % STRETCHES] if k < int(z[COUNT]) - 1 else written
+    if until >= ends - NO_TIME * half:
+        k %= STRETCHES
+        return float(z[VALUE + k] + z[SLOPE + k] * (t - T - z[TIME + k]))
+    return mean(begins, ends, written, k, u, z)
+
+
+def mean(begins: float, ends: float, written: float, k: int, u: float, z: Memory) -> float:
+    """Return the mean of what entered between two times, from the k-th stretch on; after what is written, u."""
+    area, time = u * max(0.0, ends - written), begins
+    while time < min(ends, written):
+        until = min(ends, written)
+        if k < int(z[COUNT]) - 1:
+            until = min(until, float(z[TIME + (k + 1) % STRETCHES]))
+        here = k % STRETCHES
+        area += (until - time) * (z[VALUE + here] + z[SLOPE + here] * (0.5 * (time + until) - z[TIME + here]))
+        time = until
+        k += 1
+    return area / (ends - begins)
 
 
 def stretch_at(time: float, z: Memory) -> int:
-    """Return the place in the ring of the stretch that holds at a time, or of the oldest; sought from the last read."""
+    """Return which stretch holds at a time, or the oldest; sought from the last one read."""
     newest = int(z[COUNT]) - 1
     oldest = max(0, newest + 1 - STRETCHES)
     k = max(oldest, int(z[READ]))
@@ -59,7 +82,7 @@ def stretch_at(time: float, z: Memory) -> int:
     while k > oldest and z[TIME + k % STRETCHES] > time:
         k -= 1
     z[READ] = k
-    return k % STRETCHES
+    return k
 
 
 def advance(t: float, before: float, after: float, h: float, q: Parameters, z: Memory) -> None:

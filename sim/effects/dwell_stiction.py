@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
+STEP_S = 5e-4
 LONG_AGO_S = -1e9
 LOOKS = "The longer the hold, the later the break-away and the longer the jump; sliding is untouched."
 CONFOUNDED = {

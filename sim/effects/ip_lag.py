@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
+STEP_S = 5e-4
 LOOKS = (
     "After a step of the command the stem starts late and gently, is fastest later and creeps into its end, in the "
     "same shape whatever the step's height; on a ramp it runs T behind."

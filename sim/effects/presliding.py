@@ -8,12 +8,13 @@ the force found there. The creep is not counted as velocity. Each step solves th
 last one.
 """
 
+from math import inf
 from typing import Annotated, NamedTuple
 
 from sim.effect import Memory, Parameter
 
 MEMORY = 2
-ANY_STEP = True
+STEP_S = inf
 HELD, BALANCED_N = 0, 1
 """Whether the packing holds the stem, and the force it balances, F_h + k_p (x - x_h)."""
 

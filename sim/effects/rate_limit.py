@@ -2,8 +2,8 @@
 
     p = u where that keeps   -r_v <= p' <= r_f,   else p goes towards u at the limit
 
-r_f filling rate, r_v venting rate, Pa/s; u entering pressure, p leaving pressure, Pa. A jump for which
-a step's time suffices is made at once.
+r_f filling rate, r_v venting rate, Pa/s; u entering pressure, p leaving pressure, Pa. Where p arrives within a step it
+is shown as the straight line with the same end and the same mean.
 """
 
 from typing import Annotated, NamedTuple
@@ -11,6 +11,9 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
+STEP_S = 5e-4
+UNLIMITED = 1e10
+"""Pa/s, from which a jump is made at once."""
 LOOKS = (
     "High steps are answered by a ramp whose slope does not depend on the step's height, and differs between opening "
     "and closing if filling and venting do; small steps are untouched."
@@ -30,8 +33,8 @@ class Parameters(NamedTuple):
         Parameter(
             "most rise of the pressure per second",
             1e-3,
-            1e10,
-            off=1e10,
+            UNLIMITED,
+            off=UNLIMITED,
             starts=(10.0, 3.0, 1.0, 0.3),
             scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
         ),
@@ -41,8 +44,8 @@ class Parameters(NamedTuple):
         Parameter(
             "most fall of the pressure per second",
             1e-3,
-            1e10,
-            off=1e10,
+            UNLIMITED,
+            off=UNLIMITED,
             starts=(10.0, 3.0, 1.0, 0.3),
             scale="spring_n_per_m * stroke_m / diaphragm_area_m2",
         ),
@@ -55,11 +58,13 @@ def start(signal: float, z: Memory) -> None:
 
 
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
-    """Return p; at the start of a step, u if the step's time suffices to get there."""
-    half = middle - t
-    if half > 0.0 and -q.venting_pa_per_s * half <= 0.5 * (u - z[0]) <= q.filling_pa_per_s * half:
-        return u
-    return float(z[0])
+    """Return p; at the start of a step that suffices to get to u, so much ahead that the mean is right."""
+    h = 2.0 * (middle - t)
+    way = u - z[0]
+    rate = q.filling_pa_per_s if way > 0.0 else q.venting_pa_per_s
+    if h <= 0.0 or abs(way) >= rate * h:
+        return float(z[0])
+    return u if rate >= UNLIMITED else float(u - way * abs(way) / (rate * h))
 
 
 def advance(after: float, h: float, q: Parameters, z: Memory) -> None:

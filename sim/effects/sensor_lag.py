@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
+STEP_S = 5e-4
 LOOKS = (
     "The indicated position rounds off every start and stop; after the stem has stuck it still creeps, exponentially, "
     "to its end."

@@ -95,7 +95,7 @@ def test_a_run_is_as_exact_as_it_says(effect: dict[str, Any]) -> None:
     record, composition = ready(record_of(valve, 0)), Composition.from_file(valve)
     finest, fine, rough = (
         FreeRun(composition, record, accuracy=each).position_m(composition.theta)
-        for each in (Accuracy(0.01 * FINE.step_s, 0.01 * FINE.tolerance), FINE, ROUGH)
+        for each in (Accuracy(0.01 * FINE.steps, 0.01 * FINE.tolerance), FINE, ROUGH)
     )
     assert np.std(fine - finest) < 5e-7
     assert np.max(np.abs(rough - finest)) < 5e-5
