@@ -297,6 +297,9 @@ def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:
         parameter = get_args(hint)[-1] if get_origin(hint) is Annotated else None
         if not isinstance(parameter, Parameter):
             raise InputError(str(path), f"Parameters.{name}: must be Annotated[float, Parameter(...)]")
+        if parameter.seen not in get_args(Seen):
+            allowed = ", ".join(each for each in get_args(Seen) if each)
+            raise InputError(str(path), f"Parameters.{name}: seen must be one of {allowed}, got {parameter.seen!r}")
         declared[name] = parameter
     return declared
 

@@ -196,6 +196,11 @@ HEAD = "from typing import Annotated, NamedTuple\nfrom sim.effect import Paramet
             "from typing import NamedTuple\nclass Parameters(NamedTuple):\n    k: float\ndef force(x): return x",
             "Parameters.k: must be Annotated",
         ),
+        (
+            HEAD + "class Parameters(NamedTuple):\n    k: Annotated[float, Parameter('k', 0.0, 1.0, seen='swpt')]\n"
+            "def force(x): return x",
+            "Parameters.k: seen must be one of lowest, swept, quantum, got 'swpt'",
+        ),
     ],
 )
 def test_a_wrong_effect_file_is_named_in_one_line(tmp_path: Path, text: str, expected: str) -> None:
