@@ -207,6 +207,30 @@ def test_a_rate_limit_fills_and_vents_at_its_own_rates() -> None:
     np.testing.assert_allclose(slow.run(ramp, 1e-3).pressure_pa[1:], ramp, rtol=1e-12, atol=1e-9)
 
 
+@pytest.mark.parametrize(("dead_time_s", "share"), [(3.43e-3, 0.43), (0.43e-3, 0.43), (3e-3, 0.0), (1e-9, 1e-6)])
+def test_a_delayed_jump_inside_a_step_comes_out_in_the_mean(dead_time_s: float, share: float) -> None:
+    q, z, h = dead_time.Parameters(dead_time_s), np.zeros(dead_time.MEMORY), 1e-3
+    dead_time.start(0.0, 0.0, z)
+    shown: list[tuple[float, float]] = []
+    for i in range(6):
+        first = dead_time.pressure(5e4, i * h, (i + 0.5) * h, q, z)
+        dead_time.advance(i * h, 5e4, 5e4, h, q, z)
+        shown.append((first, dead_time.pressure(5e4, (i + 1) * h, (i + 0.5) * h, q, z)))
+    k = int(dead_time_s / h)
+    assert shown[:k] == [(0.0, 0.0)] * k
+    assert shown[k] == pytest.approx(((1.0 - share) * 5e4,) * 2, rel=1e-9)
+    assert shown[k + 1 :] == [(5e4, 5e4)] * (5 - k)
+
+
+def test_a_limited_rate_that_ends_inside_a_step_comes_out_right() -> None:
+    composition = library()
+    limits = {"rate_limit.filling_pa_per_s": 713e3, "rate_limit.venting_pa_per_s": 1.9e6}
+    theta = composition.changed(composition.theta, limits)
+    coarse, fine = (respond(composition, theta, STAIRS, 5e-3, step_s=step_s).position_m for step_s in (1e-3, 1e-5))
+    assert np.ptp(fine) > 0.03
+    assert np.abs(coarse - fine).max() < 3e-5
+
+
 def test_the_supply_limit_cuts_both_ends() -> None:
     valve = valve_with("supply_limit", supply_pa=50e3, exhaust_pa=5e3)
     assert valve.run([40e3, 60e3, 50e3, 0.0, 6e3], 0.1).pressure_pa.tolist() == [5e3, 40e3, 50e3, 50e3, 5e3, 6e3]

@@ -1,5 +1,6 @@
 """Fit: the truth's error is reached, the numbers are the truth's, and what cannot be known is said."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,15 @@ from config.recording import Recording
 from config.valve import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import shipped_effect
+from sim.karnopp import Vector
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench import fit
+from workbench.fitting import OF_BASE
 from workbench.free_run import FreeRun
 from workbench.measures import rms
 from workbench.parameters import free_parameters
 from workbench.record import ready
+from workbench.simulation_error import SimulationError
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
 
@@ -107,3 +111,18 @@ def test_the_ends_of_a_range_stay_inside_it(name: str) -> None:
             theta[each.index] = end
             each.put(theta, each.coordinate(theta))
             assert each.least <= theta[each.index] <= each.most
+
+
+def test_of_searches_that_fit_equally_well_one_is_polled(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = drawn_valve(np.random.default_rng(2))
+    polled: list[float] = []
+    poll = SimulationError.polled
+
+    def counted(error: SimulationError, z: Vector, steps: Sequence[float], scale: float) -> Vector:
+        polled.append(error.cost(z, scale))
+        return poll(error, z, steps, scale)
+
+    monkeypatch.setattr(SimulationError, "polled", counted)
+    found = fit(record_of(truth, 0, 1000), truth, workers=1, profile=False)
+    assert found.agreement > 1
+    assert 2 <= len(polled) < OF_BASE.carried + OF_BASE.agreeing, "polled although others had come to the same"
