@@ -45,7 +45,8 @@ FIRST_SEED = {
     "others": 2600,
     "outside": 2700,
 }
-"""Nobody has looked at a case before the rules stood."""
+LOOKED_AT = {("clean", 9)}
+"""Nobody has looked at a case before the rules stood, but for this one, which changed them: it does not count."""
 PLANNED = {"clean": 72, "dirty": 48, "nothing": 120, "two": 6, "removed": 12, "others": 12, "outside": 12}
 FOLDER = Path("docs/blind")
 """Where the lines are kept."""
@@ -238,7 +239,7 @@ def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, i
     planned = [
         ((number + 0.5) / PLANNED[family], family, number) for family in families for number in range(PLANNED[family])
     ]
-    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there]
+    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there | LOOKED_AT]
 
 
 def main() -> None:

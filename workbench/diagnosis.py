@@ -36,7 +36,8 @@ from workbench.preview import Suspect, preview
 from workbench.simulation_error import NARROW, SimulationError
 from workbench.structure import STRUCTURED
 
-MOST_ADDED = 3
+MOST_ADDED, MOST_STEPS = 3, 5
+"""Effects added at most, and steps made for it: a step that is judged anew is followed by others."""
 AT_END = 0.2
 """Of the weakest start: nearer to the end of its range a parameter is at it."""
 BETTER = 0.999
@@ -204,16 +205,34 @@ class _Search:
     def _steps(self, base: Model) -> tuple[Step, ...]:
         steps: list[Step] = []
         here = base
-        while len(steps) < MOST_ADDED:
+        for _ in range(MOST_STEPS):
             following = self._step(len(steps) + 1, here)
             if steps:
                 steps[-1] = self._without_missing(steps[-1], following)
-            steps.append(following)
+            steps = self._judged_anew([*steps, following])
             added = steps[-1].added
-            if added is None or added.model is None or added.model.explained:
+            if added is None or added.model is None or added.model.explained or len(steps) == MOST_ADDED:
                 break
             here = added.model
         return tuple(steps)
+
+    def _judged_anew(self, steps: list[Step]) -> list[Step]:
+        """Judge an earlier step anew if what was added last does better in it than its own search had found.
+
+        A search that failed there is no reason to keep what was added in its place; all later steps are dropped then.
+        """
+        last = steps[-1].added
+        if last is None or last.model is None:
+            return steps
+        valve = last.model.fit.valve
+        for i, step in enumerate(steps[:-1]):
+            effects = (*step.before.fit.valve.effect, *(each for each in valve.effect if each.name == last.name))
+            alone = self._model(self._base(ValveFile(valve=valve.valve, effect=effects)))
+            models = {each.name: each.model or each.why_not for each in step.candidates}
+            tried = models[last.name]
+            if not isinstance(tried, Model) or lead(alone.fit, tried.fit) > LEAST_BIC:
+                return [*steps[:i], self._judged(step.before, models | {last.name: alone}, i + 1)]
+        return steps
 
     def _without_missing(self, step: Step, following: Step) -> Step:
         """Drop from the equally good what is accepted after the added one too: it is missing as well, not a rival."""
@@ -231,9 +250,13 @@ class _Search:
         fitted = {name: each.fit for name, each in models.items() if isinstance(each, Model)}
         behind = [name for name, each in fitted.items() if lead(before.fit, each) > LEFT_BEHIND]
         models |= self._refitted(number, before, behind)
+        return self._judged(before, models, number)
+
+    def _judged(self, before: Model, models: Mapping[str, Model | str], number: int) -> Step:
+        """Hold every candidate against the model before."""
         candidates = tuple(self._candidate(number, name, before, model) for name, model in models.items())
         renamed = self._renamed(candidates, before.explained)
-        candidates, added = self._judged(_better_than(renamed, candidates) if renamed else candidates)
+        candidates, added = self._best(_better_than(renamed, candidates) if renamed else candidates)
         return Step(before, candidates, added, renamed, self._alike(candidates, added) if added else ())
 
     def _seeded_by(self, before: Model, models: Sequence[Model]) -> Model:
@@ -293,7 +316,7 @@ class _Search:
         judged = errors(found, self._split)
         return Model(found, judged, judged.at_floor(self._split.floor_m))
 
-    def _judged(self, candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], Candidate | None]:
+    def _best(self, candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], Candidate | None]:
         """Return the candidates by evidence, and the best accepted one, or the first of its class."""
         ordered = tuple(sorted(candidates, key=_evidence, reverse=True))
         accepted = {each.name: each for each in ordered if each.accepted}
