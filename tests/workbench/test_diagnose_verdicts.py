@@ -124,6 +124,16 @@ def test_no_imitation_of_the_bare_valve_is_named() -> None:
     assert "mm. Fit again with the mass free." in found.sentence
 
 
+def test_what_stood_in_for_a_failed_search_does_not_stay() -> None:
+    # The search for the true effect ends too high at first, so that another is added; beside it the true one is found.
+    hidden = hide(21009)
+    assert [each.name for each in hidden.truth.effect] == ["spring_hardening"]
+    found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("flow_force", "spring_hardening"))
+    assert (found.verdict, found.missing) == ("missing", ("spring_hardening",)), found.sentence
+    assert len(found.steps) == 1
+    assert found.best.errors.train_rmse_m < 1.02 * float(hidden.answer["floor_m"]["fit"])
+
+
 def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
     write_recording(tmp_path / "rec.csv", record_of(BARE, 4, 2 * COUNT))
     (tmp_path / "valve.toml").write_text(valve_toml(SEED), encoding="utf-8")
