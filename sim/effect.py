@@ -70,6 +70,7 @@ UPKEEP: Mapping[str, tuple[str, ...]] = {
 """What keeps a memory, and the arguments it may name."""
 AT_STEM = ("force", "friction", "motion")
 FINE_STEP_S = 2.5e-4
+"""For a memory of which nothing is known."""
 SHIPPED = Path(__file__).parent / "effects"
 
 
@@ -265,6 +266,7 @@ def _declared(path: Path, source: str) -> Effect:
             if argument not in allowed[name]:
                 raise InputError(str(path), f"{name}: unknown argument {argument}; allowed: {', '.join(allowed[name])}")
     _check_places(effect)
+    _check_step(effect)
     _check_words(effect)
     return effect
 
@@ -315,9 +317,12 @@ def _check_places(effect: Effect) -> None:
         raise InputError(str(effect.path), "start and advance belong with MEMORY = 1 or more: all three or none")
 
 
-def _check_words(effect: Effect) -> None:
+def _check_step(effect: Effect) -> None:
     if not isinstance(effect.step_s, float) or not effect.step_s > 0.0:
         raise InputError(str(effect.path), f"STEP_S: must be a time in seconds above 0.0, got {effect.step_s!r}")
+
+
+def _check_words(effect: Effect) -> None:
     if not isinstance(effect.looks, str):
         raise InputError(str(effect.path), f"LOOKS: must be a text, got {effect.looks!r}")
     is_table = isinstance(effect.confounded, dict)

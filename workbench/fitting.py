@@ -429,8 +429,7 @@ def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> F
     near = AT_BOUND * (high - low)
     at_bound = bool(z[i] < low + near or z[i] > high - near)
     inward = 10.0 * near if z[i] < low + near else -10.0 * near
-    steepness = (error.cost(_moved(error, z, i, inward)) - error.cost(z)) / abs(inward)
-    wants_out = at_bound and steepness > 0.0 and steepness * float(judged.std[i]) > WANTS_OUT * judged.rise
+    wants_out = at_bound and _wants_out(error, z, judged, i, inward)
     slope = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
     return Fitted(
         value(z[i]),
@@ -440,6 +439,12 @@ def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> F
         at_bound,
         not wants_out,
     )
+
+
+def _wants_out(error: SimulationError, z: Vector, judged: Uncertainty, i: int, inward: float) -> bool:
+    """Whether the cost rises so steeply into the range that its least must lie beyond the end."""
+    steepness = (error.cost(_moved(error, z, i, inward)) - error.cost(z)) / abs(inward)
+    return steepness > 0.0 and steepness * float(judged.std[i]) > WANTS_OUT * judged.rise
 
 
 def _search(error: SimulationError, z: Vector) -> Search:

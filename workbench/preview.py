@@ -46,7 +46,7 @@ def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Sus
     z = error.coordinates(composition.theta)
     residual = error.residuals(z)
     weights = (1.0 + (residual / FINAL) ** 2) ** -0.25
-    basis, _ = np.linalg.qr(weights[:, None] * error.jacobian(z, error.residuals(z), NARROW.difference))
+    basis, _ = np.linalg.qr(weights[:, None] * error.jacobian(z, residual, NARROW.difference))
     bare = run.position_m(composition.theta)
     rows = record.judged & np.isfinite(bare)
 
