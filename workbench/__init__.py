@@ -10,7 +10,8 @@
 `record` makes a recording ready for simulation and tells what is wrong with it, `free_run` simulates it, `comparison`
 holds the two against each other, `fitting` finds the parameters, `diagnosis` the effects that are missing, `extension`
 adds them, `report` writes it all down for a browser. Where a rig imposes the position there is nothing to simulate:
-`imposed` reads such forces, `force_diagnosis` balances them. `hiding` draws recordings with an effect nobody knows.
+`imposed` reads such forces, `force_balance` balances them, `force_diagnosis` says what the balance lacks.
+`hiding` draws recordings with an effect nobody knows.
 """
 
 from config.recording import Recording

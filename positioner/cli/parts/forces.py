@@ -15,7 +15,8 @@ def run_forces(arguments: argparse.Namespace) -> int:
     from config.errors import InputError
     from config.valve import find_valve, load_valve
     from positioner.cli.parts.naming import naming
-    from workbench.force_diagnosis import as_json, diagnose_forces
+    from workbench.force_diagnosis import diagnose_forces
+    from workbench.force_diagnosis_json import as_json
     from workbench.imposed import read_imposed
 
     for option in ("report", "effects"):

@@ -11,7 +11,8 @@ from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.valves import SEED
 from workbench import diagnose
-from workbench.force_diagnosis import ForceDiagnosis, as_json, diagnose_forces
+from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.force_diagnosis_json import as_json
 from workbench.imposed import is_imposed, read_imposed
 
 Capture = pytest.CaptureFixture[str]
