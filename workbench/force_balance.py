@@ -161,11 +161,6 @@ class Balance:
             self._slips[yield_m] = _yielding(self.rows, yield_m)
         return self._slips[yield_m]
 
-    def target(self) -> Column:
-        """Return what is balanced, N."""
-        rows = self.rows
-        return self.valve.diaphragm_area_m2 * rows.pressure_pa if rows.load_n is None else rows.load_n
-
     def columns(self, model: ForceModel) -> list[_Column]:
         """Return the columns of a model."""
         rows, z = self.rows, self.slip(model.yield_m)
@@ -182,7 +177,7 @@ class Balance:
 
     def fitted(self, model: ForceModel, *, bounded: bool = True) -> ForceFit:
         """Fit a model to all that is fitted, and predict each part from the others."""
-        columns, y = self.columns(model), self.target()
+        columns, y = self.columns(model), balanced_n(self.rows, self.valve)
         X = np.column_stack([each.values for each in columns])
         scale = np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
         least = np.array([each.least if bounded else -np.inf for each in columns])
@@ -323,6 +318,17 @@ def _stroke_logs(stroke: NDArray[np.int64], error_n: Column) -> Column:
     _, block = np.unique(stroke, return_inverse=True)
     squares = np.bincount(block, error_n**2) / np.bincount(block)
     return np.asarray(0.5 * np.log(squares + np.finfo(float).tiny))
+
+
+def balanced_n(rows: Rows, valve: ValveParameters) -> Column:
+    """Return the force that is balanced, N: the load of a bench, A p of a static curve."""
+    return valve.diaphragm_area_m2 * rows.pressure_pa if rows.load_n is None else rows.load_n
+
+
+def carried_n(rows: Rows, parameters: Mapping[str, float]) -> Column:
+    """Return what spring, constant force and, on a bench, pressure carry of the balanced force, N: no friction."""
+    force_n = parameters["spring_n_per_m"] * rows.position_m + parameters["constant_n"]
+    return force_n if rows.load_n is None else force_n - parameters["diaphragm_area_m2"] * rows.pressure_pa
 
 
 def floor_of(rows: Rows, residual_n: Column) -> float | None:

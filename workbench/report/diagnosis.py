@@ -1,22 +1,22 @@
 """The report of a diagnosis: what is missing, how the error fell, what is not told apart, what to measure next."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from config.recording import Recording
-from sim.effect import Effect, find_effect
+from sim.effect import find_effect
 from workbench.comparison import Comparison, compare
-from workbench.confounding import classes, told_apart, untold
+from workbench.confounding import untold
 from workbench.diagnosis import Candidate, Diagnosis, Model, Step
-from workbench.evidence import LEAST_BIC, LEAST_GAIN, LEAST_STANDARD_ERRORS
+from workbench.evidence import LEAST_BIC
 from workbench.experiment import Experiment
 from workbench.fitting import Fitted
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison import MEANINGS, WORDS, facts, overlaid, recording
+from workbench.report.effects import Race, added_effects, not_told_apart, outcome, tried_effects
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
     Row,
@@ -27,9 +27,7 @@ from workbench.report.page import (
     glossary,
     heading,
     plot,
-    preformatted,
     section,
-    subheading,
     table,
     text,
     verdict,
@@ -37,7 +35,7 @@ from workbench.report.page import (
 )
 from workbench.report.ranking import Tried
 from workbench.report.series import drawn, rounded
-from workbench.report.units import Shown, length, of_stroke, parameter, times
+from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
 
 VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
@@ -102,7 +100,7 @@ def report_diagnosis(
             _where(seen),
             _ranking(diagnosis, seen),
             _added(diagnosis),
-            _alike(diagnosis),
+            not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "see the next section"),
             _next(diagnosis, experiment_file),
             _untold(diagnosis),
             _preview(diagnosis),
@@ -131,8 +129,7 @@ def _verdict(diagnosis: Diagnosis, seen: _Seen) -> str:
 def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
     before, after = diagnosis.base.errors, diagnosis.best.errors
     stroke_m = diagnosis.base.fit.valve.valve.stroke_m
-    added = ", ".join(_effect(name).name.replace("_", " ") for name in diagnosis.missing)
-    tried = len({each.name for each in diagnosis.candidates})
+    added = ", ".join(find_effect(name, "effects").name.replace("_", " ") for name in diagnosis.missing)
     return figures_of_merit(
         [
             (
@@ -142,9 +139,13 @@ def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
             ),
             ("and after, mm", length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
             ("Floor, mm", length(seen.floor_m), "no model does better"),
-            ("Added", Shown(added or "nothing"), f"of {tried} effects tried"),
+            ("Added", Shown(added or "nothing"), f"of {len(_names(diagnosis))} effects tried"),
         ]
     )
+
+
+def _names(diagnosis: Diagnosis) -> frozenset[str]:
+    return frozenset(each.name for each in diagnosis.candidates)
 
 
 def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
@@ -154,9 +155,8 @@ def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
         for step in diagnosis.steps
         if step.added and step.added.model
     ]
-    figure = ranking.fall(
-        [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages], seen.floor_m
-    )
+    errors = [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages]
+    figure = ranking.fall(errors, seen.floor_m, LENGTH)
     rows = [
         Row(
             [
@@ -231,48 +231,12 @@ def _where(seen: _Seen) -> str:
 
 
 def _ranking(diagnosis: Diagnosis, seen: _Seen) -> str:
-    parts = [
-        text(
-            "Each effect of the library was added in turn and the whole model refitted with it, all with equal effort. "
-            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, second by second, falls "
-            f"by more than {100 * LEAST_GAIN:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
-            "and its parameters are physically possible."
-        )
-    ]
-    for number, step in enumerate(diagnosis.steps, start=1):
-        rows = sorted(_tried(step), key=lambda each: each.order)
-        before = step.before.errors.test_rmse_m
-        title = f"Step {number}: beside {', '.join(step.before.effects)}" if step.before.effects else f"Step {number}"
-        parts += [
-            subheading(title),
-            plot(
-                f"plot-ranking-{number}",
-                ranking.ranking(rows, before, seen.floor_m),
-                110 + 26 * len(rows),
-                "Held-out error, rms, with each effect added; dashed the floor, dotted the error without any of them. "
-                "The scale is logarithmic.",
-            ),
-            table(
-                f"table-ranking-{number}",
-                ["Effect", "Outcome", "Held-out error, mm", "Fitted, mm", "Fall, in its uncertainties", "Evidence"],
-                [_ranked(each) for each in rows],
-                (0, 1),
-            ),
-        ]
-    return section("ranking", "The effects that were tried", *parts)
+    races = [Race(step.before.effects, step.before.errors.test_rmse_m, _tried(step)) for step in diagnosis.steps]
+    return tried_effects(races, seen.floor_m, LENGTH, "second by second")
 
 
 def _tried(step: Step) -> list[Tried]:
-    alike = {each.name for each in step.alike}
-    added = step.added.name if step.added else ""
-
-    def outcome(each: Candidate) -> str:
-        if each.name == added:
-            return "added"
-        if each.name in alike:
-            return "as good"
-        return "accepted" if each.accepted else "refused"
-
+    added, alike = step.added.name if step.added else "", [each.name for each in step.alike]
     return [
         Tried(
             each.name,
@@ -280,48 +244,21 @@ def _tried(step: Step) -> list[Tried]:
             each.model.errors.train_rmse_m if each.model else None,
             each.gain.standard_errors if each.gain else None,
             each.gain.bic if each.gain else None,
-            outcome(each),
+            outcome(each.name, added, alike, refused=not each.accepted),
             each.why_not,
         )
         for each in step.candidates
     ]
 
 
-def _ranked(each: Tried) -> Row:
-    kinds = {"added": "good", "as good": "set"}
-    return Row(
-        [
-            each.name,
-            f"{each.outcome}: {each.why}" if each.why else each.outcome,
-            length(each.test_m),
-            length(each.train_m),
-            "–" if each.fall_errors is None else f"{each.fall_errors:.3g}",
-            "–" if each.evidence is None else f"{each.evidence:.4g}",
-        ],
-        _effect(each.name).text.rstrip("."),
-        kinds.get(each.outcome, ""),
-    )
-
-
-def _effect(name: str) -> Effect:
-    return find_effect(name, "effects")
-
-
 def _added(diagnosis: Diagnosis) -> str:
-    parts = []
-    for name in diagnosis.missing:
-        effect = _effect(name)
-        parts += [subheading(name), text(effect.text, f"In a record: {effect.looks}" if effect.looks else "")]
-        parts.append(preformatted(effect.equation))
-    if not parts:
-        parts = [text("No effect was added; the parameters below are those of the valve itself, refitted.")]
     names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
     rows = [
         _parameter(name, diagnosis.base.fit.parameters.get(name), diagnosis.best.fit.parameters.get(name))
         for name in names
     ]
     head = ["Parameter", "Before", "After", "95 % interval", "Unit"]
-    return section("added", "What was added", *parts, table("table-parameters", head, rows, (0,)))
+    return added_effects(diagnosis.missing, table("table-parameters", head, rows, (0,)))
 
 
 def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
@@ -333,35 +270,6 @@ def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
     interval = "–" if after is None else f"{factor * after.lower:.4g} to {factor * after.upper:.4g}"
     remark = "at the end of its physical range" if after and after.at_bound else ""
     return Row([words, shown(before), shown(after), interval, unit], remark)
-
-
-def _alike(diagnosis: Diagnosis) -> str:
-    sets = diagnosis.indistinguishable
-    if not sets:
-        return section(
-            "alike",
-            "What could not be told apart",
-            text("Nothing: no other accepted effect comes within reach of the one that was added.")
-            if diagnosis.missing
-            else text("The question does not arise: no effect was accepted."),
-        )
-    library = {each.name: _effect(each.name) for each in diagnosis.candidates}
-    rows = [_two(name, other, library) for names in sets for i, name in enumerate(names) for other in names[i + 1 :]]
-    return section(
-        "alike",
-        "What could not be told apart",
-        text(
-            f"These explain the recording equally well: {'; '.join(' or '.join(names) for names in sets)}. "
-            "One of each set was added to go on with; it is not proved."
-        ),
-        table("table-alike", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
-    )
-
-
-def _two(name: str, other: str, library: Mapping[str, Effect]) -> Row:
-    same = len(classes((name, other), library)) == 1
-    none = "none of pressure and position: their equations are the same" if same else "see the next section"
-    return Row([name, other, told_apart(name, other, library) or none])
 
 
 def _next(diagnosis: Diagnosis, experiment_file: str) -> str:

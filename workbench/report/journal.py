@@ -18,7 +18,7 @@ from workbench.report.page import (
     verdict,
     write,
 )
-from workbench.report.units import Shown, length, parameter, times
+from workbench.report.units import LENGTH, Shown, length, parameter, times
 
 WORDS = {
     "As given": "The valve file as it was before the step, nothing fitted.",
@@ -62,7 +62,7 @@ def report_journal(journal: Journal, path: Path, name: str) -> None:
                 "How the error fell",
                 plot(
                     "plot-journal",
-                    ranking.fall(_stages(journal.steps), last.floor_m),
+                    ranking.fall(_stages(journal.steps), last.floor_m, LENGTH),
                     320,
                     f"Error, rms, at each step. Dashed: the floor of the last, {length(last.floor_m).text} mm.",
                 ),

@@ -1,5 +1,6 @@
 """Units that people at a plant use, each with the SI value beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 
@@ -51,6 +52,25 @@ def length(value_m: float | None, *, sign: bool = False) -> Shown:
     plus = "+" if sign else ""
     fine = 0.0 < abs(value_m) < FINE_M
     return Shown(f"{1e3 * value_m:{plus}.2g}" if fine else f"{1e3 * value_m:{plus}.3f}", f"{value_m:.6g} m")
+
+
+def force(value_n: float | None) -> Shown:
+    """Show a force in N."""
+    return Shown("–") if value_n is None or not isfinite(value_n) else Shown(f"{value_n:.4g}", f"{value_n:.6g} N")
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What errors are of: how one is shown, the factor from SI, the unit shown and the SI unit."""
+
+    shown: Callable[[float | None], Shown]
+    factor: float
+    unit: str
+    si: str
+
+
+LENGTH = Quantity(length, 1e3, "mm", "m")
+FORCE = Quantity(force, 1.0, "N", "N")
 
 
 def of_stroke(value_m: float, stroke_m: float) -> str:

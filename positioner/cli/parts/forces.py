@@ -18,10 +18,12 @@ def run_forces(arguments: argparse.Namespace) -> int:
     from workbench.force_diagnosis import diagnose_forces
     from workbench.force_diagnosis_json import as_json
     from workbench.imposed import read_imposed
+    from workbench.report import Subject, report_forces, require_plotly
 
-    for option in ("report", "effects"):
-        if getattr(arguments, option) is not None:
-            raise InputError(f"--{option}", "goes with recordings that hold a command; here the position is imposed")
+    if arguments.effects is not None:
+        raise InputError("--effects", "goes with recordings that hold a command; here the position is imposed")
+    if arguments.report is not None:
+        require_plotly(arguments.report)
     began_s = time.monotonic()
     valve = load_valve(find_valve(arguments.valve))
     recordings = [read_imposed(path) for path in arguments.recordings]
@@ -32,6 +34,9 @@ def run_forces(arguments: argparse.Namespace) -> int:
     if arguments.json is not None:
         whole = as_json(diagnosis) | {"seconds": time.monotonic() - began_s}
         arguments.json.write_text(json.dumps(whole, allow_nan=False) + "\n", encoding="utf-8")
+    if arguments.report is not None:
+        files = tuple(str(path) for path in (*arguments.recordings, arguments.test) if path)
+        report_forces(diagnosis, arguments.report, Subject(valve, files, recordings[0].metadata))
     return 0 if diagnosis.verdict == "adequate" else 1
 
 
