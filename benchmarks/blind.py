@@ -37,17 +37,15 @@ from workbench.hiding import VISIBLE, hide
 from workbench.trial import NOISE_M
 
 FIRST_SEED = {
-    "clean": 21000,
-    "dirty": 22000,
+    "clean": 31000,
+    "dirty": 32000,
     "nothing": 23000,
     "two": 24000,
     "removed": 25000,
     "others": 2600,
     "outside": 2700,
 }
-LOOKED_AT = {("clean", 9)}
-"""Nobody has looked at a case before the rules stood, but for this one, which changed them: it does not count."""
-PLANNED = {"clean": 72, "dirty": 48, "nothing": 120, "two": 6, "removed": 12, "others": 12, "outside": 12}
+PLANNED = {"clean": 80, "dirty": 120, "nothing": 160, "two": 6, "removed": 12, "others": 12, "outside": 12}
 FOLDER = Path("docs/blind")
 """Where the lines are kept."""
 
@@ -114,6 +112,7 @@ def line(family: str, number: int) -> Line:
         "visible": posed.visible and _missed_m(found, posed.fit_floor_m) > VISIBLE * posed.fit_floor_m,
         "verdict": found.verdict,
         "missing": list(found.missing),
+        "suspected": list(found.suspected),
         "sets": [[each.name for each in step.alike] for step in found.steps if step.added],
         "ranked": [each.name for each in found.steps[0].candidates[:3]],
         "at_floor": found.best.at_floor,
@@ -147,8 +146,8 @@ def named(each: Line, hidden: str) -> bool:
 
 
 def first(each: Line, hidden: str) -> bool:
-    """Whether it is the first one added, or in the set with that; where none was, the first by evidence."""
-    return bool(_same(hidden) & set((each["sets"] or [each["ranked"][:1]])[0]))
+    """Whether it is the first one added, or in the set with that; where none was, suspected, or first by evidence."""
+    return bool(_same(hidden) & set((each["sets"] or [each.get("suspected") or each["ranked"][:1]])[0]))
 
 
 def single(each: Line) -> bool:
@@ -179,6 +178,8 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
             yield share(f"false alarms, {setting}", alarms)
             honest = [each["verdict"] == "adequate" for each in lines if each["setting"] == setting]
             yield share(f"called adequate, {setting}", honest)
+            hinted = [bool(each["suspected"]) for each in lines if each["setting"] == setting and "suspected" in each]
+            yield share(f"of these something suspected, {setting}", hinted)
         return
     yield f"  {'visible':<52}{len(seen)} of {len(lines)}"
     if family in {"removed", "outside"}:
@@ -239,7 +240,7 @@ def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, i
     planned = [
         ((number + 0.5) / PLANNED[family], family, number) for family in families for number in range(PLANNED[family])
     ]
-    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there | LOOKED_AT]
+    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there]
 
 
 def main() -> None:

@@ -105,6 +105,8 @@ class Step:
     """What would be accepted but that it is the bare valve by another name: a parameter that is kept is off."""
     alike: tuple[Candidate, ...]
     """The added one and all that the block errors do not tell from it, by evidence; classes stand together."""
+    suspected: tuple[Candidate, ...]
+    """Where nothing is added: what would be if more were left to explain, and all that is not told from it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +131,11 @@ class Diagnosis:
     def indistinguishable(self) -> tuple[tuple[str, ...], ...]:
         """For each step with more than one equally good effect, their names."""
         return tuple(tuple(each.name for each in step.alike) for step in self.steps if len(step.alike) > 1)
+
+    @property
+    def suspected(self) -> tuple[str, ...]:
+        """Effects that may be there, but that nothing proves: the valve without them is at the floor."""
+        return tuple(each.name for each in self.steps[-1].suspected)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -257,7 +264,9 @@ class _Search:
         candidates = tuple(self._candidate(number, name, before, model) for name, model in models.items())
         renamed = self._renamed(candidates, before.explained)
         candidates, added = self._best(_better_than(renamed, candidates) if renamed else candidates)
-        return Step(before, candidates, added, renamed, self._alike(candidates, added) if added else ())
+        suspect = None if added or renamed else self._suspect(candidates)
+        alike, suspected = (self._alike(candidates, each) if each else () for each in (added, suspect))
+        return Step(before, candidates, added, renamed, alike, suspected)
 
     def _seeded_by(self, before: Model, models: Sequence[Model]) -> Model:
         """Return the model before, fitted again where a search from a better one's parameters ends below it."""
@@ -344,13 +353,24 @@ class _Search:
         passing = [each for each in candidates if each.physical and each.gain and not each.gain.short(explained)]
         return max((each for each in passing if bare_parameter(each.name, self._library)), key=_evidence, default=None)
 
-    def _alike(self, candidates: Sequence[Candidate], added: Candidate) -> tuple[Candidate, ...]:
-        assert added.model
+    def _suspect(self, candidates: Sequence[Candidate]) -> Candidate | None:
+        """Return what has the most evidence of all that would be accepted if more were left to explain."""
+        passing = (each for each in candidates if self._may_be_there(each) and each.gain and not each.gain.short(False))
+        return max(passing, key=_evidence, default=None)
+
+    def _may_be_there(self, candidate: Candidate) -> bool:
+        """Whether an effect is physical, has evidence, and is not the bare valve by another name."""
+        evident = candidate.physical and _evidence(candidate) > LEAST_BIC
+        return evident and bare_parameter(candidate.name, self._library) is None
+
+    def _alike(self, candidates: Sequence[Candidate], best: Candidate) -> tuple[Candidate, ...]:
+        """Return what is not told from the best: itself accepted or not, for what passes by a hair proves no more."""
+        assert best.model
         refitted = {each.name: each for each in candidates if each.model}
         as_good = [
             each.name
             for each in refitted.values()
-            if each.accepted and each.model and alike(added.model.errors, each.model.errors)
+            if self._may_be_there(each) and each.model and alike(best.model.errors, each.model.errors)
         ]
         # A class is one by algebra, whether or not the search for each of its members succeeded.
         return tuple(
@@ -430,7 +450,8 @@ def _sentence(
             f"another name, the held-out error falls from {before:.3g} to {after:.3g} mm. Fit again with the mass free."
         )
     if verdict == "adequate":
-        return f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
+        said = f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
+        return said + _suspicion(steps[0].suspected)
     if verdict == "missing":
         return f"Missing: {names}; {fell}, and nothing is left to explain."
     if verdict == "one_of":
@@ -441,6 +462,16 @@ def _sentence(
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}"
     return f"Not to be trusted: the searches end at different errors.{begun}"
+
+
+def _suspicion(suspected: Sequence[Candidate]) -> str:
+    if not suspected:
+        return ""
+    best = max(suspected, key=_evidence)
+    return (
+        f" Suspected, not proved: {' or '.join(each.name for each in suspected)}; of {best.name}, {best.why_not}. "
+        "A longer recording would tell."
+    )
 
 
 def _apart(step: Step, library: Mapping[str, Effect]) -> str:

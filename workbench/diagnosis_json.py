@@ -19,6 +19,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "sentence": diagnosis.sentence,
         "missing": list(diagnosis.missing),
         "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
+        "suspected": list(diagnosis.suspected),
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,
