@@ -4,7 +4,8 @@
 
 Each effect's parameters lie between two neighbouring starts that it declares, log-uniformly where they have one sign.
 An effect is visible where the valve without it, spring and friction refitted, misses at least half the floor in the
-record to be fitted; the floor is what the true valve itself misses: noise, and the dirt.
+record to be fitted; the floor is what the true valve itself misses: noise, and the dirt. Strengths with which the stem
+moves through less than a tenth of its stroke are drawn again: a supply below break-away hides everything.
 
 The same seed draws the same; the bare valve and the commands do not depend on the effects or the dirt.
 """
@@ -25,6 +26,8 @@ from workbench.excitation import excitation
 from workbench.trial import LEVELS, NOISE_M, Trial, missed_m
 
 VISIBLE = 0.5
+LEAST_TRAVEL = 0.1
+"""Of the stroke, in either record."""
 
 Draw = np.random.Generator
 
@@ -58,9 +61,11 @@ def hide(
     valve = drawn_valve(for_valve)
     known = known_valve(valve, for_valve)
     drawn = drawn_effects(for_effects, effects)
-    truth = ValveFile(valve=valve, effect=tuple(strength(each, valve, known, for_effects) for each in drawn))
     count = round(duration_s / period_s) + 1
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
+    truth = _strong(drawn, valve, known, for_effects)
+    while not _moves(trials, truth):
+        truth = _strong(drawn, valve, known, for_effects)
     fit, test = (
         _recorded(trial, truth, dirty, generator) for trial, generator in zip(trials, (for_fit, for_test), strict=True)
     )
@@ -74,6 +79,16 @@ def hide(
         "visible": {each.name: _visible(trials, truth, each, fit[1]) for each in truth.effect},
     }
     return Hidden(ValveFile(valve=known), fit[0], test[0], truth, answer)
+
+
+def _strong(drawn: Sequence[Effect], valve: ValveParameters, known: ValveParameters, generator: Draw) -> ValveFile:
+    return ValveFile(valve=valve, effect=tuple(strength(each, valve, known, generator) for each in drawn))
+
+
+def _moves(trials: Sequence[Trial], truth: ValveFile) -> bool:
+    composition = Composition.from_file(truth)
+    answers = (trial.answer_m(composition, composition.theta) for trial in trials)
+    return all(np.ptp(each) > LEAST_TRAVEL * truth.valve.stroke_m for each in answers)
 
 
 def _recorded(trial: Trial, truth: ValveFile, dirty: bool, generator: Draw) -> tuple[Recording, float]:

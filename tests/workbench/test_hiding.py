@@ -184,6 +184,18 @@ def test_the_stem_sticks_and_slips_in_both_directions(seed: int) -> None:
     assert np.ptp(found) > 0.5 * SEED.stroke_m
 
 
+def test_strengths_that_leave_no_motion_are_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first draw of this seed is a supply below break-away."""
+    truth = hide(21066).truth
+    (limit,) = truth.effect
+    assert limit.name == "supply_limit"
+    assert limit.parameters["supply_pa"] * truth.valve.diaphragm_area_m2 > truth.valve.static_n
+    monkeypatch.setattr("workbench.hiding.LEAST_TRAVEL", -1.0)
+    first = hide(21066)
+    assert first.truth.effect != truth.effect
+    assert np.ptp(first.fit.columns["position_m"]) < 0.01 * truth.valve.stroke_m
+
+
 def test_dirt_raises_the_floor_and_rounds(bare: Hidden) -> None:
     dirty = hide(5, effects=0, dirty=True)
     quantum_m = dirty.truth.valve.stroke_m / 4096
