@@ -134,13 +134,38 @@ def test_what_stood_in_for_a_failed_search_does_not_stay() -> None:
     assert found.best.errors.train_rmse_m < 1.02 * float(hidden.answer["floor_m"]["fit"])
 
 
+def test_what_falls_short_of_the_rule_by_a_hair_stands_beside_what_passes_by_a_hair() -> None:
+    # A dead time of 4 ms; a lag of 4.6 ms fits as well, and passes the rule, which the dead time just misses.
+    hidden = hide(22043, dirty=True)
+    assert [each.name for each in hidden.truth.effect] == ["dead_time"]
+    found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("dead_time", "sensor_lag", "friction_drift"))
+    accepted = {each.name for each in found.candidates if each.accepted}
+    assert (accepted, found.missing) == ({"sensor_lag"}, ("sensor_lag",))
+    assert found.verdict == "one_of"
+    assert found.indistinguishable == (("dead_time", "sensor_lag"),)
+    assert found.experiment is not None
+
+
+def test_what_nothing_proves_is_suspected_and_no_more() -> None:
+    hidden = hide(22008, dirty=True)
+    assert [each.name for each in hidden.truth.effect] == ["spring_hardening"]
+    found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("spring_hardening", "ip_lag"))
+    assert (found.verdict, found.missing, found.indistinguishable) == ("adequate", (), ())
+    assert found.suspected == ("spring_hardening",)
+    assert as_json(found)["suspected"] == ["spring_hardening"]
+    (suspect,) = (each for each in found.candidates if each.name == "spring_hardening")
+    said = f"Suspected, not proved: spring_hardening; of spring_hardening, {suspect.why_not}."
+    assert said in found.sentence
+    assert "standard errors, more than 3 needed" in said
+
+
 def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
     write_recording(tmp_path / "rec.csv", record_of(BARE, 4, 2 * COUNT))
     (tmp_path / "valve.toml").write_text(valve_toml(SEED), encoding="utf-8")
     said = _diagnosed(tmp_path, "sensor_gain")
     assert said["status"] == 0
     assert said["verdict"] == "adequate"
-    assert said["missing"] == []
+    assert said["missing"] == said["suspected"] == []
     assert said["base"]["parameters"] == said["best"]["parameters"]
     assert not any(each["accepted"] for each in said["candidates"])
     assert all(each["why_not"] for each in said["candidates"])
