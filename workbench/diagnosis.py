@@ -26,7 +26,7 @@ from config.valve import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect, Parameter, find_effect, shipped_effects
 from workbench.confounding import algebraic_class, bare_parameter, classes, imitation, told_apart
-from workbench.evidence import LEAST_BIC, Errors, Gain, alike, bic, errors, gain, lead
+from workbench.evidence import LEAST_BIC, Errors, Gain, alike, bic, errors, fallen, gain, lead
 from workbench.experiment import Experiment, experiment
 from workbench.fitting import Fit, fit, profiled
 from workbench.free_run import FreeRun
@@ -440,7 +440,7 @@ def _sentence(
 ) -> str:
     names = " and ".join(step.added.name for step in steps if step.added)
     before, after = 1e3 * steps[0].before.errors.test_rmse_m, 1e3 * best.errors.test_rmse_m
-    fell = f"the held-out error falls from {before:.3g} to {after:.3g} mm"
+    fell = fallen(steps[0].before.errors, best.errors)
     repeat = "" if repeats else REPEAT
     renamed = steps[0].renamed
     if verdict == "adequate" and renamed and renamed.model:

@@ -166,3 +166,14 @@ def alike(best: Errors, other: Errors) -> bool:
     """Whether the block errors, fitted and held out, do not tell two apart: within 1 standard error or 2 %."""
     less, standard_errors = fall(other.all_logs, best.all_logs)
     return less < ALIKE_GAIN or standard_errors < ALIKE_STANDARD_ERRORS
+
+
+def fallen(before: Errors, after: Errors) -> str:
+    """Say how the held-out error falls; where one slip missed by a hair outweighs all else, in a typical second."""
+    whole = f"from {1e3 * before.test_rmse_m:.3g} to {1e3 * after.test_rmse_m:.3g} mm"
+    if after.test_rmse_m < before.test_rmse_m:
+        return f"the held-out error falls {whole}"
+    typical = f"from {1e3 * before.test_block_m:.3g} to {1e3 * after.test_block_m:.3g} mm"
+    return (
+        f"the held-out error of a typical second falls {typical}, though a slip missed by a hair moves the rms {whole}"
+    )

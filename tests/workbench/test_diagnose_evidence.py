@@ -1,5 +1,7 @@
 """What a candidate is held against: block errors, the meter of structure, algebraic classes, what is held out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from config.errors import InputError
 from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
 from workbench.confounding import algebraic_class, bare_parameter, classes
-from workbench.evidence import Errors, Gain, alike, block_logs, fall, independent
+from workbench.evidence import Errors, Gain, alike, block_logs, fall, fallen, independent
 from workbench.held_out import joined, residual_m, split
 from workbench.record import ready
 from workbench.structure import STRUCTURED, structure
@@ -84,6 +86,16 @@ def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_
     missed[40] = np.log(6e-3)
     assert alike(errors_of(best), errors_of(missed))
     assert not alike(errors_of(best), errors_of(best + 0.1))
+
+
+def test_a_fall_is_never_said_of_an_error_that_rises() -> None:
+    before = replace(errors_of(np.zeros(60)), test_rmse_m=1.31e-4, test_block_m=9e-5)
+    assert fallen(before, errors_of(np.zeros(60))) == "the held-out error falls from 0.131 to 0.1 mm"
+    missed = replace(before, test_rmse_m=4.39e-4, test_block_m=5e-5)
+    assert fallen(before, missed) == (
+        "the held-out error of a typical second falls from 0.09 to 0.05 mm, "
+        "though a slip missed by a hair moves the rms from 0.131 to 0.439 mm"
+    )
 
 
 def test_what_hangs_together_is_few_independent_samples() -> None:
