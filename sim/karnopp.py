@@ -292,9 +292,9 @@ def move(
     s = h - tau
     if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST * (abs(v) + valve.v_s):
         s = FIRST * (abs(v) + valve.v_s) / abs(a)
-    longest = LEAP / sqrt(valve.k_s * valve.per_m)
+    shortest_leap = LEAP / sqrt(valve.k_s * valve.per_m)
     while tau < h:
-        leaps = mode == SLIP and s > longest
+        leaps = mode == SLIP and s > shortest_leap
         if leaps:
             x1, v1, a1, error = leap(valve, sigma, drive, tau, s, x, v, a, q, z)
         else:
