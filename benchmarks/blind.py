@@ -36,16 +36,17 @@ from workbench.diagnosis import Diagnosis, diagnose
 from workbench.hiding import VISIBLE, hide
 from workbench.trial import NOISE_M
 
-FIRST_SEED = {
-    "clean": 31000,
-    "dirty": 32000,
-    "nothing": 23000,
-    "two": 24000,
-    "removed": 25000,
-    "others": 2600,
-    "outside": 2700,
+SEEDS: Mapping[str, tuple[range, ...]] = {
+    "clean": (range(21000, 21072), range(31000, 31048)),
+    "dirty": (range(32000, 32100),),
+    "nothing": (range(23000, 23120),),
+    "two": (range(24000, 24006),),
+    "removed": (range(25000, 25012),),
+    "others": (range(2600, 2612),),
+    "outside": (range(2700, 2712),),
 }
-PLANNED = {"clean": 80, "dirty": 120, "nothing": 160, "two": 6, "removed": 12, "others": 12, "outside": 12}
+LOOKED_AT = {21009}
+"""Nobody has looked at a case before the rules stood, but for this one, which changed them: it does not count."""
 FOLDER = Path("docs/blind")
 """Where the lines are kept."""
 
@@ -68,13 +69,12 @@ class Problem:
     setting: str
 
 
-def problem(family: str, number: int) -> Problem:
-    """Make the case of a family with a number."""
-    seed = FIRST_SEED[family] + number
+def problem(family: str, seed: int) -> Problem:
+    """Make the case of a family with a seed."""
     if family in {"others", "outside"}:
-        return _other(family, number)
+        return _other(family, seed)
     count = {"nothing": 0, "two": 2}.get(family, 1)
-    dirty = family == "dirty" or (family == "nothing" and number % 2 == 1)
+    dirty = family == "dirty" or (family == "nothing" and seed % 2 == 1)
     made = hide(seed, effects=count, dirty=dirty)
     hidden = tuple(each.name for each in made.truth.effect)
     library = [name for name in shipped_effects() if family != "removed" or name not in _same(hidden[0])]
@@ -84,12 +84,13 @@ def problem(family: str, number: int) -> Problem:
     return Problem(made.fit, made.test, made.base, library, hidden, visible, floor_m["fit"], floor_m["test"], setting)
 
 
-def _other(family: str, number: int) -> Problem:
+def _other(family: str, seed: int) -> Problem:
+    number = seed - SEEDS[family][0].start
     kinds = sorted(name for name, kind in KINDS.items() if (kind.in_library is not None) == (family == "others"))
     kinds = [name for name in kinds if name not in {"nothing", "presliding"}]
     law = sorted(LAWS)[number % len(LAWS)]
     kind = kinds[number % len(kinds)]
-    made = case(kind, law=law, seed=FIRST_SEED[family] + number)
+    made = case(kind, law=law, seed=seed)
     return Problem(made.fit, made.test, made.base, shipped_effects(), (kind,), True, NOISE_M, NOISE_M, law)
 
 
@@ -98,15 +99,14 @@ def _same(name: str) -> frozenset[str]:
     return algebraic_class(name, library)
 
 
-def line(family: str, number: int) -> Line:
+def line(family: str, seed: int) -> Line:
     """Diagnose a case; return what is kept of it."""
-    posed = problem(family, number)
+    posed = problem(family, seed)
     began_s, cpu_s = time.perf_counter(), time.process_time()
     found = diagnose(posed.fit, posed.base, test=posed.test, effects=posed.library, workers=1)
     return {
         "family": family,
-        "number": number,
-        "seed": FIRST_SEED[family] + number,
+        "seed": seed,
         "setting": posed.setting,
         "hidden": list(posed.hidden),
         "visible": posed.visible and _missed_m(found, posed.fit_floor_m) > VISIBLE * posed.fit_floor_m,
@@ -159,7 +159,7 @@ def single(each: Line) -> bool:
 
 def report(lines: Sequence[Line]) -> Iterator[str]:
     """Yield the figures, family by family, and the confusion table."""
-    for family in PLANNED:
+    for family in SEEDS:
         chosen = [each for each in lines if each["family"] == family]
         if chosen:
             yield from _figures(family, chosen)
@@ -170,7 +170,9 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
 def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
     seeds = [each["seed"] for each in lines]
     seen = [each for each in lines if each["visible"]]
-    yield f"{family}: {len(lines)} cases, seeds {min(seeds)} to {max(seeds)}"
+    within = [[seed for seed in seeds if seed in each] for each in SEEDS[family]]
+    spans = " and ".join(f"{min(each)} to {max(each)}" for each in within if each)
+    yield f"{family}: {len(lines)} cases, seeds {spans}"
     yield f"  {'seconds of one core a case, median':<52}{np.median([each['cpu_seconds'] for each in lines]):.0f}"
     if family == "nothing":
         for setting in ("clean", "dirty"):
@@ -236,17 +238,16 @@ def kept(folder: Path) -> list[Line]:
 
 def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, int]]:
     """Return the planned cases that are not there, in turn through the families, so that all grow together."""
-    there = {(each["family"], each["number"]) for each in lines}
-    planned = [
-        ((number + 0.5) / PLANNED[family], family, number) for family in families for number in range(PLANNED[family])
-    ]
-    return [(family, number) for _, family, number in sorted(planned) if (family, number) not in there]
+    there = {each["seed"] for each in lines} | LOOKED_AT
+    seeds = {family: [seed for each in SEEDS[family] for seed in each] for family in families}
+    planned = [((i + 0.5) / len(each), family, seed) for family, each in seeds.items() for i, seed in enumerate(each)]
+    return [(family, seed) for _, family, seed in sorted(planned) if seed not in there]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--family", nargs="*", choices=PLANNED, default=list(PLANNED), help="families to run (all)")
-    parser.add_argument("--cases", type=int, default=sum(PLANNED.values()), help="run at most so many now")
+    parser.add_argument("--family", nargs="*", choices=SEEDS, default=list(SEEDS), help="families to run (all)")
+    parser.add_argument("--cases", type=int, help="run at most so many now (all)")
     parser.add_argument("--out", type=Path, default=FOLDER, help="where a line a case is kept")
     parser.add_argument("--table", action="store_true", help="run nothing, print the tables")
     arguments = parser.parse_args()
@@ -266,7 +267,7 @@ def _told(each: Line) -> str:
     hidden = (", ".join(each["hidden"]) or "nothing") + ("" if each["visible"] else " (invisible)")
     sets = " + ".join("/".join(names) for names in each["sets"])
     return (
-        f"{each['family']} {each['number']} {hidden}: {each['verdict']} {sets}; "
+        f"{each['family']} {each['seed']} {hidden}: {each['verdict']} {sets}; "
         f"{1e3 * each['base_rmse_m']:.4f} to {1e3 * each['best_rmse_m']:.4f} mm, floor {1e3 * each['floor_m']:.4f}; "
         f"{each['cpu_seconds']:.0f} s of a core"
     )
