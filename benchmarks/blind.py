@@ -39,7 +39,7 @@ from workbench.trial import NOISE_M
 SEEDS: Mapping[str, tuple[range, ...]] = {
     "clean": (range(21000, 21072), range(31000, 31048)),
     "dirty": (range(32000, 32100),),
-    "nothing": (range(23000, 23120),),
+    "nothing": (range(23000, 23120), range(33000, 33030)),
     "two": (range(24000, 24006),),
     "removed": (range(25000, 25012),),
     "others": (range(2600, 2612),),
@@ -145,9 +145,13 @@ def named(each: Line, hidden: str) -> bool:
     return any(_same(hidden) & set(names) for names in each["sets"])
 
 
-def first(each: Line, hidden: str) -> bool:
-    """Whether it is the first one added, or in the set with that; where none was, suspected, or first by evidence."""
-    return bool(_same(hidden) & set((each["sets"] or [each.get("suspected") or each["ranked"][:1]])[0]))
+def first(each: Line) -> bool:
+    """Whether a hidden effect is the first added, or in its set; where none was added, suspected, or best by evidence.
+
+    That of a line kept before there were suspicions is the best by evidence.
+    """
+    said = set((each["sets"] or [each.get("suspected") or each["ranked"][:1]])[0])
+    return any(_same(hidden) & said for hidden in each["hidden"])
 
 
 def single(each: Line) -> bool:
@@ -189,16 +193,16 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         yield share("a wrong effect named as all there is", [each["verdict"] in {"missing", "one_of"} for each in seen])
         return
     bare = _bare()
-    known = [each for each in seen if not set(each["hidden"]) & bare]
-    same = [each for each in seen if set(each["hidden"]) & bare]
+    known = [each for each in seen if not set(each["hidden"]) <= bare]
+    same = [each for each in seen if set(each["hidden"]) <= bare]
     if same:
         yield share("the bare valve by another name: nothing named", [not each["missing"] for each in same])
-    yield share("true effect first, or in the set with it", [first(each, each["hidden"][0]) for each in known])
-    yield share("true effect named", [named(each, each["hidden"][0]) for each in known])
+    yield share("true effect first, or in the set with it", [first(each) for each in known])
+    yield share("true effect named", [any(named(each, name) for name in each["hidden"]) for each in known])
     if family == "two":
         yield share("both named", [all(named(each, name) for name in each["hidden"]) for each in known])
     ones = [each for each in known if single(each)]
-    yield share("one alone named: right", [first(each, each["hidden"][0]) for each in ones])
+    yield share("one alone named: right", [first(each) for each in ones])
     falls = [each["best_rmse_m"] / each["floor_m"] for each in known]
     if falls:
         middle, ninety = np.quantile(falls, [0.5, 0.9])

@@ -1,8 +1,12 @@
 """The model on its own through a whole record: it sees the command, never the measured position after the start.
 
-Each segment begins with the stem at rest where it is first measured, its first pressure long held; one that begins in
-motion begins with that velocity. The place is the median of the first still samples, corrected by what the sensor's
-effects make of it, so that the model indicates it.
+Each segment begins with the stem at rest where it is first measured; one that begins in motion begins with that
+velocity. The place is the median of the first still samples, corrected by what the sensor's effects make of it, so that
+the model indicates it. What was commanded before is not known. A pressure path that remembers it, a lag or a limited
+rate, begins with the pressure nearest to the first command of those that balance the forces:
+
+    at rest      |A p - k_s x| <= F_s
+    in motion    A p = k_s x + F_v v + F_c sign v
 
 Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
 of the measurements at its ends. A measured load acts as the pressure load / A besides.
@@ -43,7 +47,9 @@ LONGEST_START = 50
 """Samples of the start that are averaged at most."""
 SHORT = 4
 """Samples within which a stem that leaves its place is in motion from the start."""
-AREA = BASE.index("diaphragm_area_m2")
+AREA, SPRING, VISCOUS, COULOMB, STATIC = (
+    BASE.index(name) for name in ("diaphragm_area_m2", "spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,12 +114,22 @@ class FreeRun:
     def _begin(self, theta: Vector, begin: Start, time_s: float, pressure_pa: float) -> Vector:
         stem_m = begin.position_m
         for _ in range(3):
-            state = at_rest(self._composition, theta, time_s, stem_m, pressure_pa)
+            held_pa = balanced_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
+            state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
             stem_m += begin.position_m - read(state).indicated
         if begin.velocity_m_per_s:
             direction = float(np.sign(begin.velocity_m_per_s))
             write(state, read(state)._replace(v=begin.velocity_m_per_s, mode=SLIP, sigma=direction))
         return state
+
+
+def balanced_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
+    """Return the pressure nearest to a command with which the forces are in balance."""
+    middle_n = theta[SPRING] * position_m + theta[VISCOUS] * velocity_m_per_s
+    if velocity_m_per_s:
+        return float((middle_n + theta[COULOMB] * np.sign(velocity_m_per_s)) / theta[AREA])
+    least_pa, most_pa = ((middle_n + sign * theta[STATIC]) / theta[AREA] for sign in (-1.0, 1.0))
+    return float(min(max(command_pa, least_pa), most_pa))
 
 
 def start(record: Record, first: int, end: int) -> Start:
