@@ -37,16 +37,14 @@ from workbench.hiding import VISIBLE, hide
 from workbench.trial import NOISE_M
 
 SEEDS: Mapping[str, tuple[range, ...]] = {
-    "clean": (range(21000, 21072), range(31000, 31048)),
-    "dirty": (range(32000, 32100),),
-    "nothing": (range(23000, 23120), range(33000, 33030)),
+    "clean": (range(34000, 34080),),
+    "dirty": (range(35000, 35120),),
+    "nothing": (range(23000, 23120), range(33000, 33040)),
     "two": (range(24000, 24006),),
     "removed": (range(25000, 25012),),
     "others": (range(2600, 2612),),
     "outside": (range(2700, 2712),),
 }
-LOOKED_AT = {21009}
-"""Nobody has looked at a case before the rules stood, but for this one, which changed them: it does not count."""
 FOLDER = Path("docs/blind")
 """Where the lines are kept."""
 
@@ -242,7 +240,7 @@ def kept(folder: Path) -> list[Line]:
 
 def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, int]]:
     """Return the planned cases that are not there, in turn through the families, so that all grow together."""
-    there = {each["seed"] for each in lines} | LOOKED_AT
+    there = {each["seed"] for each in lines}
     seeds = {family: [seed for each in SEEDS[family] for seed in each] for family in families}
     planned = [((i + 0.5) / len(each), family, seed) for family, each in seeds.items() for i, seed in enumerate(each)]
     return [(family, seed) for _, family, seed in sorted(planned) if seed not in there]
