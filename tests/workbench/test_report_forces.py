@@ -69,6 +69,7 @@ def test_friction_and_what_is_left_of_it_are_drawn(page: Page, diagnosed: ForceD
     assert level_n == pytest.approx(60.0 + 1e-4 * float(np.median(diagnosed.rows.pressure_pa)), rel=0.1)
     before, after = page.figures["plot-over-pressure"]["data"]
     assert max(np.abs(before["y"])) > 4.0 * max(np.abs(after["y"]))
+    assert before["y"][-1] > 4.0 > -1.0 > before["y"][0], "the stem resists the more, the higher the pressure"
 
 
 def test_what_is_balanced_is_the_load_of_a_bench(diagnosed: ForceDiagnosis) -> None:
