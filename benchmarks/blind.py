@@ -45,6 +45,8 @@ SEEDS: Mapping[str, tuple[range, ...]] = {
     "others": (range(2600, 2612),),
     "outside": (range(2700, 2712),),
 }
+APART = 100
+"""Seeds farther from each other are told as another span."""
 FOLDER = Path("docs/blind")
 """Where the lines are kept."""
 
@@ -172,9 +174,7 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
 def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
     seeds = [each["seed"] for each in lines]
     seen = [each for each in lines if each["visible"]]
-    within = [[seed for seed in seeds if seed in each] for each in SEEDS[family]]
-    spans = " and ".join(f"{min(each)} to {max(each)}" for each in within if each)
-    yield f"{family}: {len(lines)} cases, seeds {spans}"
+    yield f"{family}: {len(lines)} cases, seeds {_spans(sorted(seeds))}"
     yield f"  {'seconds of one core a case, median':<52}{np.median([each['cpu_seconds'] for each in lines]):.0f}"
     if family == "nothing":
         for setting in ("clean", "dirty"):
@@ -207,6 +207,12 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         yield f"  {'held-out error over the floor: median, 90 %':<52}{middle:.2f}, {ninety:.2f}"
     for verdict, count in sorted(Counter(each["verdict"] for each in known).items()):
         yield f"  {'verdict ' + verdict:<52}{count}"
+
+
+def _spans(seeds: Sequence[int]) -> str:
+    begins = [seed for i, seed in enumerate(seeds) if not i or seed - seeds[i - 1] > APART]
+    ends = [seed for i, seed in enumerate(seeds) if i + 1 == len(seeds) or seeds[i + 1] - seed > APART]
+    return " and ".join(f"{begin} to {end}" for begin, end in zip(begins, ends, strict=True))
 
 
 def _bare() -> frozenset[str]:
