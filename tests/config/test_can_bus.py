@@ -92,6 +92,7 @@ def test_a_newcomer_is_heard_at_once_and_one_who_left_is_forgotten(join: Join) -
 def test_nothing_is_lost_in_a_burst_of_all_to_all(join: Join, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(can_bus, "DEAF_S", 5.0)  # six threads of one interpreter may keep a reader waiting
     ends = [join() for _ in range(3)]
+    assert [end.recv(0.0) for end in ends] == [None] * 3, "each has taken the others' hellos, and knows them"
     seen: dict[int, list[int]] = {}
     readers = [Thread(target=lambda e=end: seen.update({e.port: received(e, 2 * BURST)})) for end in ends]
     senders = [Thread(target=burst, args=(end, BURST)) for end in ends]
