@@ -28,6 +28,8 @@ BASE = (
     "stribeck_velocity_m_per_s",
     "deadzone_ratio",
 )
+MASS, AREA, SPRING, VISCOUS, COULOMB, STATIC, STRIBECK, DEADZONE = range(len(BASE))
+"""Where they stand in theta."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -350,13 +350,13 @@ class _Search:
 
     def _renamed(self, candidates: Sequence[Candidate], explained: bool) -> Candidate | None:
         """Return the best that would be accepted but that it is the bare valve by another name, if there is one."""
-        passing = [each for each in candidates if each.physical and each.gain and not each.gain.short(explained)]
+        passing = _passing(candidates, explained)
         return max((each for each in passing if bare_parameter(each.name, self._library)), key=_evidence, default=None)
 
     def _suspect(self, candidates: Sequence[Candidate]) -> Candidate | None:
         """Return what has the most evidence of all that would be accepted if more were left to explain."""
-        passing = (each for each in candidates if self._may_be_there(each) and each.gain and not each.gain.short(False))
-        return max(passing, key=_evidence, default=None)
+        passing = _passing(candidates, explained=False)
+        return max((each for each in passing if self._may_be_there(each)), key=_evidence, default=None)
 
     def _may_be_there(self, candidate: Candidate) -> bool:
         """Whether an effect is physical, has evidence, and is not the bare valve by another name."""
@@ -399,6 +399,11 @@ def _better_than(renamed: Candidate, candidates: Sequence[Candidate]) -> tuple[C
     return tuple(
         replace(each, why_not=why_not) if each.accepted and _evidence(each) <= least else each for each in candidates
     )
+
+
+def _passing(candidates: Sequence[Candidate], explained: bool) -> list[Candidate]:
+    """Return the physical ones that pass the rule, as it is where something is left to explain, or nothing."""
+    return [each for each in candidates if each.physical and each.gain and not each.gain.short(explained)]
 
 
 def _evidence(candidate: Candidate) -> float:

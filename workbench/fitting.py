@@ -21,13 +21,13 @@ from config.errors import InputError
 from config.loading import validated
 from config.recording import Column, Recording
 from config.valve import EffectTable, ValveFile, ValveParameters
-from sim.composition import BASE, Composition
+from sim.composition import BASE, COULOMB, STATIC, Composition
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 from workbench.free_run import FreeRun
 from workbench.measures import fit_percent
 from workbench.motion import slips
-from workbench.parameters import COULOMB, DEFAULT, STATIC, Parameter, free_parameters, strengths
+from workbench.parameters import DEFAULT, Parameter, free_parameters, strengths
 from workbench.record import Record, ready, require_fittable, require_units
 from workbench.simulation_error import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
 from workbench.starts import drawn, forces_regressed, values_seen, with_plays

@@ -19,7 +19,7 @@ import numpy as np
 from config.errors import InputError
 from config.recording import Column
 from config.valve import EffectTable, ValveFile
-from sim.composition import BASE, Composition
+from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from sim.karnopp import SLIP, Vector, read, write
 from sim.open_loop import at_rest, follow
 from workbench.record import Record
@@ -47,9 +47,6 @@ LONGEST_START = 50
 """Samples of the start that are averaged at most."""
 SHORT = 4
 """Samples within which a stem that leaves its place is in motion from the start."""
-AREA, SPRING, VISCOUS, COULOMB, STATIC = (
-    BASE.index(name) for name in ("diaphragm_area_m2", "spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
-)
 
 
 @dataclass(frozen=True, slots=True)

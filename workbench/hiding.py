@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from config.recording import Recording
+from config.recording import Column, Recording
 from config.slave import Sensor
 from config.valve import EffectTable, ValveFile, ValveParameters, find_valve, load_valve
 from sim.composition import Composition
@@ -63,11 +63,10 @@ def hide(
     drawn = drawn_effects(for_effects, effects)
     count = round(duration_s / period_s) + 1
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
-    truth = _strong(drawn, valve, known, for_effects)
-    while not _moves(trials, truth):
-        truth = _strong(drawn, valve, known, for_effects)
+    truth, answers = _moving(trials, drawn, valve, known, for_effects)
     fit, test = (
-        _recorded(trial, truth, dirty, generator) for trial, generator in zip(trials, (for_fit, for_test), strict=True)
+        _recorded(trial, truth, clean_m, dirty, generator)
+        for trial, clean_m, generator in zip(trials, answers, (for_fit, for_test), strict=True)
     )
     answer = {
         "salt": for_salt.bytes(16).hex(),
@@ -81,23 +80,24 @@ def hide(
     return Hidden(ValveFile(valve=known), fit[0], test[0], truth, answer)
 
 
-def _strong(drawn: Sequence[Effect], valve: ValveParameters, known: ValveParameters, generator: Draw) -> ValveFile:
-    return ValveFile(valve=valve, effect=tuple(strength(each, valve, known, generator) for each in drawn))
+def _moving(
+    trials: Sequence[Trial], drawn: Sequence[Effect], valve: ValveParameters, known: ValveParameters, generator: Draw
+) -> tuple[ValveFile, list[Column]]:
+    """Draw strengths until the stem moves in every trial; return the valve, and what it answers when clean, m."""
+    while True:
+        truth = ValveFile(valve=valve, effect=tuple(strength(each, valve, known, generator) for each in drawn))
+        composition = Composition.from_file(truth)
+        answers = [trial.answer_m(composition, composition.theta) for trial in trials]
+        if all(np.ptp(each) > LEAST_TRAVEL * valve.stroke_m for each in answers):
+            return truth, answers
 
 
-def _moves(trials: Sequence[Trial], truth: ValveFile) -> bool:
-    composition = Composition.from_file(truth)
-    answers = (trial.answer_m(composition, composition.theta) for trial in trials)
-    return all(np.ptp(each) > LEAST_TRAVEL * truth.valve.stroke_m for each in answers)
-
-
-def _recorded(trial: Trial, truth: ValveFile, dirty: bool, generator: Draw) -> tuple[Recording, float]:
+def _recorded(trial: Trial, truth: ValveFile, clean_m: Column, dirty: bool, generator: Draw) -> tuple[Recording, float]:
     """Return the recording and its floor, m."""
-    composition = Composition.from_file(truth)
-    clean_m = trial.answer_m(composition, composition.theta)
     quantum_m = truth.valve.stroke_m / LEVELS if dirty else 0.0
     sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
-    recording = trial.recording(trial.soiled_m(composition, generator) if dirty else clean_m, sensor)
+    answer_m = trial.soiled_m(Composition.from_file(truth), generator) if dirty else clean_m
+    recording = trial.recording(answer_m, sensor)
     return recording, float(np.sqrt(np.mean((recording.position_m - clean_m) ** 2)))
 
 

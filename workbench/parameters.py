@@ -13,7 +13,7 @@ from math import asinh, exp, log, sinh
 import numpy as np
 
 from config.errors import InputError
-from sim.composition import BASE, Composition
+from sim.composition import BASE, COULOMB, STATIC, Composition
 from sim.effect import Seen
 from sim.karnopp import Vector
 
@@ -24,7 +24,6 @@ FACTOR = 50.0
 MOST_STATIC = 5.0
 """F_s / F_c at most."""
 MOST_GRID = 48
-COULOMB, STATIC = BASE.index("coulomb_n"), BASE.index("static_n")
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,15 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from config.recording import Column
-from sim.composition import BASE
+from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.motion import directions, velocity_m_per_s
 from workbench.parameters import Parameter
 from workbench.record import Record
 
-AREA, SPRING, VISCOUS, COULOMB, STATIC = (
-    BASE.index(name) for name in ("diaphragm_area_m2", "spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
-)
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
 STATIC_RATIO = (0.0, 0.4)

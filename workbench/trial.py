@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from config.recording import Column, Recording
 from config.slave import Sensor
 from config.valve import ValveFile
-from sim.composition import BASE, Composition
+from sim.composition import COULOMB, SPRING, STATIC, VISCOUS, Composition
 from sim.karnopp import Vector, read
 from sim.open_loop import STEP_S, at_rest, follow
 from sim.sensor import Transmitter
@@ -34,9 +34,6 @@ COARSE_S = 1e-3
 """Step of the refit."""
 SCALES = ((100.0, 1e-3), (30.0, 3e-4), (5.0, 1e-4))
 """Of the soft-L1 loss, in standard deviations of the noise, and of the differences, as the cost is a staircase."""
-SPRING, VISCOUS, COULOMB, STATIC = (
-    BASE.index(name) for name in ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
-)
 MOST_STATIC = 1.6
 """log(F_s / F_c) at most."""
 

@@ -12,21 +12,13 @@ from config.valve import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import shipped_effect
 from sim.karnopp import Vector
-from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
+from tests.workbench.valves import SEED, drawn_valve, error_of, record_of, with_effect
 from workbench import fit
 from workbench.fitting import OF_BASE
-from workbench.free_run import FreeRun
-from workbench.measures import rms
 from workbench.parameters import free_parameters
-from workbench.record import ready
 from workbench.simulation_error import SimulationError
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
-
-
-def error_of(valve: ValveFile, recording: Recording) -> float:
-    composition = Composition.from_file(valve)
-    return rms(FreeRun(composition, ready(recording)).position_m(composition.theta) - recording.position_m)
 
 
 @pytest.mark.parametrize(("seed", "dirty"), [(2, False), (5, True)])

@@ -9,18 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.recording import Recording, read_recording
+from config.recording import read_recording
 from config.valve import ValveFile, find_valve, load_valve
 from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
+from tests.workbench.valves import error_of
 from workbench import trial
 from workbench.excitation import FIRST, excitation
-from workbench.free_run import FreeRun
 from workbench.hiding import Hidden, drawn_effects, drawn_valve, hide, known_valve, strength
 from workbench.motion import slips
 from workbench.noise import repeat_lag, repeatability_m
-from workbench.record import ready
 from workbench.sealing import FILES, SEALED, seal
 from workbench.trial import NOISE_M
 
@@ -294,16 +293,10 @@ def test_every_command_stays_in_reach_and_repeats() -> None:
         assert repeat_lag(command_pa) == 3001 - round(FIRST * 3001)
 
 
-def missed_m(recording: Recording, file: ValveFile) -> float:
-    composition = Composition.from_file(file)
-    run = FreeRun(composition, ready(recording)).position_m(composition.theta)
-    return float(np.sqrt(np.mean((run - recording.position_m) ** 2)))
-
-
 def test_the_truth_simulates_to_the_record(hidden: Hidden) -> None:
     """The truth, from the record's own first position, stays at the noise; without its effect it does not."""
-    assert missed_m(hidden.fit, hidden.truth) < 1.1 * NOISE_M
-    assert missed_m(hidden.fit, hidden.truth.model_copy(update={"effect": ()})) > 1.3 * NOISE_M
+    assert error_of(hidden.truth, hidden.fit) < 1.1 * NOISE_M
+    assert error_of(hidden.truth.model_copy(update={"effect": ()}), hidden.fit) > 1.3 * NOISE_M
 
 
 @pytest.mark.parametrize(("seed", "effect"), [(21000, "rate_limit"), (21065, "ip_lag")])
@@ -311,4 +304,4 @@ def test_what_the_pressure_path_remembers_from_before_the_record_is_found_in_its
     """Both records begin in motion, with a pressure that is far from the first command."""
     hidden = hide(seed)
     assert [each.name for each in hidden.truth.effect] == [effect]
-    assert missed_m(hidden.fit, hidden.truth) < 1.1 * NOISE_M
+    assert error_of(hidden.truth, hidden.fit) < 1.1 * NOISE_M

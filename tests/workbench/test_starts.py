@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from config.recording import Recording
-from sim.composition import BASE, Composition
+from sim.composition import COULOMB, STATIC, Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench.parameters import free_parameters
 from workbench.record import ready
 from workbench.starts import quanta_seen_m, values_seen, with_plays
 
-COULOMB, STATIC = BASE.index("coulomb_n"), BASE.index("static_n")
 VALVE = drawn_valve(np.random.default_rng(0))
 STOPS = {"lower_m": 0.012, "travel_m": 0.06, "stiffness_n_per_m": 1e8, "damping_ns_per_m": 1e4}
 

@@ -6,6 +6,9 @@ from config.recording import Column, Recording
 from config.valve import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.open_loop import respond
+from workbench.free_run import FreeRun
+from workbench.measures import rms
+from workbench.record import ready
 
 SEED = load_valve(shipped_valve("seed"))
 NOISE_M = 5e-5
@@ -65,6 +68,12 @@ def record_of(file: ValveFile, seed: int, count: int = 3000, *, dirty: bool = Fa
         position = quantum * np.round(position / quantum)
     time_s: Column = np.asarray(PERIOD_S * np.arange(count), np.float64)
     return Recording({"time_s": time_s, "command_pa": command, "position_m": position})
+
+
+def error_of(file: ValveFile, recording: Recording) -> float:
+    """Return the rms error of a valve's free run, m."""
+    composition = Composition.from_file(file)
+    return rms(FreeRun(composition, ready(recording)).position_m(composition.theta) - recording.position_m)
 
 
 def _correlated(generator: np.random.Generator, count: int, std: float) -> Column:

@@ -16,7 +16,7 @@ from workbench.fitting import Fitted
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison import MEANINGS, WORDS, facts, overlaid, recording
-from workbench.report.effects import Race, added_effects, not_told_apart, outcome, tried_effects
+from workbench.report.effects import Race, added_effects, headline, not_told_apart, outcome, tried_effects
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
     Row,
@@ -37,13 +37,6 @@ from workbench.report.ranking import Tried
 from workbench.report.series import drawn, rounded
 from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
 
-VERDICTS = {
-    "adequate": ("good", "Nothing is missing that this recording could show."),
-    "missing": ("good", "The missing effect is found."),
-    "one_of": ("open", "It is one of several effects; this recording does not tell which."),
-    "unexplained": ("bad", "Something is missing that the library of effects does not have."),
-    "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
-}
 DIAGNOSIS_WORDS = {
     "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "
     "play in the linkage, a sensor's fault.",
@@ -118,11 +111,10 @@ def _facts(diagnosis: Diagnosis, seen: _Seen) -> str:
 
 
 def _verdict(diagnosis: Diagnosis, seen: _Seen) -> str:
-    kind, first = VERDICTS[diagnosis.verdict]
-    if diagnosis.verdict == "missing" and len(diagnosis.missing) > 1:
-        first = "The missing effects are found."
     return verdict(
-        kind, first, text(diagnosis.sentence, "Where the model failed before:"), bullets(seen.base.sentences)
+        *headline(diagnosis.verdict, diagnosis.missing),
+        text(diagnosis.sentence, "Where the model failed before:"),
+        bullets(seen.base.sentences),
     )
 
 

@@ -1,4 +1,4 @@
-"""What a report says of effects: the race they ran, what each added one is, which were not told apart."""
+"""What a report says of effects: the verdict, the race they ran, what each added one is, which were not told apart."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,13 @@ from workbench.report.page import Row, plot, preformatted, section, subheading, 
 from workbench.report.ranking import Tried
 from workbench.report.units import Quantity
 
+VERDICTS = {
+    "adequate": ("good", "Nothing is missing that this recording could show."),
+    "missing": ("good", "The missing effect is found."),
+    "one_of": ("open", "It is one of several effects; this recording does not tell which."),
+    "unexplained": ("bad", "Something is missing that the library of effects does not have."),
+    "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
+}
 KINDS = {"added": "good", "as good": "set"}
 """How a row is marked by what came of its effect."""
 
@@ -22,6 +29,13 @@ class Race:
     beside: tuple[str, ...]
     before: float
     tried: Sequence[Tried]
+
+
+def headline(verdict: str, missing: Sequence[str]) -> tuple[str, str]:
+    """Return how a verdict is marked, and its first words."""
+    if verdict == "missing" and len(missing) > 1:
+        return "good", "The missing effects are found."
+    return VERDICTS[verdict]
 
 
 def outcome(name: str, added: str, alike: Collection[str], *, refused: bool) -> str:

@@ -12,8 +12,9 @@ from workbench.force_diagnosis import ForceDiagnosis, ForceStep
 from workbench.imposed import Rows
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
-from workbench.report.diagnosis import DIAGNOSIS_WORDS, VERDICTS
-from workbench.report.effects import Race, added_effects, not_told_apart, outcome, tried_effects
+from workbench.report.comparison import WORDS
+from workbench.report.diagnosis import DIAGNOSIS_WORDS
+from workbench.report.effects import Race, added_effects, headline, not_told_apart, outcome, tried_effects
 from workbench.report.page import (
     Row,
     Subject,
@@ -37,6 +38,7 @@ from workbench.residuals import BINS, FEWEST, Profile, profile
 DRAWN = 6_000
 """Rows drawn at most."""
 FEW = 200
+"""Rows below which a dot is drawn large."""
 BALANCE = {
     "constant_n": "constant force: preload, weight, offsets",
     "coulomb_n": "sliding (Coulomb) friction",
@@ -45,7 +47,7 @@ BALANCE = {
 FORCE_WORDS = {
     "Balance": "While the stem moves, the force that is measured equals spring, friction and the pressure's share. "
     "What the balance leaves over is its error.",
-    "rms": "Root of the mean square: the usual size of the error, in which large errors weigh more.",
+    "rms": WORDS["rms"],
     "Floor": "How well strokes over the same place, the same way, repeat each other: no balance does better.",
     **{word: DIAGNOSIS_WORDS[word] for word in ("Effect", "Fitted, held out", "Evidence")},
     "Std": "Standard deviation of a parameter over fits that each leave a part of the data out.",
@@ -69,7 +71,7 @@ def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: Subject) -> No
         title,
         [
             heading(title, subject, _facts(diagnosis.rows)),
-            verdict(*_first(diagnosis), text(diagnosis.sentence)),
+            verdict(*headline(diagnosis.verdict, diagnosis.missing), text(diagnosis.sentence)),
             _key_figures(diagnosis),
             _fall(diagnosis),
             _friction(diagnosis, balanced_n(diagnosis.rows, subject.valve.valve)),
@@ -84,11 +86,6 @@ def report_forces(diagnosis: ForceDiagnosis, path: Path, subject: Subject) -> No
 
 
 ALL_TAKEN = "nothing in them had to be left out"
-
-
-def _first(diagnosis: ForceDiagnosis) -> tuple[str, str]:
-    kind, first = VERDICTS[diagnosis.verdict]
-    return kind, first if len(diagnosis.missing) < 2 else first.replace("effect is", "effects are")
 
 
 def _facts(rows: Rows) -> str:
