@@ -25,7 +25,7 @@ LEAST_BIC = 10.0
 LEAST_GAIN = 0.05
 LEAST_STANDARD_ERRORS, WHERE_EXPLAINED = 2.0, 3.0
 """More where nothing is left to explain: of twenty candidates one falls by two deviations by pure chance."""
-ALIKE_STANDARD_ERRORS = 1.0
+ALIKE_STANDARD_ERRORS = 2.0
 ALIKE_GAIN = 0.02
 AT_FLOOR, RARELY_OFF = 1.25, 1.75
 """A model reaches the floor if its block error, and its plain error where it was fitted, are within these of it."""
@@ -163,7 +163,7 @@ def fall(before: Column, after: Column) -> tuple[float, float]:
 
 
 def alike(best: Errors, other: Errors) -> bool:
-    """Whether the block errors, fitted and held out, do not tell two apart: within 1 standard error or 2 %."""
+    """Whether the block errors, fitted and held out, do not tell two apart: within 2 standard errors or 2 %."""
     less, standard_errors = fall(other.all_logs, best.all_logs)
     return less < ALIKE_GAIN or standard_errors < ALIKE_STANDARD_ERRORS
 

@@ -2,7 +2,10 @@
 
 `simulation_error` has the cost and its search, `starts` where searches begin, `parameters` the coordinates,
 `uncertainty` what the recording says about the result. Effects to be added begin on a grid of strengths at the best
-base fits, and at no strength, so that the extended valve is never worse than the base it extends.
+base fits, and at no strength, so that the extended valve is never worse than the base it extends. What the base took
+for the effect must go with it:
+
+    z_b(q) = z_b - J^+ r(q)      base parameters for a strength q of the effect: J = dr/dz_b without it, r with it
 
 Several searches are made, and how far their results agree is told. The result does not depend on the number of
 workers, which are threads: the simulation holds no interpreter lock.
@@ -29,7 +32,7 @@ from workbench.measures import fit_percent
 from workbench.motion import slips
 from workbench.parameters import DEFAULT, Parameter, free_parameters, strengths
 from workbench.record import Record, ready, require_fittable, require_units
-from workbench.simulation_error import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
+from workbench.simulation_error import FINAL, LAST, LONGEST_MOVE, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
 from workbench.starts import drawn, forces_regressed, values_seen, with_plays
 from workbench.uncertainty import Uncertainty, uncertainty
 
@@ -48,14 +51,14 @@ class Effort:
     """until so many have come to the same."""
 
 
-OF_BASE, OF_EFFECT = Effort(16, 8, 6, 3), Effort(14, 4, 3, 2)
+OF_BASE, OF_EFFECT = Effort(16, 8, 6, 3), Effort(18, 4, 3, 2)
 EXCESSES = (1.0, 0.5, 0.1)
 """Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
 ELSEWHERE = 0.01
 """Of a log-parameter: searches that end nearer to each other have found the same place."""
 DRAWS_REGRESSED, DRAWS_FILE, DRAWS_EFFECT = 40, 12, 150
-EACH_SEEDS = 2
-"""Strengths begun at each base fit; the other searches begin at draws."""
+EACH_SEEDS, COMPENSATED = 2, 5
+"""Strengths begun at each base fit, and with base parameters that make up for them; other searches begin at draws."""
 AGREE = 1.01
 """Searches agree if their costs are within this factor of the best."""
 FLAT = 0.5
@@ -273,10 +276,31 @@ def _effect_starts(composition: Composition, error: SimulationError, effects: Se
         for theta in seeds
     ]
     chosen = [z for grid in grids for z in _screened(error, grid, EACH_SEEDS)]
+    strong = [_with(error, seeds[0], added, values) for values in points]
+    chosen += _screened(error, _compensated(error, switched_off, strong), COMPENSATED)
     for band in with_plays(seeds[0], added):
         chosen += _screened(error, map(error.coordinates, band), 1)
     between = _between(error, seeds[0], added)
     return [weakest, *chosen, *_screened(error, between, OF_EFFECT.starts - len(chosen))]
+
+
+def _compensated(error: SimulationError, base: Vector, grid: Sequence[Vector]) -> list[Vector]:
+    """Return the strengths with the base's parameters moved by one Gauss-Newton step to make up for each.
+
+    Static friction stays: its derivatives are a staircase's, a slip more or less.
+    """
+    rough = error.rough
+    own = [i for i, each in enumerate(error.parameters) if each.index < len(BASE) and each.index != STATIC]
+    J = rough.jacobian(base, rough.residuals(base), WIDE.difference)[:, own]
+    compensated = []
+    for z in grid:
+        residuals = rough.residuals(z)
+        weights = (1.0 + (residuals / WIDE.scale) ** 2) ** -0.25
+        move = np.linalg.lstsq(weights[:, None] * J, -weights * residuals)[0]
+        there = z.copy()
+        there[own] += np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
+        compensated.append(np.clip(there, error.lower, error.upper))
+    return compensated
 
 
 def _between(error: SimulationError, theta: Vector, added: Sequence[Parameter]) -> list[Vector]:
