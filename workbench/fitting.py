@@ -1,17 +1,13 @@
 """Fit: the parameters with which one free run through the whole recording comes closest.
 
 `simulation_error` has the cost and its search, `starts` where searches begin, `parameters` the coordinates,
-`uncertainty` what the recording says about the result. Effects to be added begin on a grid of strengths at the best
-base fits, and at no strength, so that the extended valve is never worse than the base it extends. What the base took
-for the effect must go with it:
-
-    z_b(q) = z_b - J^+ r(q)      base parameters for a strength q of the effect: J = dr/dz_b without it, r with it
+`uncertainty` what the recording says about the result.
 
 Several searches are made, and how far their results agree is told. The result does not depend on the number of
 workers, which are threads: the simulation holds no interpreter lock.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -24,16 +20,16 @@ from config.errors import InputError
 from config.loading import validated
 from config.recording import Column, Recording
 from config.valve import EffectTable, ValveFile, ValveParameters
-from sim.composition import BASE, COULOMB, STATIC, Composition
+from sim.composition import BASE, STATIC, Composition
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 from workbench.free_run import FreeRun
 from workbench.measures import fit_percent
 from workbench.motion import slips
-from workbench.parameters import DEFAULT, Parameter, free_parameters, strengths
+from workbench.parameters import DEFAULT, free_parameters
 from workbench.record import Record, ready, require_fittable, require_units
-from workbench.simulation_error import FINAL, LAST, LONGEST_MOVE, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
-from workbench.starts import drawn, forces_regressed, values_seen, with_plays
+from workbench.simulation_error import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
+from workbench.starts import base_starts, effect_starts, forces_regressed
 from workbench.uncertainty import Uncertainty, uncertainty
 
 
@@ -52,13 +48,8 @@ class Effort:
 
 
 OF_BASE, OF_EFFECT = Effort(16, 8, 6, 3), Effort(18, 4, 3, 2)
-EXCESSES = (1.0, 0.5, 0.1)
-"""Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
 ELSEWHERE = 0.01
 """Of a log-parameter: searches that end nearer to each other have found the same place."""
-DRAWS_REGRESSED, DRAWS_FILE, DRAWS_EFFECT = 40, 12, 150
-EACH_SEEDS, COMPENSATED = 2, 5
-"""Strengths begun at each base fit, and with base parameters that make up for them; other searches begin at draws."""
 AGREE = 1.01
 """Searches agree if their costs are within this factor of the best."""
 FLAT = 0.5
@@ -177,13 +168,17 @@ def fit(
     if not effects:
         composition = Composition.from_file(valve)
         error = _error(composition, record, free, from_pressure)
-        origins = _origins(composition, error)
-        found = _searched(composition, error, _base_starts(error, origins, seed), OF_BASE, profile, workers, progress)
+        origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
+        begins = base_starts(error, origins, seed, OF_BASE.starts)
+        found = _searched(composition, error, begins, OF_BASE, profile, workers, progress)
         return replace(found, seeds=(*found.seeds, *origins))
     ground = base or fit(recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free))
     composition = _extended(ground.valve, effects)
     error = _error(composition, record, free, from_pressure)
-    begins = _effect_starts(composition, error, effects, ground)
+    names = {find_effect(name, "effects").name for name in effects}
+    added = [each for each in error.parameters if each.name.partition(".")[0] in names]
+    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in ground.seeds]
+    begins = effect_starts(error, added, seeds, OF_EFFECT.starts)
     return _searched(composition, error, begins, OF_EFFECT, profile, workers, progress)
 
 
@@ -248,100 +243,6 @@ def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTa
     return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
 
 
-def _origins(composition: Composition, error: SimulationError) -> tuple[Vector, Vector]:
-    """Return the parameter vectors where all begins: the valve file's and the regression's."""
-    theta = composition.theta
-    return theta, forces_regressed(theta, error.run.record, error.run.from_pressure)
-
-
-def _base_starts(error: SimulationError, origins: tuple[Vector, Vector], seed: int) -> list[Vector]:
-    """Return coordinates: the origins and draws round both, the best by the screening cost."""
-    generator = np.random.default_rng(seed)
-    theta, regressed = origins
-    pool = [theta, regressed, *drawn(regressed, DRAWS_REGRESSED, generator), *drawn(theta, DRAWS_FILE, generator)]
-    return _screened(error, [error.coordinates(each) for each in pool], OF_BASE.starts)
-
-
-def _effect_starts(composition: Composition, error: SimulationError, effects: Sequence[str], base: Fit) -> list[Vector]:
-    """Return coordinates: the base as it is, and at each of its seeds the best strengths by the screening cost."""
-    names = {find_effect(name, "effects").name for name in effects}
-    added = [each for each in error.parameters if each.name.partition(".")[0] in names]
-    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
-    ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
-    switched_off = error.coordinates(seeds[0])
-    weakest = min((switched_off, *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost)
-    points = [*strengths(added), *values_seen(added, error.run.record)]
-    grids = [
-        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
-        for theta in seeds
-    ]
-    chosen = [z for grid in grids for z in _screened(error, grid, EACH_SEEDS)]
-    strong = [_with(error, seeds[0], added, values) for values in points]
-    chosen += _screened(error, _compensated(error, switched_off, strong), COMPENSATED)
-    for band in with_plays(seeds[0], added):
-        chosen += _screened(error, map(error.coordinates, band), 1)
-    between = _between(error, seeds[0], added)
-    return [weakest, *chosen, *_screened(error, between, OF_EFFECT.starts - len(chosen))]
-
-
-def _compensated(error: SimulationError, base: Vector, grid: Sequence[Vector]) -> list[Vector]:
-    """Return the strengths with the base's parameters moved by one Gauss-Newton step to make up for each.
-
-    Static friction stays: its derivatives are a staircase's, a slip more or less.
-    """
-    rough = error.rough
-    own = [i for i, each in enumerate(error.parameters) if each.index < len(BASE) and each.index != STATIC]
-    J = rough.jacobian(base, rough.residuals(base), WIDE.difference)[:, own]
-    compensated = []
-    for z in grid:
-        residuals = rough.residuals(z)
-        weights = (1.0 + (residuals / WIDE.scale) ** 2) ** -0.25
-        move = np.linalg.lstsq(weights[:, None] * J, -weights * residuals)[0]
-        there = z.copy()
-        there[own] += np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
-        compensated.append(np.clip(there, error.lower, error.upper))
-    return compensated
-
-
-def _between(error: SimulationError, theta: Vector, added: Sequence[Parameter]) -> list[Vector]:
-    """Return draws between an effect's outermost strengths, with any part of the static friction."""
-    generator = np.random.default_rng(0)
-    corners = [error.coordinates(each) for each in (_sticking(theta, 0.0), theta)]
-    pool = []
-    for _ in range(DRAWS_EFFECT):
-        z = corners[0] + generator.uniform() * (corners[1] - corners[0])
-        for i, parameter in enumerate(error.parameters):
-            if parameter in added:
-                low, high = (_coordinate(parameter, theta, end(parameter.starts)) for end in (min, max))
-                z[i] = generator.uniform(low, high)
-        pool.append(z)
-    return pool
-
-
-def _coordinate(parameter: Parameter, theta: Vector, value: float) -> float:
-    changed = theta.copy()
-    changed[parameter.index] = value
-    return parameter.coordinate(changed)
-
-
-def _sticking(theta: Vector, part: float) -> Vector:
-    """Leave only a part of what static friction has above Coulomb's."""
-    changed = theta.copy()
-    changed[STATIC] = theta[COULOMB] + part * (theta[STATIC] - theta[COULOMB])
-    return changed
-
-
-def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
-    changed = theta.copy()
-    for parameter, value in zip(added, values, strict=True):
-        changed[parameter.index] = value
-    return error.coordinates(changed)
-
-
-def _screened(error: SimulationError, pool: Iterable[Vector], count: int) -> list[Vector]:
-    return sorted(pool, key=lambda z: error.rough.cost(z, MIDDLE.scale))[:count]
-
-
 def _searched(
     composition: Composition,
     error: SimulationError,
@@ -359,7 +260,7 @@ def _searched(
     narrow = partial(error.descended_at, NARROW)
 
     begun = _each(wide, begins, workers, lambda done: tell(0.3 * done))
-    carried = _each(middle, _screened(error, begun, effort.carried), workers, lambda done: tell(0.3 + 0.1 * done))
+    carried = _each(middle, error.screened(begun, effort.carried), workers, lambda done: tell(0.3 + 0.1 * done))
     carried = _polled(error.rough, carried, STRIDES, MIDDLE.scale, workers, lambda done: tell(0.4 + 0.1 * done))
     # The first start as it is stays in the race: descent at a wide scale may lose it.
     down = _each(narrow, [*carried, begins[0]], workers, lambda done: tell(0.5 + 0.2 * done))

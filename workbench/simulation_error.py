@@ -9,7 +9,7 @@ ends the search where derivatives see no further.
 The wide scales do with a simulation of longer steps (`rough`); what is compared in the end is always the fine one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -112,6 +112,10 @@ class SimulationError:
         """Whether two places fit equally well: their costs differ by less than one unit of BIC, n log(C_1 / C_2)."""
         costs = self.cost(z, scale), self.cost(other, scale)
         return self.count * (max(costs) - min(costs)) < max(costs)
+
+    def screened(self, pool: Iterable[Vector], count: int) -> list[Vector]:
+        """Return the best of a pool, by the middling scale's cost of the rough simulation."""
+        return sorted(pool, key=lambda z: self.rough.cost(z, MIDDLE.scale))[:count]
 
     def rms_m(self, z: Vector) -> float:
         """Return the plain rms error, m."""

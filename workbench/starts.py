@@ -1,36 +1,137 @@
-"""Where a search begins: the valve file's values, a regression of forces over the moving samples, and draws round both.
+"""Where searches begin: for the bare valve, and with an effect added.
 
-A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected
+The bare valve begins at the valve file's values, at a regression of forces over the moving samples, and at draws round
+both. An effect begins at no strength, so that the extended valve is never worse than the base it extends, and on a grid
+of strengths at the best base fits; what the record's positions suggest is in `seen`.
+
+    A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected
+    z_b(q) = z_b - J^+ r(q)                       base parameters for a strength q of the effect, which must make up for
+                                                  it: J = dr/dz_b without the effect, r with it
 """
 
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from config.recording import Column
-from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS
+from sim.composition import AREA, BASE, COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.motion import directions, velocity_m_per_s
-from workbench.parameters import Parameter
+from workbench.parameters import Parameter, strengths
 from workbench.record import Record
+from workbench.seen import values_seen
+from workbench.simulation_error import LONGEST_MOVE, WIDE, SimulationError
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
 STATIC_RATIO = (0.0, 0.4)
 """Range of the draws of log(F_s / F_c)."""
+DRAWS_REGRESSED, DRAWS_FILE, DRAWS_EFFECT = 40, 12, 150
 ENOUGH_MOVING = 20
+EXCESSES = (1.0, 0.5, 0.1)
+"""Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
+EACH_SEEDS, COMPENSATED = 2, 5
+"""Strengths begun at each base fit, and with base parameters that make up for them; other searches begin at draws."""
 PLAY = "backlash.width_m"
 NARROWEST, WIDEST, PLAYS = 6e-3, 0.9, 5
 """Of the dead band 2 F_c / k_s, beyond which a play leaves no friction; widths in each of three bands."""
 STATIC_SHIFTS = (1.0, 0.0, -1.0)
-ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
-"""Quantiles of the positions at their ends; how far inside these, in noises; how far outside, of what is swept."""
-LEAST_REST, FEWEST_RESTS = 8, 6
-LIKELY_QUANTA = 8
-FINEST, COARSEST = 3.0, 8.0
-"""A quantum is sought from so many noises to the swept positions divided by so many."""
-PER_LOBE = 8.0
+
+
+def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, count: int) -> list[Vector]:
+    """Return coordinates: of the origins and draws round both the best by the screening cost.
+
+    Args:
+        error: by whose screening cost they are compared.
+        origins: theta of the valve file, and that of the regression.
+        seed: of the draws.
+        count: how many.
+    """
+    generator = np.random.default_rng(seed)
+    theta, regressed = origins
+    pool = [theta, regressed, *drawn(regressed, DRAWS_REGRESSED, generator), *drawn(theta, DRAWS_FILE, generator)]
+    return error.screened(map(error.coordinates, pool), count)
+
+
+def effect_starts(
+    error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector], count: int
+) -> list[Vector]:
+    """Return coordinates: the base as it is, and at each of its seeds the best strengths by the screening cost.
+
+    Args:
+        error: by whose screening cost they are compared.
+        added: the parameters of the effects to be added.
+        seeds: theta of base fits, the best first, with the effects switched off.
+        count: how many but for the base as it is.
+    """
+    ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
+    switched_off = error.coordinates(seeds[0])
+    weakest = min((switched_off, *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost)
+    points = [*strengths(added), *values_seen(added, error.run.record)]
+    grids = [
+        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
+        for theta in seeds
+    ]
+    chosen = [z for grid in grids for z in error.screened(grid, EACH_SEEDS)]
+    strong = [_with(error, seeds[0], added, values) for values in points]
+    chosen += error.screened(_compensated(error, switched_off, strong), COMPENSATED)
+    for band in with_plays(seeds[0], added):
+        chosen += error.screened(map(error.coordinates, band), 1)
+    between = _between(error, seeds[0], added)
+    return [weakest, *chosen, *error.screened(between, count - len(chosen))]
+
+
+def _compensated(error: SimulationError, base: Vector, grid: Sequence[Vector]) -> list[Vector]:
+    """Return the strengths with the base's parameters moved by one Gauss-Newton step to make up for each.
+
+    Static friction stays: its derivatives are a staircase's, a slip more or less.
+    """
+    rough = error.rough
+    own = [i for i, each in enumerate(error.parameters) if each.index < len(BASE) and each.index != STATIC]
+    J = rough.jacobian(base, rough.residuals(base), WIDE.difference)[:, own]
+    compensated = []
+    for z in grid:
+        residuals = rough.residuals(z)
+        weights = (1.0 + (residuals / WIDE.scale) ** 2) ** -0.25
+        move = np.linalg.lstsq(weights[:, None] * J, -weights * residuals)[0]
+        there = z.copy()
+        there[own] += np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
+        compensated.append(np.clip(there, error.lower, error.upper))
+    return compensated
+
+
+def _between(error: SimulationError, theta: Vector, added: Sequence[Parameter]) -> list[Vector]:
+    """Return draws between an effect's outermost strengths, with any part of the static friction."""
+    generator = np.random.default_rng(0)
+    corners = [error.coordinates(each) for each in (_sticking(theta, 0.0), theta)]
+    pool = []
+    for _ in range(DRAWS_EFFECT):
+        z = corners[0] + generator.uniform() * (corners[1] - corners[0])
+        for i, parameter in enumerate(error.parameters):
+            if parameter in added:
+                low, high = (_coordinate(parameter, theta, end(parameter.starts)) for end in (min, max))
+                z[i] = generator.uniform(low, high)
+        pool.append(z)
+    return pool
+
+
+def _coordinate(parameter: Parameter, theta: Vector, value: float) -> float:
+    changed = theta.copy()
+    changed[parameter.index] = value
+    return parameter.coordinate(changed)
+
+
+def _sticking(theta: Vector, part: float) -> Vector:
+    """Leave only a part of what static friction has above Coulomb's."""
+    changed = theta.copy()
+    changed[STATIC] = theta[COULOMB] + part * (theta[STATIC] - theta[COULOMB])
+    return changed
+
+
+def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
+    changed = theta.copy()
+    for parameter, value in zip(added, values, strict=True):
+        changed[parameter.index] = value
+    return error.coordinates(changed)
 
 
 def forces_regressed(theta: Vector, record: Record, from_pressure: bool) -> Vector:
@@ -87,62 +188,6 @@ def _with_play(theta: Vector, play: Parameter, width_m: float, part: float) -> V
     changed[COULOMB] -= shift_n
     changed[STATIC] += part * shift_n
     return changed
-
-
-def values_seen(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
-    """Return values of the parameters that the positions suggest, for an effect that declares what of them it may be.
-
-    Just inside their lowest or highest, or both; and the quanta to which they look rounded. Empty if none is declared.
-    """
-    kinds = {each.seen for each in added}
-    suggested: list[dict[str, float]] = []
-    if kinds & {"lowest", "swept"}:
-        suggested += _ends_seen(record.position_m[record.judged], record.noise_m)
-    if "quantum" in kinds:
-        suggested += [{"quantum": each} for each in quanta_seen_m(record)]
-    return [
-        tuple(seen.get(each.seen, each.starts[0] if each.starts else each.least) for each in added)
-        for seen in suggested
-    ]
-
-
-def _ends_seen(position_m: Column, noise_m: float) -> list[dict[str, float]]:
-    lowest, highest = np.quantile(position_m, ENDS).tolist()
-    aside = ASIDE * (highest - lowest)
-    return [
-        {"lowest": lowest + low, "swept": highest - high - (lowest + low)}
-        for inside in (inside * noise_m for inside in INSIDE)
-        for low, high in ((inside, inside), (inside, -aside), (-aside, inside))
-    ]
-
-
-def quanta_seen_m(record: Record) -> list[float]:
-    """Return the steps, m, of which the places of rest look most to be multiples, the likeliest first.
-
-    S(q) = |sum exp(2 pi i x_j / q)|, x_j mean position of the j-th rest: the noise is averaged away there.
-    """
-    places_m = _rests_m(record)
-    if places_m.size < FEWEST_RESTS:
-        return []
-    swept_m = float(np.ptp(places_m))
-    frequency = np.arange(COARSEST / swept_m, 1.0 / (FINEST * record.noise_m), 1.0 / (PER_LOBE * swept_m))
-    height = np.abs(np.exp(2j * np.pi * np.outer(frequency, places_m)).sum(axis=1))
-    peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]))
-    likeliest = peaks[np.argsort(-height[peaks])[:LIKELY_QUANTA]]
-    return [float(each) for each in 1.0 / frequency[likeliest]]
-
-
-def _rests_m(record: Record) -> Column:
-    """Return the mean position of each rest long enough."""
-    means = []
-    for first, end in record.segments:
-        position_m = np.where(record.judged, record.position_m, np.nan)[first:end]
-        way = directions(position_m, record.noise_m)
-        edges = [0, *(1 + np.flatnonzero(np.diff(way != 0))).tolist(), way.size]
-        for begin, over in pairwise(edges):
-            if way[begin] == 0 and over - begin >= LEAST_REST:
-                means.append(float(np.nanmean(position_m[begin:over])))
-    return np.array(means)
 
 
 def drawn(theta: Vector, count: int, generator: np.random.Generator) -> list[Vector]:

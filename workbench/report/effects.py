@@ -118,7 +118,7 @@ def not_told_apart(
     """Return the section of what could not be told apart; `otherwise` where the effects' files say nothing of it."""
     title = "What could not be told apart"
     if not sets:
-        nothing = "Nothing: no other accepted effect comes within reach of the one that was added."
+        nothing = "Nothing: no other effect comes within reach of the one that was added."
         return section("alike", title, text(nothing if missing else NO_QUESTION))
     library = {name: _effect(name) for name in tried}
     rows = [
@@ -132,7 +132,7 @@ def not_told_apart(
         title,
         text(
             f"These explain the recording equally well: {'; '.join(' or '.join(names) for names in sets)}. "
-            "One of each set was added to go on with; it is not proved."
+            "That is as far as it can tell. One of each set was added to go on with; it is not proved."
         ),
         table("table-alike", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
     )
