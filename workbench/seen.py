@@ -17,7 +17,7 @@ ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
 """Quantiles of the positions at their ends; how far inside these, in noises; how far outside, of what is swept."""
 LEAST_REST, FEWEST_RESTS = 8, 6
 LIKELY_QUANTA = 8
-FINEST, COARSEST = 3.0, 8.0
+FINEST, COARSEST = 2.0, 8.0
 """A quantum is sought from so many noises to the swept positions divided by so many."""
 PER_LOBE = 8.0
 

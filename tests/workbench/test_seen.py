@@ -19,7 +19,7 @@ def recorded(**effect: float | str) -> Recording:
     return record_of(with_effect(VALVE, name, **{key: float(value) for key, value in effect.items()}), 0)
 
 
-@pytest.mark.parametrize("quantum_m", [2e-4, 5e-4])
+@pytest.mark.parametrize("quantum_m", [1.4e-4, 2e-4, 5e-4])
 def test_a_quantum_of_a_few_noises_is_among_the_likely_ones(quantum_m: float) -> None:
     likely_m = quanta_seen_m(ready(recorded(name="quantisation", quantum_m=quantum_m)))
     assert min(abs(each / quantum_m - 1.0) for each in likely_m) < 2e-3
