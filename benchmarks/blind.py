@@ -184,7 +184,7 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
             honest = [each["verdict"] == "adequate" for each in lines if each["setting"] == setting]
             yield share(f"called adequate, {setting}", honest)
             hinted = [bool(each["suspected"]) for each in lines if each["setting"] == setting and "suspected" in each]
-            yield share(f"of these something suspected, {setting}", hinted)
+            yield share(f"something suspected, not proved, {setting}", hinted)
         return
     yield f"  {'visible':<52}{len(seen)} of {len(lines)}"
     if family in {"removed", "outside"}:

@@ -43,6 +43,8 @@ AT_END = 0.2
 BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
 
+SCATTERS = 3.0
+"""Times the noise: a valve that repeats itself no better scatters."""
 REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
 LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
@@ -206,7 +208,7 @@ class _Search:
         base, best = self._profiled(base), self._profiled(best)
         verdict = _verdict(best, steps)
         chosen = self._experiment(steps) if verdict == "one_of" else None
-        sentence = _sentence(verdict, best, steps, self._library, self._split.repeats)
+        sentence = _sentence(verdict, best, steps, self._library, self._split)
         return Diagnosis(verdict, base, best, suspects, steps, chosen, self._split, sentence)
 
     def _steps(self, base: Model) -> tuple[Step, ...]:
@@ -440,13 +442,11 @@ def _verdict(best: Model, steps: Sequence[Step]) -> Verdict:
     return "unexplained" if best.fit.trusted else "untrusted"
 
 
-def _sentence(
-    verdict: Verdict, best: Model, steps: Sequence[Step], library: Mapping[str, Effect], repeats: bool
-) -> str:
+def _sentence(verdict: Verdict, best: Model, steps: Sequence[Step], library: Mapping[str, Effect], parts: Split) -> str:
     names = " and ".join(step.added.name for step in steps if step.added)
     before, after = 1e3 * steps[0].before.errors.test_rmse_m, 1e3 * best.errors.test_rmse_m
     fell = fallen(steps[0].before.errors, best.errors)
-    repeat = "" if repeats else REPEAT
+    repeat = "" if parts.repeats else REPEAT
     renamed = steps[0].renamed
     if verdict == "adequate" and renamed and renamed.model:
         after = 1e3 * renamed.model.errors.test_rmse_m
@@ -456,7 +456,7 @@ def _sentence(
         )
     if verdict == "adequate":
         said = f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
-        return said + _suspicion(steps[0].suspected)
+        return said + _suspicion(steps[0].suspected) + _scatter(parts)
     if verdict == "missing":
         return f"Missing: {names}; {fell}, and nothing is left to explain."
     if verdict == "one_of":
@@ -476,6 +476,17 @@ def _suspicion(suspected: Sequence[Candidate]) -> str:
     return (
         f" Suspected, not proved: {' or '.join(each.name for each in suspected)}; of {best.name}, {best.why_not}. "
         "A longer recording would tell."
+    )
+
+
+def _scatter(parts: Split) -> str:
+    """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it."""
+    noise_m = max(each.record.noise_m for each in (parts.train, parts.judged))
+    if parts.floor_m < SCATTERS * noise_m:
+        return ""
+    return (
+        f" The valve itself scatters: a repeated command repeats the position to {1e3 * parts.floor_m:.3g} mm, where "
+        f"the sensor's noise is {1e3 * noise_m:.2g} mm. What makes the difference follows neither command nor position."
     )
 
 

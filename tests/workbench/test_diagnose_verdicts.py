@@ -157,6 +157,7 @@ def test_what_nothing_proves_is_suspected_and_no_more() -> None:
     said = f"Suspected, not proved: spring_hardening; of spring_hardening, {suspect.why_not}."
     assert said in found.sentence
     assert "standard errors, more than 3 needed" in said
+    assert f"scatters: a repeated command repeats the position to {1e3 * found.split.floor_m:.3g} mm" in found.sentence
 
 
 def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
@@ -165,6 +166,7 @@ def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
     said = _diagnosed(tmp_path, "sensor_gain")
     assert said["status"] == 0
     assert said["verdict"] == "adequate"
+    assert "scatters" not in said["sentence"]
     assert said["missing"] == said["suspected"] == []
     assert said["base"]["parameters"] == said["best"]["parameters"]
     assert not any(each["accepted"] for each in said["candidates"])
