@@ -43,7 +43,7 @@ SEEDS: Mapping[str, tuple[range, ...]] = {
     "two": (range(39000, 39006),),
     "removed": (range(39100, 39112),),
     "others": (range(2620, 2632),),
-    "outside": (range(2720, 2732),),
+    "outside": (range(2740, 2752),),
 }
 """Nobody has looked at a case before the rules stood; of earlier seeds, see docs/blind.md."""
 APART = 100

@@ -9,7 +9,8 @@ is accepted, or three effects are added.
     adequate      nothing is missing: no effect is accepted, and the valve explains the record without
     missing       these effects, and with them all is explained
     one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
-    unexplained   something is missing that the library does not have; what lowered the error so far is still named
+    unexplained   something is missing that the library does not have; what lowered the error so far is still named.
+                  Or the valve scatters so much that a tenth of the motion is left, which no model could explain
     untrusted     the searches disagree, and the best of them explains nothing
 """
 
@@ -206,7 +207,7 @@ class _Search:
         base, last = steps[0].before, steps[-1]
         best = last.added.model if last.added and last.added.model else last.before
         base, best = self._profiled(base), self._profiled(best)
-        verdict = _verdict(best, steps)
+        verdict = _verdict(best, steps, self._split)
         chosen = self._experiment(steps) if verdict == "one_of" else None
         sentence = _sentence(verdict, best, steps, self._library, self._split)
         return Diagnosis(verdict, base, best, suspects, steps, chosen, self._split, sentence)
@@ -433,7 +434,9 @@ def _at_end(value: float, declared: Parameter, valve: ValveParameters) -> bool:
     )
 
 
-def _verdict(best: Model, steps: Sequence[Step]) -> Verdict:
+def _verdict(best: Model, steps: Sequence[Step], parts: Split) -> Verdict:
+    if best.explained and not best.errors.follows(parts.moved_m):
+        return "unexplained"
     added = [step for step in steps if step.added]
     if best.explained and not added:
         return "adequate"
@@ -465,7 +468,7 @@ def _sentence(verdict: Verdict, best: Model, steps: Sequence[Step], library: Map
         )
     begun = f" {names} explains a part: {fell}." if names else f" The held-out error is {after:.3g} mm."
     if verdict == "unexplained":
-        return f"Something is missing that the library does not have.{begun}{repeat}"
+        return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
     return f"Not to be trusted: the searches end at different errors.{begun}"
 
 

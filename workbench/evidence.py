@@ -29,6 +29,8 @@ ALIKE_STANDARD_ERRORS = 2.0
 ALIKE_GAIN = 0.02
 AT_FLOOR, RARELY_OFF = 1.25, 1.75
 """A model reaches the floor if its block error, and its plain error where it was fitted, are within these of it."""
+MOST_LEFT = 0.1
+"""Of the position's standard deviation: a model that leaves more explains little, however badly the valve repeats."""
 MOST = float(np.log(2.0))
 LEAST_ERROR = 0.01
 """Of a mean logarithm: no better known, however alike the blocks."""
@@ -62,6 +64,10 @@ class Errors:
         """
         mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
         return mostly and self.train_rmse_m <= RARELY_OFF * floor_m
+
+    def follows(self, moved_m: float) -> bool:
+        """Whether a typical second's error is small against the motion, given by its standard deviation."""
+        return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * moved_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,11 @@ class Split:
     """The error that no model undercuts: the valve's repeatability where a command repeats, else the sensor's noise."""
 
     @property
+    def moved_m(self) -> float:
+        """The standard deviation of the position that is fitted, m."""
+        return float(np.std(self.train.record.position_m[self.train.counted]))
+
+    @property
     def repeats(self) -> bool:
         """Whether a command repeats itself, so that the floor is the valve's own."""
         return any(each.record.repeatability_m is not None for each in (self.train, self.judged))

@@ -11,6 +11,7 @@ import pytest
 from config.recording import Recording, read_table, write_recording
 from config.writing import valve_toml
 from positioner.cli.main import main
+from tests.workbench.generators import case
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis_json import as_json
@@ -158,6 +159,15 @@ def test_what_nothing_proves_is_suspected_and_no_more() -> None:
     assert said in found.sentence
     assert "standard errors, more than 3 needed" in said
     assert f"scatters: a repeated command repeats the position to {1e3 * found.split.floor_m:.3g} mm" in found.sentence
+
+
+def test_a_valve_that_is_pushed_at_random_is_not_called_adequate() -> None:
+    # It repeats itself to 14 mm, so that the bare valve is as good as any model: a quarter of the motion is left.
+    pushed = case("cavitation", law="elasto_plastic", seed=2726)
+    found = diagnose(pushed.fit, pushed.base, test=pushed.test, effects=("stribeck",))
+    assert found.base.explained
+    assert (found.verdict, found.missing) == ("unexplained", ())
+    assert "The valve itself scatters: a repeated command" in found.sentence
 
 
 def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
