@@ -162,10 +162,10 @@ def test_what_nothing_proves_is_suspected_and_no_more() -> None:
 
 
 def test_a_valve_that_is_pushed_at_random_is_not_called_adequate() -> None:
-    # It repeats itself to 14 mm, so that the bare valve is as good as any model: a quarter of the motion is left.
-    pushed = case("cavitation", law="elasto_plastic", seed=2726)
+    # It repeats itself to 6 mm, so that the bare valve is as good as any model: a sixth of the motion is left.
+    pushed = case("cavitation", law="lugre", seed=2721)
     found = diagnose(pushed.fit, pushed.base, test=pushed.test, effects=("stribeck",))
-    assert found.base.explained
+    assert found.base.at_floor
     assert (found.verdict, found.missing) == ("unexplained", ())
     assert "The valve itself scatters: a repeated command" in found.sentence
 
