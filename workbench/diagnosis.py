@@ -373,7 +373,7 @@ class _Search:
         as_good = [
             each.name
             for each in refitted.values()
-            if self._may_be_there(each) and each.model and alike(best.model.errors, each.model.errors)
+            if self._may_be_there(each) and each.model and alike(best.model.errors.all_logs, each.model.errors.all_logs)
         ]
         # A class is one by algebra, whether or not the search for each of its members succeeded.
         return tuple(

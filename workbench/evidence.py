@@ -168,9 +168,9 @@ def fall(before: Column, after: Column) -> tuple[float, float]:
     return 1.0 - float(np.exp(-mean)), mean / max(error, LEAST_ERROR)
 
 
-def alike(best: Errors, other: Errors) -> bool:
-    """Whether the block errors, fitted and held out, do not tell two apart: within 2 standard errors or 2 %."""
-    less, standard_errors = fall(other.all_logs, best.all_logs)
+def alike(best: Column, other: Column) -> bool:
+    """Whether the block errors l_b do not tell two apart: within 2 standard errors or 2 %."""
+    less, standard_errors = fall(other, best)
     return less < ALIKE_GAIN or standard_errors < ALIKE_STANDARD_ERRORS
 
 

@@ -16,15 +16,7 @@ from config.recording import Recording
 from config.valve import ValveFile
 from sim.effect import Effect, shipped_effect
 from workbench.confounding import told_apart
-from workbench.evidence import (
-    ALIKE_GAIN,
-    ALIKE_STANDARD_ERRORS,
-    AT_FLOOR,
-    LEAST_BIC,
-    LEAST_GAIN,
-    LEAST_STANDARD_ERRORS,
-    fall,
-)
+from workbench.evidence import AT_FLOOR, LEAST_BIC, LEAST_GAIN, LEAST_STANDARD_ERRORS, alike, fall
 from workbench.force_balance import Balance, ForceFit, ForceModel, floor_of
 from workbench.imposed import Rows, rows_of
 
@@ -141,13 +133,8 @@ def _step(number: int, before: ForceFit, fits: Mapping[str, ForceFit]) -> ForceS
     if not accepted:
         return ForceStep(before, tuple(candidates), None, ())
     added = accepted[0]
-    alike = [each.name for each in accepted if _alike(added.fit, each.fit)]
-    return ForceStep(before, tuple(candidates), added, tuple(alike))
-
-
-def _alike(best: ForceFit, other: ForceFit) -> bool:
-    less, standard_errors = fall(other.logs, best.logs)
-    return less < ALIKE_GAIN or standard_errors < ALIKE_STANDARD_ERRORS
+    as_good = [each.name for each in accepted if alike(added.fit.logs, each.fit.logs)]
+    return ForceStep(before, tuple(candidates), added, tuple(as_good))
 
 
 def _candidate(number: int, name: str, before: ForceFit, fit: ForceFit) -> ForceCandidate:

@@ -20,7 +20,7 @@ from workbench.free_run import FreeRun
 from workbench.held_out import Split
 from workbench.parameters import free_parameters
 from workbench.record import Record
-from workbench.simulation_error import FINAL, NARROW, SimulationError
+from workbench.simulation_error import FINAL, NARROW, SimulationError, root_weights
 
 TRIED = 2
 """Weakest strengths tried: one either way, where an effect has two signs."""
@@ -45,7 +45,7 @@ def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Sus
     error = SimulationError(run, composition, parameters, composition.theta)
     z = error.coordinates(composition.theta)
     residual = error.residuals(z)
-    weights = (1.0 + (residual / FINAL) ** 2) ** -0.25
+    weights = root_weights(residual, FINAL)
     basis, _ = np.linalg.qr(weights[:, None] * error.jacobian(z, residual, NARROW.difference))
     bare = run.position_m(composition.theta)
     rows = record.judged & np.isfinite(bare)

@@ -187,6 +187,11 @@ class SimulationError:
         return z
 
 
+def root_weights(residuals: Vector, scale: float) -> Vector:
+    """Return by what residuals and derivatives are multiplied so that least squares go down the soft-L1 cost."""
+    return np.asarray((1.0 + (residuals / scale) ** 2) ** -0.25)
+
+
 def soft(residuals: Vector, scale: float) -> float:
     """Return the soft-L1 cost."""
     return float(scale**2 * np.sum(np.sqrt(1.0 + (residuals / scale) ** 2) - 1.0))

@@ -19,7 +19,7 @@ from workbench.motion import directions, velocity_m_per_s
 from workbench.parameters import Parameter, strengths
 from workbench.record import Record
 from workbench.seen import values_seen
-from workbench.simulation_error import LONGEST_MOVE, WIDE, SimulationError
+from workbench.simulation_error import LONGEST_MOVE, WIDE, SimulationError, root_weights
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
@@ -48,7 +48,7 @@ def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, co
     """
     generator = np.random.default_rng(seed)
     theta, regressed = origins
-    pool = [theta, regressed, *drawn(regressed, DRAWS_REGRESSED, generator), *drawn(theta, DRAWS_FILE, generator)]
+    pool = [theta, regressed, *_drawn(regressed, DRAWS_REGRESSED, generator), *_drawn(theta, DRAWS_FILE, generator)]
     return error.screened(map(error.coordinates, pool), count)
 
 
@@ -91,7 +91,7 @@ def _compensated(error: SimulationError, base: Vector, grid: Sequence[Vector]) -
     compensated = []
     for z in grid:
         residuals = rough.residuals(z)
-        weights = (1.0 + (residuals / WIDE.scale) ** 2) ** -0.25
+        weights = root_weights(residuals, WIDE.scale)
         move = np.linalg.lstsq(weights[:, None] * J, -weights * residuals)[0]
         there = z.copy()
         there[own] += np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
@@ -190,7 +190,7 @@ def _with_play(theta: Vector, play: Parameter, width_m: float, part: float) -> V
     return changed
 
 
-def drawn(theta: Vector, count: int, generator: np.random.Generator) -> list[Vector]:
+def _drawn(theta: Vector, count: int, generator: np.random.Generator) -> list[Vector]:
     """Return draws round a parameter vector."""
     draws = []
     for _ in range(count):

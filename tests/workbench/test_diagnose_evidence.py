@@ -84,8 +84,8 @@ def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_
     best = np.log(np.full(60, 5e-5)) + 0.05 * np.random.default_rng(3).standard_normal(60)
     missed = best.copy()
     missed[40] = np.log(6e-3)
-    assert alike(errors_of(best), errors_of(missed))
-    assert not alike(errors_of(best), errors_of(best + 0.1))
+    assert alike(best, missed)
+    assert not alike(best, best + 0.1)
 
 
 def test_a_fall_is_never_said_of_an_error_that_rises() -> None:
