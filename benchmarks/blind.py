@@ -1,6 +1,6 @@
 """Blind cases through the whole diagnosis: `make blind` runs what is missing of the campaign and prints its tables.
 
-    clean      one effect drawn at random of the whole library, noise of 0.05 mm      `workbench.hiding`
+    clean      one effect drawn at random of the whole library, noise of 0.05 mm      `workbench.blind.hiding`
     dirty      the same with pressure noise, break-away jitter and 12 bits
     nothing    no effect, clean and dirty in turn
     two        two effects, clean
@@ -28,13 +28,13 @@ from typing import Any
 import numpy as np
 
 from config.recording import Recording
-from config.valve import ValveFile
+from config.valve_file import ValveFile
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.generators import KINDS, LAWS, case
-from workbench.confounding import algebraic_class
-from workbench.diagnosis import Diagnosis, diagnose
-from workbench.hiding import VISIBLE, hide
-from workbench.trial import NOISE_M
+from workbench.blind.hiding import VISIBLE, hide
+from workbench.blind.trial import NOISE_M
+from workbench.select.diagnosis import Diagnosis, diagnose
+from workbench.select.equivalence import algebraic_class
 
 SEEDS: Mapping[str, range] = {
     "clean": range(36100, 36180),

@@ -18,11 +18,12 @@ from pathlib import Path
 import canopen
 
 from benchmarks.bus import BLOCK, CYCLES, PUSH_PA, measured, ratio
-from benchmarks.cycle import DAEMON, FIRST, full_loop
-from config.canopen import ACTIVATE, SHIPPED_EDS, CanBus, CanopenDevice
-from config.eds import read_eds
+from benchmarks.cycle_time import DAEMON, FIRST, full_loop
+from config.canopen_device import SHIPPED_EDS, CanBus, CanopenDevice
 from drivers import driver_for
 from drivers.boundary import DriverError
+from fieldbus.canopen.eds import read_eds
+from fieldbus.canopen.objects import ACTIVATE
 from positioner.control.controller import Controller
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle

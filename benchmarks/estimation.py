@@ -8,15 +8,15 @@ from time import perf_counter, sleep
 import numpy as np
 import numpy.typing as npt
 
-from config.valve import EffectTable, load_valve, shipped_valve
-from positioner.cli.seed import hardships, table
-from positioner.daemon.refinement import RefinementProcess
+from config.valve_file import EffectTable, load_valve, shipped_valve
+from positioner.daemon.refinement_process import RefinementProcess
 from positioner.estimation import Estimates, Identification, IdentificationSettings
-from positioner.estimation.identification import READINGS
-from positioner.estimation.identifier import Identifier
-from positioner.estimation.recorded import RecordSettings, identify
+from positioner.estimation.algebraic import Identifier
+from positioner.estimation.batch import RecordSettings, identify
+from positioner.estimation.online import READINGS
 from positioner.estimation.refiner import InPlace, Job
-from positioner.estimation.solution import CHAINS, ROWS, Feeds, kernel
+from positioner.estimation.weighted import CHAINS, ROWS, Feeds, kernel
+from positioner.paper import hardships, noise_table
 from sim.valve import Valve
 
 SAMPLES = 800
@@ -33,7 +33,7 @@ SOLVED = READINGS // 2
 OCTAVES = tuple(2.0**-power for power in range(5, -1, -1))
 FOUR: tuple[Feeds, ...] = (((2, 0), (-4, 1), (1, 2)), ((-2, 1), (1, 2)), ((1, 2),), ((1, 2),))
 """The columns' feeds when k is a fourth unknown: d^2/ds^2 of the transformed equation, over s^3."""
-TRUE = table.true_values(load_valve(shipped_valve("seed"))).tolist()
+TRUE = noise_table.true_values(load_valve(shipped_valve("seed"))).tolist()
 AREA = load_valve(shipped_valve("seed")).valve.diaphragm_area_m2
 NAMES = ("a", "b", "c", "b_over_c", "k_over_c")
 NOISES_PU = (1e-6, 1e-5, 3e-5, 1e-4, 1e-3)
@@ -96,7 +96,7 @@ def identified(motion: Motion, settings: IdentificationSettings) -> Identificati
 
 def relative_errors(estimates: Estimates) -> list[float]:
     """Return those of a, b, c, b/c, k/c."""
-    true = [TRUE[table.NAMES.index(name)] for name in NAMES]
+    true = [TRUE[noise_table.NAMES.index(name)] for name in NAMES]
     return [getattr(estimates, name).value / value - 1 for name, value in zip(NAMES, true, strict=True)]
 
 
@@ -169,9 +169,9 @@ def _one_window_or_several() -> list[str]:
             errors = np.array([a / TRUE[0], b / TRUE[1], b / c / TRUE[4]]) - 1
             lines.append(_row(f"{title}, {noise:g}", np.sqrt((errors**2).mean(axis=1)).tolist()))
     file = load_valve(shipped_valve("seed"))
-    moved = table.motion(file, PERIOD_S)
+    moved = noise_table.motion(file, PERIOD_S)
     for title, known in (("start known", 2), ("x_0 free", 1), ("x_0, v_0 free", 0)):
-        bounds = table.bound(file, replace(moved, known=known), 1e-4 * SETTINGS.stroke_m)
+        bounds = noise_table.bound(file, replace(moved, known=known), 1e-4 * SETTINGS.stroke_m)
         lines.append(_row(f"bound at 0.0001, {title}", bounds[[0, 1, 4]].tolist()))
     return lines
 
@@ -277,7 +277,7 @@ def _limits() -> list[str]:
     """Return what is refused where the mass cannot be known: at 20 ms, and behind a lag of 0.3 s."""
     rng = np.random.default_rng(0)
     file = load_valve(shipped_valve("seed"))
-    coarse = table.motion_at(file, 0.02 * np.arange(-20, 41, dtype=np.float64), 20)
+    coarse = noise_table.motion_at(file, 0.02 * np.arange(-20, 41, dtype=np.float64), 20)
     lagging = file.model_copy(
         update={"effect": (EffectTable.model_validate({"name": "ip_lag", "time_constant_s": 0.3}),)}
     )
@@ -333,7 +333,7 @@ def _bounds() -> list[str]:
     """Return the noise table, and the hardships: the seed's identifier, ours and the bound side by side."""
     file = load_valve(shipped_valve("seed"))
     rows = [row for noise_pu in (1e-4, 1e-3) for row in hardships.hardships(file, noise_pu, SEEDS // 2)]
-    return [*table.lines(list(table.table(file, SEEDS))), *hardships.lines(rows)]
+    return [*noise_table.lines(list(noise_table.table(file, SEEDS))), *hardships.lines(rows)]
 
 
 def report() -> list[str]:

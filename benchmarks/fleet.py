@@ -15,7 +15,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from config.registers import Fault
+from config.codes import Fault
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.composition import Composition
 from workbench import fit
-from workbench.hiding import hide
+from workbench.blind.hiding import hide
 
 FIRST_SEED = {"clean": 41000, "dirty": 42000}
 CASES = 40

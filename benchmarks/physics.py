@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 import numpy.typing as npt
 
-from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.valve import Valve
 
 PASCAL_PER_PSI = 6894.757

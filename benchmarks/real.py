@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from config.recording import Recording
-from config.valve import ValveFile
-from workbench.diagnosis import diagnose
-from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
-from workbench.imposed import read_imposed
+from config.valve_file import ValveFile
+from workbench.data.imposed_motion import read_imposed
+from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.select.diagnosis import diagnose
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RUNS = ("J_2", "J_3", "J_5", "J_7", "J_9")

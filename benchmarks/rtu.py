@@ -17,9 +17,9 @@ from pathlib import Path
 from pymodbus.client import ModbusSerialClient
 
 from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio
-from benchmarks.cycle import DAEMON, FIRST, full_loop
+from benchmarks.cycle_time import DAEMON, FIRST, full_loop
 from config.device import ModbusRtuDevice
-from config.rtu import Baud, SerialPort
+from config.serial_port import Baud, SerialPort
 from drivers import driver_for
 from positioner.cli.parts.pseudo_line import pseudo_line
 from positioner.control.controller import Controller

@@ -19,11 +19,11 @@ from typing import Literal
 
 import numpy as np
 
-from config.daemon import DaemonFile
-from config.registers import Mode
-from config.slave import SlaveFile
-from config.valve import ValveFile, load_valve, shipped_valve
-from drivers.memory import MemoryDriver
+from config.codes import Mode
+from config.daemon_file import DaemonFile
+from config.slave_file import SlaveFile
+from config.valve_file import ValveFile, load_valve, shipped_valve
+from drivers.in_memory import MemoryDriver
 from positioner.control.controller import Controller, Decision
 from positioner.control.pulse import Pulse, unknown
 from positioner.control.requests import QUIET, Requests
@@ -32,7 +32,7 @@ from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
-from sim.slave.device import Device
+from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
 SEED = load_valve(shipped_valve("seed")).valve

@@ -15,11 +15,12 @@ from pathlib import Path
 from pymodbus.client import ModbusTlsClient
 
 from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio
-from benchmarks.cycle import DAEMON, FIRST, full_loop
+from benchmarks.cycle_time import DAEMON, FIRST, full_loop
 from config.device import ModbusTcpDevice
 from config.roles import Role
-from config.tls import Tls, client_context
+from config.tls_table import Tls
 from drivers import driver_for
+from fieldbus.modbus.tls import client_context
 from positioner.cli.parts.authority import Authority, Owner
 from positioner.control.controller import Controller
 from positioner.control.settings import Settings

@@ -12,15 +12,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from config.valve import ValveFile
+from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from workbench import compare, diagnose, fit
-from workbench.free_run import FINE, Accuracy, FreeRun
-from workbench.held_out import split
-from workbench.hiding import hide
-from workbench.preview import preview
-from workbench.record import Record
+from workbench.blind.hiding import hide
+from workbench.data.held_out import split
+from workbench.data.record import Record
+from workbench.model.free_run import FINE, Accuracy, FreeRun
+from workbench.select.preview import preview
 
 RUNS = 20
 DURATION_S, PERIOD_S, SEED = 60.0, 0.005, 20001

@@ -5,7 +5,6 @@ keeps them; the map of a real device is written in the daemon's TOML file, in th
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from itertools import pairwise
@@ -15,9 +14,9 @@ from pydantic import AfterValidator, Field, model_validator
 from pyModbusTCP.utils import valid_host
 
 from config.loading import Port, Schema
-from config.rtu import RtuUnit, SerialPort
-from config.tls import Tls
-from config.wire import Format, Layout, WireType, WordOrder
+from config.register_format import Format, WireType, WordOrder
+from config.serial_port import RtuUnit, SerialPort
+from config.tls_table import Tls
 
 MOST_REGISTERS = 125
 """A Modbus reply carries at most this many registers."""
@@ -143,14 +142,19 @@ class ModbusMap(Schema):
         """The quantities of one sample, by name."""
         return {name: place for name, place in self.places.items() if name not in WRITABLE}
 
+    @property
+    def sampled_words(self) -> int:
+        """Registers from the first to the last of one sample, those between its quantities included."""
+        places = self.sampled.values()
+        return max(place.end for place in places) - min(place.address for place in places)
+
     @model_validator(mode="after")
     def _can_be_read_and_written(self) -> Self:
         places = self.sampled.values()
         if len({place.table for place in places}) > 1:
             raise ValueError("position, pressure, counter, time and status must lie in one table")
-        span = max(place.end for place in places) - min(place.address for place in places)
-        if span > MOST_REGISTERS:
-            raise ValueError(f"one sample must lie within {MOST_REGISTERS} registers, it spans {span}")
+        if self.sampled_words > MOST_REGISTERS:
+            raise ValueError(f"one sample must lie within {MOST_REGISTERS} registers, it spans {self.sampled_words}")
         for name, place in self.places.items():
             if name in WRITABLE and place.table != "holding":
                 raise ValueError(f"{name} is written, so it must lie in the holding table")
@@ -163,11 +167,6 @@ class ModbusMap(Schema):
             if place.table == next_place.table and place.end > next_place.address:
                 raise ValueError(f"{name} and {next_name} share register {next_place.address}")
         return self
-
-
-def layout(places: Iterable[Place]) -> Layout:
-    """Return the layout of some places in one run of registers."""
-    return Layout([(place.address, place.format) for place in places])
 
 
 def _simulated_map() -> ModbusMap:
@@ -288,8 +287,7 @@ class ModbusRtuDevice(ModbusDevice):
 
     @model_validator(mode="after")
     def _a_reply_fits_into_its_timeout(self) -> Self:
-        words = layout(self.map.sampled.values()).words
-        least_s = self.serial.silence_s + (2 * words + 5) * self.serial.character_s
+        least_s = self.serial.silence_s + (2 * self.map.sampled_words + 5) * self.serial.character_s
         if self.reply_timeout_s <= least_s:
             raise ValueError(
                 f"reply_timeout_s must be more than {least_s:.4f} s, which a measurement takes "

@@ -6,90 +6,18 @@ as on the wire; many tools print them from 1.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
 from itertools import chain
 from typing import Literal
 
+from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, State, listed
 from config.errors import InputError
+from config.register_format import Format, WireType
 from config.roles import Role
-from config.wire import Format, WireType
 
 MAP_VERSION = 1
 WORD_TEST = 0xB38C
 LONG_TEST = 0x12345678
 FLOAT_TEST = 1234.5
-
-
-class Mode(IntEnum):
-    """Who commands the pressure."""
-
-    HOLD = 0
-    MANUAL = 1
-    AUTOMATIC = 2
-
-
-class Fault(IntEnum):
-    """Why the positioner has let go of the valve; latched until acknowledged."""
-
-    NONE = 0
-    NO_REPLY = 1
-    STALE = 2
-    IMPLAUSIBLE = 3
-    DEVICE = 4
-    RESTARTED = 5
-    DCS_SILENT = 6
-
-
-class Quality(IntEnum):
-    """What the last measurement is worth."""
-
-    GOOD = 0
-    REPEATED = 1
-    LOST = 2
-
-
-class Why(IntEnum):
-    """Why the law, or the excitation, is not doing what was asked."""
-
-    NOTHING = 0
-    NOT_AUTOMATIC = 1
-    NO_ESTIMATES = 2
-    NO_MOVE_ASKED = 3
-    ALPHA_BELOW_BREAKAWAY = 4
-    EXCITATION_BEYOND_LIMITS = 5
-    EXCITATION_TOO_LONG = 6
-    AMPLITUDE_ZERO = 7
-    LAW_BEYOND_LIMITS = 8
-    STUCK = 9
-    TRIM_ENDED = 10
-
-
-class Namur(IntEnum):
-    """Status of a device by NAMUR NE 107, best first."""
-
-    GOOD = 0
-    MAINTENANCE_REQUIRED = 1
-    OUT_OF_SPECIFICATION = 2
-    FUNCTION_CHECK = 3
-    FAILURE = 4
-
-
-class HealthCause(IntEnum):
-    """What a valve's NE 107 status rests on."""
-
-    NONE = 0
-    FAULT = 1
-    NOT_AUTOMATIC = 2
-    EXCITED = 3
-    NOT_IDENTIFIED = 4
-    DCS_SILENT = 5
-    BEYOND_LIMITS = 6
-    STUCK = 7
-    FRICTION_HIGH = 8
-    FRICTION_LOW = 9
-    STICTION = 10
-    TRAVEL = 11
-    REVERSALS = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +80,7 @@ _LARGEST_PA = 2e6
 COMMANDS = (
     _operable("reference", 0, "float32", "p.u.", 0.0, 1.0, "stem position asked for"),
     _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
-    _writable("mode", 3, "uint16", "1", 0, 2, "0 hold, 1 manual, 2 automatic; falls to hold on a fault"),
+    _writable("mode", 3, "uint16", "1", 0, 2, f"{listed(Mode)}; falls to hold on a fault"),
     _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3)"),
     _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
     _writable("eta_3", 6, "uint16", "1", 0, 1, "0 switches the friction estimator on"),
@@ -165,25 +93,10 @@ COMMANDS = (
 )
 
 STATUS = (
-    Register("state", 100, "uint16", "1", "0 S0 start, 1 S1 up, 2 S2 down, 3 S3 identify"),
-    Register(
-        "fault",
-        101,
-        "uint16",
-        "1",
-        "0 none, 1 no reply, 2 stale, 3 implausible, 4 device, 5 device restarted, 6 DCS silent",
-    ),
-    Register("quality", 102, "uint16", "1", "of the last measurement: 0 good, 1 repeated, 2 lost"),
-    Register(
-        "why",
-        103,
-        "uint16",
-        "1",
-        "why not as asked: 0 it is, 1 not automatic, 2 no estimates, 3 no move asked, 4 alpha below break-away, "
-        "5 excitation beyond pressure limits, 6 excitation too long, 7 amplitude is zero, "
-        "8 the law asks for a pressure beyond the limits, 9 stuck: the strongest pulse allowed does not move the stem, "
-        "10 the trim ended outside its dead band",
-    ),
+    Register("state", 100, "uint16", "1", listed(State)),
+    Register("fault", 101, "uint16", "1", listed(Fault)),
+    Register("quality", 102, "uint16", "1", f"of the last measurement: {listed(Quality)}"),
+    Register("why", 103, "uint16", "1", f"why not as asked: {listed(InhibitReason)}"),
     Register("position", 104, "float32", "p.u.", "stem position"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
     Register("device_status", 107, "uint16", "1", "the device's own status word"),
@@ -265,18 +178,8 @@ HEALTH = (
     _writable(
         "health_reset", 501, "uint16", "1", 0, 1, "write 1: travel, reversals and stiction index start anew; reads 0"
     ),
-    Register(
-        "ne107", 502, "uint16", "1", "NAMUR NE 107: 0 good, 1 M maintenance, 2 S specification, 3 C check, 4 F failure"
-    ),
-    Register(
-        "ne107_cause",
-        503,
-        "uint16",
-        "1",
-        "what decides ne107: 0 nothing, 1 fault (see there), 2 not automatic, 3 excited, 4 not identified, "
-        "5 DCS silent, 6 the law asks for a pressure beyond the limits, 7 stuck, 8 friction high: packing tight, "
-        "9 friction low: packing leaks, 10 stiction, 11 travel, 12 reversals",
-    ),
+    Register("ne107", 502, "uint16", "1", f"NAMUR NE 107: {listed(Ne107Status)}"),
+    Register("ne107_cause", 503, "uint16", "1", f"what decides ne107: {listed(Ne107Cause)}"),
     Register("ne107_causes", 504, "uint16", "1", "all causes that hold: bit n - 1 is cause n of ne107_cause"),
     Register("friction", 506, "float32", "Pa", "Coulomb friction F_c / A as the law uses it; NaN: none yet"),
     Register("friction_baseline", 508, "float32", "Pa", "what it was when it was called normal; NaN: never"),

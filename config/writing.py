@@ -1,4 +1,4 @@
-"""Writes a valve file, the inverse of `config.valve.load_valve`."""
+"""Writes a valve file, the inverse of `config.valve_file.load_valve`."""
 
 import json
 import os
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from config.errors import InputError
-from config.valve import EffectTable, ValveFile
+from config.valve_file import EffectTable, ValveFile
 
 
 def write_valve(path: Path, file: ValveFile, remarks: Sequence[str] = ()) -> None:

@@ -2,10 +2,10 @@
 
 `boundary` says what every driver does; `modbus_tcp` talks to a device on Modbus TCP, `memory` to a valve in the
 same process and virtual time. A driver knows registers and time-outs, and nothing of control. `driver_for` finds
-drivers by the name of their bus, those of other packages too (`config.buses`).
+drivers by the name of their bus, those of other packages too (`config.bus_plugins`).
 """
 
-from config.buses import DRIVERS, loaded, offered
+from config.bus_plugins import DRIVERS, loaded, offered
 from config.device import Device
 from config.errors import InputError
 from drivers.boundary import Driver

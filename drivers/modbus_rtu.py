@@ -10,10 +10,10 @@ be, however late it is. What comes before it is thrown away.
 import time
 
 from config.device import ModbusRtuDevice
-from config.rtu import ECHO, framed, is_whole
-from config.serial_line import SerialLine
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply
-from drivers.modbus import ModbusDriver
+from drivers.modbus_device import ModbusDriver
+from fieldbus.modbus.rtu import ECHO, framed, is_whole
+from fieldbus.modbus.serial_line import SerialLine
 
 EXCEPTION = 0x80
 EXCEPTION_FRAME = 5

@@ -9,9 +9,9 @@ from typing import Any
 from pyModbusTCP.constants import MB_EXCEPT_ERR, MB_RECV_ERR, MB_TIMEOUT_ERR
 
 from config.device import ModbusTcpDevice
-from config.modbus_client import modbus_client, reason
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply
-from drivers.modbus import ModbusDriver
+from drivers.modbus_device import ModbusDriver
+from fieldbus.modbus.client import modbus_client, reason
 
 
 class ModbusTcpDriver(ModbusDriver):
@@ -21,7 +21,7 @@ class ModbusTcpDriver(ModbusDriver):
         config: where the device is, how long it may take, what its registers hold.
 
     Raises:
-        InputError: a file of `config.tls` that is not there or does not fit.
+        InputError: a file of `config.tls_table` that is not there or does not fit.
     """
 
     def __init__(self, config: ModbusTcpDevice) -> None:

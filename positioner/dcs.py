@@ -8,23 +8,22 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
+from config.codes import Fault, InhibitReason, Refusal, State
 from config.device import MOST_REGISTERS
 from config.errors import InputError, Unfulfilled
-from config.modbus_client import modbus_client, reason
-from config.registers import Fault, Register, Why, register_named
-from config.tls import Tls
-from positioner.control.states import State
-from positioner.estimation.estimate import Reason
+from config.registers import Register, register_named
+from config.tls_table import Tls
+from fieldbus.modbus.client import modbus_client, reason
 
 POLL_S = 0.05
 CYCLES_WRAP = 1 << 32
 
 REFUSALS = (
-    Why.NOT_AUTOMATIC,
-    Why.ALPHA_BELOW_BREAKAWAY,
-    Why.EXCITATION_BEYOND_LIMITS,
-    Why.EXCITATION_TOO_LONG,
-    Why.AMPLITUDE_ZERO,
+    InhibitReason.NOT_AUTOMATIC,
+    InhibitReason.ALPHA_BELOW_BREAKAWAY,
+    InhibitReason.EXCITATION_BEYOND_LIMITS,
+    InhibitReason.EXCITATION_TOO_LONG,
+    InhibitReason.AMPLITUDE_ZERO,
 )
 """Why an excitation does not begin or has ended; the other reasons concern the law."""
 
@@ -126,7 +125,7 @@ class Dcs:
         time.sleep(POLL_S)
         if self.get("identifications") != applied_before:
             return None
-        return problem or Reason(int(self.get("refusal"))).text
+        return problem or Refusal(int(self.get("refusal"))).text
 
     def _wait_for_estimates(self, timeout_s: float, show: Callable[[float], None]) -> str | None:
         """Wait until the estimates the law needs are there; return what went wrong, or None."""
@@ -143,7 +142,7 @@ class Dcs:
             if now["fault"]:
                 return f"fault: {_plain(Fault(int(now['fault'])))}"
             if now["why"] in REFUSALS:
-                return _plain(Why(int(now["why"])))
+                return _plain(InhibitReason(int(now["why"])))
             if begun and now["progress"] >= 1 and now["b_over_c_valid"] and now["k_over_c_valid"]:
                 return None
             time.sleep(POLL_S)
@@ -175,5 +174,5 @@ def _neighbours(registers: Sequence[Register]) -> list[Register]:
     return run
 
 
-def _plain(code: Fault | Why) -> str:
+def _plain(code: Fault | InhibitReason) -> str:
     return code.name.lower().replace("_", " ")

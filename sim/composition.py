@@ -13,10 +13,10 @@ import numpy as np
 
 from config.errors import InputError
 from config.loading import validated
-from config.valve import ValveFile, ValveParameters
-from sim.compiled import Kernel, kernel
+from config.valve_file import ValveFile, ValveParameters
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
+from sim.kernel import Kernel, kernel
 
 BASE = (
     "mass_kg",

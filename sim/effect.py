@@ -49,7 +49,7 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
-from config.valve import ValveParameters
+from config.valve_file import ValveParameters
 
 Memory = npt.NDArray[np.float64]
 Seen = Literal["", "lowest", "swept", "quantum"]

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from config.valve import ValveFile
+from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.karnopp import TOLERANCE, karnopp, read
 from sim.open_loop import STEP_S, Response, at_rest, checked_step, follow

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from config.roles import Role
-from config.tls import Tls
+from config.tls_table import Tls
 from positioner.cli.parts.authority import Authority, Owner
 
 HERE = ("127.0.0.1",)

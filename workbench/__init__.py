@@ -15,12 +15,12 @@ adds them, `report` writes it all down for a browser. Where a rig imposes the po
 """
 
 from config.recording import Recording
-from workbench.comparison import Comparison, compare
-from workbench.diagnosis import Diagnosis, diagnose
-from workbench.extension import Extension, extend
-from workbench.fitting import Fit, fit
-from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
-from workbench.imposed import read_imposed
+from workbench.compare.comparison import Comparison, compare
+from workbench.data.imposed_motion import read_imposed
+from workbench.fit.fitting import Fit, fit
+from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.select.diagnosis import Diagnosis, diagnose
+from workbench.select.extension import Extension, extend
 
 __all__ = [
     "Comparison",

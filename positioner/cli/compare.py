@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.export import add_export_arguments, read_any
+from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
     from workbench import Comparison
@@ -26,9 +26,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
     import json
 
-    from config.valve import find_valve, load_valve
+    from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
-    from workbench.comparison import as_json, compare
+    from workbench.compare.comparison import as_json, compare
 
     valve = load_valve(find_valve(arguments.valve))
     recording = read_any(arguments.recording, arguments, valve.valve.stroke_m)
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(arguments: argparse.Namespace, compared: "Comparison") -> list[str]:
-    from workbench.sentences import shortened
+    from workbench.compare.sentences import shortened
 
     verdict = "adequate" if compared.adequate else "not adequate"
     repeated = "" if compared.repeatability_m is None else f", repeatability {_mm(compared.repeatability_m)}"

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from config.valve import ValveParameters
+    from config.valve_file import ValveParameters
     from positioner.dcs import Dcs
 
 HELP = "identify and control a simulated sticking valve over a real bus, as processes, in under a minute"
@@ -154,7 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
     import json
 
-    from config.valve import load_valve, shipped_valve
+    from config.valve_file import load_valve, shipped_valve
 
     valve = load_valve(shipped_valve("seed")).valve
     with _folder(arguments.out) as folder:
@@ -275,7 +275,7 @@ def _play(port: int, valve: "ValveParameters", powered_s: float) -> Outcome:
 
 
 def _identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[Identified]:
-    from positioner.cli.parts.truth import truth
+    from positioner.virtual.true_parameters import truth
 
     def show(progress: float) -> None:
         _live(f"identifying ({phase}): {100 * progress:3.0f} %")
@@ -286,11 +286,11 @@ def _identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters")
 
 
 def _held_against(dcs: "Dcs", phase: str, name: str, true: float) -> Identified:
-    from positioner.estimation.estimate import Reason
+    from config.codes import Refusal
 
     now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
-    reason = Reason(int(now[f"{name}_reason"]))
-    refusal = "" if reason is Reason.VALID else reason.text
+    reason = Refusal(int(now[f"{name}_reason"]))
+    refusal = "" if reason is Refusal.VALID else reason.text
     return Identified(phase, name, now[f"{name}_e"], now[f"{name}_std"], true, refusal)
 
 
@@ -389,8 +389,8 @@ def _recording(folder: Path) -> Path:
 
 def _picture(folder: Path, outcome: Outcome) -> Path:
     from config.recording import read_recording
-    from config.valve import load_valve, shipped_valve
-    from positioner.cli.parts.picture import draw_run
+    from config.valve_file import load_valve, shipped_valve
+    from positioner.virtual.run_picture import draw_run
 
     path = folder / "run.png"
     stroke_m = load_valve(shipped_valve("seed")).valve.stroke_m

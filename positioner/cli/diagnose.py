@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.export import add_export_arguments, read_any
+from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
-    from workbench.diagnosis import Diagnosis
-    from workbench.preview import Suspect
+    from workbench.select.diagnosis import Diagnosis
+    from workbench.select.preview import Suspect
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
 EXAMPLE = "positioner diagnose rec.csv --valve seed --test other.csv --json diagnosed.json"
@@ -45,17 +45,17 @@ def run(arguments: argparse.Namespace) -> int:
     import json
     import time
 
-    from config.valve import find_valve, load_valve
+    from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import show
-    from workbench.confounding import untold
-    from workbench.diagnosis import diagnose
-    from workbench.diagnosis_json import as_json
-    from workbench.imposed import is_imposed
+    from workbench.data.imposed_motion import is_imposed
     from workbench.report import Subject, report_diagnosis, require_plotly
+    from workbench.select.diagnosis import diagnose
+    from workbench.select.diagnosis_json import as_json
+    from workbench.select.equivalence import untold
 
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
-        from positioner.cli.parts.forces import run_forces
+        from positioner.cli.parts.diagnose_forces import run_forces
 
         return run_forces(arguments)
     if arguments.report is not None:

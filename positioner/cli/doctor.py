@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from config.daemon import DaemonFile
+    from config.daemon_file import DaemonFile
 
     Check = Callable[[DaemonFile, Path], str]
 
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print a line a check; exit status 1 when one failed."""
-    from config.daemon import load_valves
+    from config.daemon_file import load_valves
 
     files = load_valves(arguments.config)
     for file in files:
@@ -95,7 +95,7 @@ def _certificates(file: "DaemonFile", _config: Path) -> str:
     from datetime import UTC, datetime
 
     from config.errors import InputError
-    from config.tls import expiry
+    from fieldbus.modbus.tls import expiry
 
     tables = {"device.tls": getattr(file.device, "tls", None), "supervisory.tls": file.supervisory.tls}
     ends = []

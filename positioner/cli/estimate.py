@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from config.recording import Recording
-    from positioner.estimation.recorded import Recorded, RecordSettings
+    from positioner.estimation.batch import Recorded, RecordSettings
 
 HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
 EXAMPLE = "positioner estimate rec.csv --json estimated.json"
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.errors import InputError
     from config.recording import Recording
-    from positioner.estimation.recorded import identify
+    from positioner.estimation.batch import identify
 
     if arguments.noise_m is not None and not arguments.noise_m > 0:
         raise InputError("--noise-m", f"must be positive, it is {arguments.noise_m:g}")
@@ -52,7 +52,7 @@ def _pressure(recording: "Recording", arguments: argparse.Namespace) -> tuple[An
     """Return the measured pressure, or else the command: a row's is in force until the next row."""
     import numpy as np
 
-    from positioner.estimation.recorded import RecordSettings
+    from positioner.estimation.batch import RecordSettings
 
     measured = recording.columns.get("pressure_pa")
     held = None if arguments.pressure is None else arguments.pressure == "held"

@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.export import add_export_arguments, read_any
+from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
-    from workbench.extension import Extension
-    from workbench.journal import Journal
+    from workbench.select.extension import Extension
+    from workbench.select.extension_journal import Journal
 
 HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -38,14 +38,14 @@ def run(arguments: argparse.Namespace) -> int:
     import json
     import time
 
-    from config.valve import find_valve, load_valve
+    from config.valve_file import find_valve, load_valve
     from config.writing import write_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import show
-    from workbench.extension import extend
-    from workbench.extension_json import as_json
-    from workbench.journal import Journal
     from workbench.report import report_journal, require_plotly
+    from workbench.select.extension import extend
+    from workbench.select.extension_journal import Journal
+    from workbench.select.extension_json import as_json
 
     if arguments.report is not None:
         require_plotly(arguments.report)

@@ -2,7 +2,7 @@
 
 import argparse
 
-from positioner.cli.parts.connection import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connected
 
 HELP = "read supervisory registers by name (all of them without a name)"
 EXAMPLE = "positioner get position state fault"

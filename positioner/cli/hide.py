@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Hide, or reveal."""
-    from workbench.hiding import hide
-    from workbench.sealing import reveal, seal
+    from workbench.blind.hiding import hide
+    from workbench.blind.sealing import reveal, seal
 
     if arguments.reveal is not None:
         sha256, answer = reveal(arguments.reveal)

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.connection import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connected
 
 if TYPE_CHECKING:
     from positioner.dcs import Dcs
@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, print what was found, and whether the law uses it now."""
+    from config.codes import Mode
     from config.errors import Unfulfilled
-    from config.registers import Mode
 
     asked = {
         "alpha": arguments.alpha_pa,
@@ -39,14 +39,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _report(dcs: "Dcs", problem: str | None) -> int:
+    from config.codes import Refusal
     from config.registers import BY_NAME, ESTIMATED
-    from positioner.estimation.estimate import Reason
 
     print(f"{'':9} {'estimate':>14} {'std':>12} unit")
     for name in ESTIMATED:
         now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
-        reason = Reason(int(now[f"{name}_reason"]))
-        note = "" if reason is Reason.VALID else f"  refused: {reason.text}"
+        reason = Refusal(int(now[f"{name}_reason"]))
+        note = "" if reason is Refusal.VALID else f"  refused: {reason.text}"
         unit = BY_NAME[f"{name}_e"].unit
         print(f"{name:9} {now[f'{name}_e']:14.6g} {now[f'{name}_std']:12.3g} {unit}{note}")
     if problem is not None:

@@ -53,9 +53,9 @@ def _row(register: "Register") -> dict[str, object]:
 
 
 def _reasons() -> list[dict[str, object]]:
-    from positioner.estimation.estimate import Reason
+    from config.codes import Refusal
 
-    return [{"number": int(reason), "name": reason.name.lower(), "text": reason.text} for reason in Reason]
+    return [{"number": int(reason), "name": reason.name.lower(), "text": reason.text} for reason in Refusal]
 
 
 def _markdown(rows: list[dict[str, object]]) -> None:

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from config.daemon import DaemonFile
+    from config.daemon_file import DaemonFile
     from config.recording import Column, Recording
-    from config.slave import SlaveFile
-    from config.valve import ValveParameters
-    from positioner.cli.parts.virtual import Script
+    from config.slave_file import SlaveFile
+    from config.valve_file import ValveParameters
     from positioner.control.requests import Requests
     from positioner.daemon.snapshot import Snapshot
+    from positioner.virtual.virtual_cycle import Script
 
 HELP = "closed loop in virtual time: identify first, then follow a reference"
 EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.csv"
@@ -38,10 +38,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Play and write the recording; its time is the reference's, identification lies before it."""
     from config.errors import Unfulfilled
     from config.recording import write_recording
-    from config.valve import find_valve, load_valve
-    from positioner.cli.parts.series import read_series
-    from positioner.cli.parts.virtual import played, virtual_cycle
-    from sim.slave.modbus import device_of
+    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.csv_series import read_series
+    from positioner.virtual.virtual_cycle import played, virtual_cycle
+    from sim.slave.modbus_slave import device_of
 
     path = find_valve(arguments.valve)
     valve = load_valve(path).valve
@@ -73,9 +73,9 @@ def _require_travel(path: Path, reference_m: "Column", stroke_m: float) -> None:
 
 def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["DaemonFile", "SlaveFile"]:
     """Return the files that a daemon and a slave would be given for this loop."""
-    from config.daemon import DaemonFile
+    from config.daemon_file import DaemonFile
     from config.loading import validated
-    from config.slave import SlaveFile
+    from config.slave_file import SlaveFile
 
     most_pa = max(420e3, 1.5 * (valve.static_n + valve.spring_n_per_m * valve.stroke_m) / valve.diaphragm_area_m2)
     daemon = {
@@ -97,7 +97,7 @@ def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["Da
 
 def _first_requests(valve: "ValveParameters") -> "Requests":
     """Return what an engineer who knows the valve's data sheet asks for: an excitation of a third of the travel."""
-    from config.registers import Mode
+    from config.codes import Mode
     from positioner.control.requests import Requests
 
     travel_pa = valve.spring_n_per_m * valve.stroke_m / valve.diaphragm_area_m2

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from config.daemon import DaemonFile
+    from config.daemon_file import DaemonFile
     from drivers.boundary import Driver, Reading
 
 HELP = "read the valve once a second: bus rate, age, plausibility; moves nothing"
@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     import itertools
     import time
 
-    from config.daemon import load_daemon
+    from config.daemon_file import load_daemon
     from drivers.boundary import DriverError
     from positioner.control.settings import Settings
 

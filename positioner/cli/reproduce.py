@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from positioner.cli.seed.findings import Findings
-    from positioner.cli.seed.formulas import Erratum
-    from positioner.cli.seed.table import Cell
+    from positioner.paper.findings import Findings
+    from positioner.paper.formulas import Erratum
+    from positioner.paper.noise_table import Cell
 
 HELP = "the seed's figures and claims: as printed, corrected, and under honest noise; takes two minutes"
 EXAMPLE = "positioner reproduce --out figures --json reproduced.json"
@@ -34,11 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a claim does not hold without noise, or a printed form is no worse than ours."""
     from config.errors import InputError
-    from config.valve import load_valve, shipped_valve
-    from positioner.cli.seed.findings import findings
-    from positioner.cli.seed.formulas import errata, refusal_of_printed_static_friction
-    from positioner.cli.seed.scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, course
-    from positioner.cli.seed.table import lines, table
+    from config.valve_file import load_valve, shipped_valve
+    from positioner.paper.findings import findings
+    from positioner.paper.formulas import errata, refusal_of_printed_static_friction
+    from positioner.paper.noise_table import lines, table
+    from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, course
 
     if arguments.seeds < 2:
         raise InputError("--seeds", f"must be at least 2, it is {arguments.seeds}")
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     _print_lines(lines(cells))
     if arguments.out:
         (arguments.out / "noise-table.txt").write_text("\n".join(lines(cells)) + "\n", encoding="utf-8")
-        from positioner.cli.seed.figures import draw_all
+        from positioner.paper.seed_figures import draw_all
 
         for path in draw_all(arguments.out, courses[0], (courses[2], courses[3]), file):
             print(path)
@@ -157,12 +157,12 @@ def _estimate_lines(found: list["Findings"]) -> list[str]:
 
 
 def _refusal_lines(found: list["Findings"]) -> Iterable[str]:
-    from positioner.estimation import Reason
+    from config.codes import Refusal
 
     for each in found:
-        for reason in dict.fromkeys(one.reason for one in each.identified if one.reason != Reason.VALID.name):
+        for reason in dict.fromkeys(one.reason for one in each.identified if one.reason != Refusal.VALID.name):
             names = ", ".join(one.name for one in each.identified if one.reason == reason)
-            yield f"  {each.noise}, {_period(each.period_s)}: {names} refused: {Reason[reason].text}"
+            yield f"  {each.noise}, {_period(each.period_s)}: {names} refused: {Refusal[reason].text}"
 
 
 def _law_lines(found: list["Findings"]) -> list[str]:
@@ -193,7 +193,7 @@ def _kept_lines(each: "Findings") -> list[str]:
 
 
 def _claim_lines(found: list["Findings"]) -> list[str]:
-    from positioner.cli.seed.findings import CLAIMS
+    from positioner.paper.findings import CLAIMS
 
     lines = ["", "the seed's claims", *(f"  {claim:9} {text}" for claim, text in CLAIMS.items())]
     lines.append(f"{'noise':20}{'sample':>8}" + "".join(f"{claim:>16}" for claim in CLAIMS))

@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run until SIGTERM or Ctrl-C, which leave each valve in its configured safe state."""
-    from config.daemon import load_valves
+    from config.daemon_file import load_valves
     from positioner.daemon.service import serve
 
     return serve(load_valves(arguments.config), arguments.config)

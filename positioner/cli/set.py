@@ -2,7 +2,7 @@
 
 import argparse
 
-from positioner.cli.parts.connection import add_connection, connected
+from positioner.cli.parts.daemon_address import add_connection, connected
 
 HELP = "write a supervisory register by name"
 EXAMPLE = "positioner set reference 0.5"
@@ -24,8 +24,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _number(name: str, text: str) -> float:
+    from config.codes import Mode
     from config.errors import InputError
-    from config.registers import Mode
 
     if name == "mode" and text.upper() in Mode.__members__:
         return Mode[text.upper()]

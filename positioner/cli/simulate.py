@@ -28,10 +28,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.loading import validated
     from config.recording import Recording, write_recording
-    from config.slave import Sensor
-    from config.valve import find_valve, load_valve
-    from positioner.cli.parts.series import read_series
-    from sim.sensor import Transmitter
+    from config.slave_file import Sensor
+    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.csv_series import read_series
+    from sim.transmitter import Transmitter
     from sim.valve import Valve
 
     path = find_valve(arguments.valve)

@@ -6,20 +6,20 @@ the running integrals of the identification. It reads no clock.
 
 from dataclasses import dataclass, replace
 
-from config.registers import Fault, Mode, Why
-from positioner.control import breakaway
-from positioner.control.breakaway import Breakaway
-from positioner.control.excitation import Swing
-from positioner.control.law import balance_pa
+from config.codes import Fault, InhibitReason, Mode, State
+from positioner.control import breakaway_law as breakaway
+from positioner.control.balance_law import balance_pa
+from positioner.control.breakaway_law import Breakaway
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
-from positioner.control.states import Situation, State, state_in, why_not_the_law
+from positioner.control.sine_excitation import Swing
+from positioner.control.states import Situation, state_in, why_not_the_law
 from positioner.control.supervision import Watch, supervise, usable
-from positioner.estimation.applied import Applied, accept
-from positioner.estimation.estimate import Estimates
-from positioner.estimation.identification import Identification
+from positioner.estimation.acceptance import Applied, accept
+from positioner.estimation.estimates import Estimates
+from positioner.estimation.online import Identification
 from positioner.estimation.refiner import Refiner
 
 
@@ -67,7 +67,7 @@ class Decision:
     state: State
     mode: Mode
     fault: Fault
-    why: Why
+    why: InhibitReason
     reference_m: float
     delta_r_m: float
     sample_age_s: float
@@ -132,10 +132,10 @@ def step(
         wanted_pa = _pressure_pa(state, held_pa, running, sample.now_s, reference, applied, small)
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
 
-    why = refusal if refusal is not Why.NOTHING else why_not_the_law(situation)
-    if why is Why.NOTHING and command_pa != wanted_pa:
-        why = Why.LAW_BEYOND_LIMITS
-    if why is Why.NOTHING and small is not None:
+    why = refusal if refusal is not InhibitReason.NOTHING else why_not_the_law(situation)
+    if why is InhibitReason.NOTHING and command_pa != wanted_pa:
+        why = InhibitReason.LAW_BEYOND_LIMITS
+    if why is InhibitReason.NOTHING and small is not None:
         why = small.why
     decision = Decision(
         command_pa=command_pa,
@@ -180,27 +180,27 @@ def _at_the_stem(memory: Memory, sample: Sample, settings: Settings) -> Referenc
 
 def _excitation(
     memory: Memory, mode: Mode, reference: Reference, sample: Sample, requests: Requests, settings: Settings
-) -> tuple[Running | None, Why]:
+) -> tuple[Running | None, InhibitReason]:
     """Return the excitation under way, and why none is when one was asked for."""
     if mode is not Mode.AUTOMATIC or requests.eta[0] != 0:
-        return None, Why.NOTHING
+        return None, InhibitReason.NOTHING
     running = memory.running
     if running is None:
         return _begun(memory, reference, sample, requests, settings)
     if running.ended:
-        return running, Why.EXCITATION_TOO_LONG
+        return running, InhibitReason.EXCITATION_TOO_LONG
     if sample.now_s - running.start_s > settings.excitation_limit_s:
-        return replace(running, ended=True), Why.EXCITATION_TOO_LONG
-    return running, Why.NOTHING
+        return replace(running, ended=True), InhibitReason.EXCITATION_TOO_LONG
+    return running, InhibitReason.NOTHING
 
 
 def _begun(
     memory: Memory, reference: Reference, sample: Sample, requests: Requests, settings: Settings
-) -> tuple[Running | None, Why]:
+) -> tuple[Running | None, InhibitReason]:
     alpha_pa = requests.alpha_pa if requests.alpha_pa > 0 else _educated_guess_pa(memory, reference)
     swing = Swing(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
     refusal = swing.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
-    return (Running(swing, sample.now_s) if refusal is Why.NOTHING else None), refusal
+    return (Running(swing, sample.now_s) if refusal is InhibitReason.NOTHING else None), refusal
 
 
 def _educated_guess_pa(memory: Memory, reference: Reference) -> float:

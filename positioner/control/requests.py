@@ -6,7 +6,7 @@ cycle sees every one, and none twice.
 
 from dataclasses import dataclass
 
-from config.registers import Mode
+from config.codes import Mode
 
 Eta = tuple[int, int, int]
 """eta_1 excitation, eta_2 parameter identifier, eta_3 friction estimator: 0 switches each on."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from config.registers import Quality
+from config.codes import Quality
 
 
 @dataclass(frozen=True, slots=True)

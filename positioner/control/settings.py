@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from config.daemon import DaemonFile, Law
+from config.daemon_file import DaemonFile, Law
 from config.device import ActionName
-from positioner.control.breakaway import BreakawaySettings
+from positioner.control.breakaway_law import BreakawaySettings
 from positioner.control.supervision import Limits
-from positioner.estimation.applied import Applied, Ratios
-from positioner.estimation.identification import IdentificationSettings
+from positioner.estimation.acceptance import Applied, Ratios
+from positioner.estimation.online import IdentificationSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,18 +10,8 @@ the law it interrupted by itself.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
 
-from config.registers import Why
-
-
-class State(IntEnum):
-    """Numbers as served in the registers."""
-
-    S0_START = 0
-    S1_UP = 1
-    S2_DOWN = 2
-    S3_IDENTIFY = 3
+from config.codes import InhibitReason, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +35,12 @@ def state_in(situation: Situation) -> State:
     return State.S1_UP if situation.delta_r_m > 0.0 else State.S2_DOWN
 
 
-def why_not_the_law(situation: Situation) -> Why:
+def why_not_the_law(situation: Situation) -> InhibitReason:
     """Return why neither S1 nor S2 is in force; NOTHING when one is, or when S3 occupies their place."""
     if not situation.automatic:
-        return Why.NOT_AUTOMATIC
+        return InhibitReason.NOT_AUTOMATIC
     if situation.exciting:
-        return Why.NOTHING
+        return InhibitReason.NOTHING
     if not situation.law_ready:
-        return Why.NO_ESTIMATES
-    return Why.NO_MOVE_ASKED if situation.delta_r_m == 0.0 else Why.NOTHING
+        return InhibitReason.NO_ESTIMATES
+    return InhibitReason.NO_MOVE_ASKED if situation.delta_r_m == 0.0 else InhibitReason.NOTHING

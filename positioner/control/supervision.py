@@ -7,8 +7,8 @@ acknowledgement after its cause is gone frees the way; then a person or the DCS 
 import math
 from dataclasses import dataclass
 
+from config.codes import Fault, Mode, Quality
 from config.device import ActionName, DeviceStatus
-from config.registers import Fault, Mode, Quality
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 

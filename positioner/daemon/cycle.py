@@ -13,17 +13,17 @@ import time
 from collections.abc import Sequence
 from threading import Event
 
-from config.registers import Quality
+from config.codes import Quality
 from positioner.control.controller import Controller, Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
+from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.health import Health
 from positioner.daemon.link import Link
 from positioner.daemon.logs import about, say
 from positioner.daemon.pacing import Pace
 from positioner.daemon.recorder import Recorder, Row
 from positioner.daemon.snapshot import Snapshot
-from positioner.daemon.statistics import CycleStatistics
 
 log = logging.getLogger(__name__)
 

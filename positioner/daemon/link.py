@@ -8,7 +8,7 @@ import logging
 import math
 from dataclasses import dataclass, replace
 
-from config.registers import Quality
+from config.codes import Quality
 from drivers.boundary import Driver, DriverError, Reading
 from positioner.control.sample import Sample
 from positioner.daemon.logs import say

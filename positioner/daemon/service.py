@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event, Thread
 
-from config.daemon import DaemonFile
+from config.daemon_file import DaemonFile
 from config.errors import InputError
-from config.modbus_server import RegisterServer
 from config.registers import WRITER_AT
 from config.roles import Role
-from config.tls import Guard
 from drivers import driver_for
 from drivers.boundary import DriverError, Reading
+from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.tls import Guard
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
@@ -29,8 +29,8 @@ from positioner.daemon.link import Link
 from positioner.daemon.logs import about, say, start_logging
 from positioner.daemon.pacing import DevicePace, Pace, RealTime
 from positioner.daemon.recorder import Recorder
-from positioner.daemon.refinement import RefinementProcess
-from positioner.daemon.supervisory import SupervisoryRegisters
+from positioner.daemon.refinement_process import RefinementProcess
+from positioner.daemon.supervisory_registers import SupervisoryRegisters
 
 log = logging.getLogger(__name__)
 

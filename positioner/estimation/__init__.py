@@ -5,9 +5,10 @@ a file: the algebraic `identifier` and its `solution`, the `derivatives` as FIR 
 `judgement` of what came out. Needs numpy only; time comes in with the samples.
 """
 
-from positioner.estimation.applied import Applied, Ratios, accept
-from positioner.estimation.estimate import Estimate, Estimates, Reason, no_estimates
-from positioner.estimation.identification import Identification, IdentificationSettings
+from config.codes import Refusal
+from positioner.estimation.acceptance import Applied, Ratios, accept
+from positioner.estimation.estimates import Estimate, Estimates, no_estimates
+from positioner.estimation.online import Identification, IdentificationSettings
 
 __all__ = [
     "Applied",
@@ -16,7 +17,7 @@ __all__ = [
     "Identification",
     "IdentificationSettings",
     "Ratios",
-    "Reason",
+    "Refusal",
     "accept",
     "no_estimates",
 ]

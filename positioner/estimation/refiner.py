@@ -1,16 +1,16 @@
 """Who refines: a job goes out, its result comes back, at once or some cycles later.
 
 The control core hands a job to a `Refiner` and asks at each sample whether the result is there. In virtual time it is
-computed `InPlace`; the daemon has a process of its own for it (`positioner.daemon.refinement`), for a fit of some tens
-of milliseconds has no place in a cycle of one.
+computed `InPlace`; the daemon has a process of its own for it (`positioner.daemon.refinement_process`), for a fit of
+some tens of milliseconds has no place in a cycle of one.
 """
 
 from dataclasses import dataclass
 from typing import Protocol
 
 from positioner.estimation.array import Array
-from positioner.estimation.recorded import Recorded, RecordSettings, identify
-from positioner.estimation.refinement import Prior
+from positioner.estimation.batch import Recorded, RecordSettings, identify
+from positioner.estimation.likelihood import Prior
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ each step, dead band and resolution of the recording. A figure that cannot be to
 """
 
 from positioner.response.figure import Figure
-from positioner.response.report import Response, as_json, respond
+from positioner.response.response_figures import Response, as_json, respond
 from positioner.response.step_figures import StepFigures
 
 __all__ = ["Figure", "Response", "StepFigures", "as_json", "respond"]

@@ -21,8 +21,8 @@ import numpy as np
 
 from config.recording import Column
 from positioner.response.figure import Figure, Passage, passage, untold
-from positioner.response.rest import Rest, rest_at_the_end
-from positioner.response.steps import Step
+from positioner.response.rest_level import Rest, rest_at_the_end
+from positioner.response.step_detection import Step
 
 T63, T86 = 0.632, 0.865
 OBSERVABLE_SIGMA = 5.0

@@ -1,7 +1,7 @@
 """The object dictionary of the simulated CANopen node: what SDO reads and writes, and how PDOs are composed of it.
 
-Objects, their types and what they are at power-up come from the electronic data sheet (`config.eds`). Those of the
-device itself are read from it and written to it; the rest are numbers kept here. The rules of CiA 301 hold: a
+Objects, their types and what they are at power-up come from the data sheet (`fieldbus.canopen.eds`). Those of
+the device itself are read from it and written to it; the rest are numbers kept here. The rules of CiA 301 hold: a
 mapping is changed while its PDO is not valid, entry 0 last, and only what a PDO can carry is mapped.
 """
 
@@ -14,7 +14,7 @@ from canopen import ObjectDictionary
 from canopen.objectdictionary import ODVariable
 from canopen.sdo.exceptions import SdoAbortedError
 
-from config.canopen import PDO_BYTES
+from fieldbus.canopen.objects import PDO_BYTES
 
 NO_ACCESS_READ, NO_ACCESS_WRITE = 0x06010001, 0x06010002
 NO_OBJECT, NO_SUBINDEX, NO_DATA = 0x06020000, 0x06090011, 0x08000024

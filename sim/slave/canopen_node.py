@@ -17,19 +17,9 @@ from canopen import ObjectDictionary
 from canopen.sdo.exceptions import SdoAbortedError
 from canopen.sdo.server import SdoServer
 
-from config.canopen import (
-    ACTIVATE,
-    CONTROL_WORD,
-    DEVICE_MODE,
-    LOCAL,
-    NO_FAULT,
-    SIMULATED_OBJECTS,
-    STATUS_WORD,
-    Control,
-    DeviceMode,
-    NodeState,
-)
+from config.canopen_device import CONTROL_WORD, SIMULATED_OBJECTS, STATUS_WORD
 from config.device import CommunicationAction, DeviceStatus
+from fieldbus.canopen.objects import ACTIVATE, DEVICE_MODE, LOCAL, NO_FAULT, Control, DeviceMode, NodeState
 from sim.slave.canopen_dictionary import (
     COMMUNICATION_END,
     LOCAL_CONTROL,
@@ -43,7 +33,7 @@ from sim.slave.canopen_dictionary import (
     Write,
 )
 from sim.slave.clocks import Clock
-from sim.slave.device import Device
+from sim.slave.simulated_device import Device
 
 ERROR_REGISTER, SYNC_ID, EMCY_ID, HEARTBEAT_MS = 0x1001, 0x1005, 0x1014, 0x1017
 COMMAND = SIMULATED_OBJECTS.command_pa.index

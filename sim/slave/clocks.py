@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from config.slave import SlaveFile
-from sim.slave.device import Device
+from config.slave_file import SlaveFile
+from sim.slave.simulated_device import Device
 
 log = logging.getLogger(__name__)
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Protocol
 
-from config.canopen import require_can
-from config.slave import CanopenBus, load_slave
+from config.canopen_device import require_can
+from config.slave_file import CanopenBus, load_slave
 
 
 class Slave(Protocol):
@@ -35,9 +35,9 @@ def slave_of(path: Path, port: int | None = None) -> Slave:
     bus = load_slave(path).bus
     if isinstance(bus, CanopenBus):
         require_can(str(path), "bus.kind")
-        from sim.slave.canopen import CanopenSlave
+        from sim.slave.canopen_slave import CanopenSlave
 
         return CanopenSlave(path, port)
-    from sim.slave.modbus import ModbusSlave
+    from sim.slave.modbus_slave import ModbusSlave
 
     return ModbusSlave(path, port)

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from config.can_bus import free_channel
-from config.registers import Fault, Mode
+from config.codes import Fault, Mode
+from fieldbus.canopen.loopback import free_channel
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs, DcsError

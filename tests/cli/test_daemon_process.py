@@ -14,9 +14,10 @@ from pathlib import Path
 import pytest
 from pymodbus.client import ModbusTcpClient
 
+from config.codes import Fault, Mode
 from config.device import ModbusTcpDevice
 from config.recording import read_recording
-from config.registers import BY_NAME, Fault, Mode
+from config.registers import BY_NAME
 from drivers import driver_for
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs

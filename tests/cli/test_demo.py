@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from config.codes import Fault, Mode
 from config.recording import read_recording
-from config.registers import Fault, Mode
-from config.valve import load_valve, shipped_valve
+from config.valve_file import load_valve, shipped_valve
 from positioner.cli.demo import LARGEST_ERROR_PU, Identified, Outcome, Step, started
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from config.valve import load_valve, shipped_valve
-from positioner.cli.seed.hardships import Hardship, hardships, lines
+from config.valve_file import load_valve, shipped_valve
+from positioner.paper.hardships import Hardship, hardships, lines
 
 ALLOWED = 1.5
 SEEDS = 16

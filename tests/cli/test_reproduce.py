@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config.valve import load_valve, shipped_valve
+from config.codes import Refusal
+from config.valve_file import load_valve, shipped_valve
 from positioner.cli.main import main
-from positioner.cli.seed import scenario, table
-from positioner.cli.seed.findings import CLAIMS, Findings, findings
-from positioner.cli.seed.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
-from positioner.cli.seed.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
-from positioner.estimation import Reason
+from positioner.paper import noise_table, scenario
+from positioner.paper.findings import CLAIMS, Findings, findings
+from positioner.paper.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
+from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
 
 PERIOD_S = 1e-4
 FILE = load_valve(shipped_valve("seed"))
@@ -113,7 +113,7 @@ def test_the_sine_is_measured_and_not_true(quiet: Course) -> None:
 def test_without_noise_the_law_brings_the_stem_to_both_references(quiet: Course) -> None:
     found = findings(quiet, FILE)
     assert {one.name: one.reason for one in found.identified} == dict.fromkeys(
-        ("a", "b", "c", "k", "b_over_c", "k_over_c"), Reason.VALID.name
+        ("a", "b", "c", "k", "b_over_c", "k_over_c"), Refusal.VALID.name
     )
     assert all(abs(one.value / one.true - 1) < 1e-4 for one in found.identified)
     assert [(step.state, step.reference_pu) for step in found.steps] == [("S1", 0.6), ("S2", 0.4)]
@@ -124,7 +124,7 @@ def test_without_noise_the_law_brings_the_stem_to_both_references(quiet: Course)
 
 def test_at_a_fieldbus_sample_time_white_noise_spoils_the_seeds_a_b_c_but_not_ours(slow: Findings) -> None:
     assert all(solved.worst_error > 1 for solved in slow.solved)
-    assert {one.reason for one in slow.identified} == {Reason.VALID.name}
+    assert {one.reason for one in slow.identified} == {Refusal.VALID.name}
     assert all(abs(one.value / one.true - 1) < 0.02 for one in slow.identified)
     assert holds(slow) == {"a": False, "b": True, "c": True, "c daemon": True}
 
@@ -142,7 +142,7 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
 ) -> None:
     """At a tenth of the seed's sample rate its trapezoidal solve misses a, b, c by 2 %, and the command says so."""
     monkeypatch.setattr(scenario, "SEED_PERIOD_S", PERIOD_S)
-    monkeypatch.setattr(table, "PERIODS_S", (1e-3,))
+    monkeypatch.setattr(noise_table, "PERIODS_S", (1e-3,))
     words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json"), "--seeds", "3"]
     assert main(words) == 1
     assert "DOES NOT HOLD: claim a, noise none: 0.019, limit 0.01" in capsys.readouterr().out
@@ -162,7 +162,7 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
 
 def test_the_noise_table_sets_ours_at_the_bound_and_the_seeds_far_off() -> None:
     """40 runs scatter a standard deviation by 11 %: 1.2 times the bound, and three times that scatter."""
-    found = table.cell(FILE, table.motion(FILE, 1e-3), 1e-3, 1e-4, 40)
+    found = noise_table.cell(FILE, noise_table.motion(FILE, 1e-3), 1e-3, 1e-4, 40)
     for at, std, bias, covered in zip(found.bound, found.std, found.bias, found.covered, strict=True):
         assert 0.7 * at < std < 1.2 * 1.33 * at
         assert abs(bias) < 0.5 * at

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from config.daemon import load_daemon
+from config.codes import Fault, Mode
+from config.daemon_file import load_daemon
 from config.errors import InputError
-from config.registers import Fault, Mode
 from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in, running

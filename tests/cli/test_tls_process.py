@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 from pymodbus.client import ModbusTlsClient
 
-from config.daemon import load_daemon
+from config.codes import Mode
+from config.daemon_file import load_daemon
 from config.errors import Unfulfilled
-from config.registers import BY_NAME, Mode
+from config.registers import BY_NAME
 from config.roles import Role
-from config.tls import Tls, client_context
+from config.tls_table import Tls
+from fieldbus.modbus.tls import client_context
 from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.authority import Authority, Owner

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from config.canopen import CanopenDevice
-from config.daemon import DaemonFile
+from config.canopen_device import CanopenDevice
+from config.daemon_file import DaemonFile
 from config.loading import SHIPPED, Schema
-from config.slave import CanopenBus, SlaveFile
+from config.slave_file import CanopenBus, SlaveFile
 
 PROFILES: dict[str, tuple[type[Schema], type[Schema], str]] = {
     "daemon_canopen.toml": (DaemonFile, CanopenDevice, "device"),

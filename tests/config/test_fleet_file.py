@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from config.daemon import load_daemon, load_valves
+from config.daemon_file import load_daemon, load_valves
 from config.errors import InputError
 from config.loading import SHIPPED
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from config.daemon import load_daemon
+from config.daemon_file import load_daemon
 from config.errors import InputError
-from config.valve import load_valve, shipped_valve
+from config.valve_file import load_valve, shipped_valve
 
 SEED = """[valve]
 name = "v"

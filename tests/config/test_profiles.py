@@ -2,9 +2,9 @@
 
 import tomllib
 
-from config.daemon import DaemonFile, load_daemon
+from config.daemon_file import DaemonFile, load_daemon
 from config.loading import SHIPPED
-from config.slave import load_slave
+from config.slave_file import load_slave
 
 PROFILES = SHIPPED / "profiles"
 

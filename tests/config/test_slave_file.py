@@ -6,7 +6,7 @@ import pytest
 
 from config.errors import InputError
 from config.loading import SHIPPED
-from config.slave import SlaveFile, load_slave, valve_path
+from config.slave_file import SlaveFile, load_slave, valve_path
 
 
 def test_the_example_says_the_defaults_but_for_noise_and_ageing() -> None:

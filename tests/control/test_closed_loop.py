@@ -6,17 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from config.daemon import DaemonFile
-from config.registers import Mode, Quality
-from config.slave import SlaveFile
-from config.valve import load_valve, shipped_valve
-from positioner.cli.parts.virtual import virtual_cycle
+from config.codes import Mode, Quality, Refusal
+from config.daemon_file import DaemonFile
+from config.slave_file import SlaveFile
+from config.valve_file import load_valve, shipped_valve
 from positioner.control.controller import Controller, Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
-from positioner.estimation.estimate import Reason
-from sim.slave.modbus import device_of
+from positioner.virtual.virtual_cycle import virtual_cycle
+from sim.slave.modbus_slave import device_of
 
 VALVE = load_valve(shipped_valve("seed")).valve
 STROKE_M = VALVE.stroke_m
@@ -80,7 +79,7 @@ def test_a_second_identification_that_finds_nothing_leaves_the_first_in_use() ->
     second = plant.identify(0.5)
     assert second.applied.ratios == first.applied.ratios
     assert (second.applied.count, second.applied.refusals) == (1, 1)
-    assert second.applied.refused is not Reason.VALID
+    assert second.applied.refused is not Refusal.VALID
 
 
 def test_a_ratio_alone_is_renewed_by_the_friction_estimator() -> None:
@@ -133,4 +132,4 @@ def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) ->
     assert ratios.b_over_c == pytest.approx(B_OVER_C, rel=0.01)
     assert ratios.k_over_c == pytest.approx(K_OVER_C, rel=0.01)
     singly = {decisions[-1].estimates.a.reason, decisions[-1].estimates.k.reason}
-    assert singly == {Reason.COMMANDS_MISSED if spoil is interrupted else Reason.VALID}
+    assert singly == {Refusal.COMMANDS_MISSED if spoil is interrupted else Refusal.VALID}

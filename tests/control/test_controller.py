@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from config.daemon import DaemonFile
+from config.codes import Fault, InhibitReason, Mode, Quality, State
+from config.daemon_file import DaemonFile
 from config.device import DeviceStatus
-from config.registers import Fault, Mode, Quality, Why
 from positioner.control.controller import Controller, Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
-from positioner.control.states import State
 
 HELD_PA = 40e3
 STROKE_M = 0.1
@@ -77,7 +76,7 @@ def test_in_hold_no_request_but_a_mode_moves_it(bench: Bench, asked: dict[str, o
 
 def test_automatic_without_a_new_reference_holds() -> None:
     decision = automatic().step()
-    assert (decision.command_pa, decision.why) == (HELD_PA, Why.NO_MOVE_ASKED)
+    assert (decision.command_pa, decision.why) == (HELD_PA, InhibitReason.NO_MOVE_ASKED)
 
 
 def test_up_and_down_follow_the_law_and_delta_r_is_kept() -> None:
@@ -122,7 +121,7 @@ def test_the_law_waits_for_estimates() -> None:
     bench = automatic(law=None)
     bench.ask(reference_m=0.05)
     decision = bench.step()
-    assert (decision.state, decision.why, decision.command_pa) == (State.S0_START, Why.NO_ESTIMATES, HELD_PA)
+    assert (decision.state, decision.why, decision.command_pa) == (State.S0_START, InhibitReason.NO_ESTIMATES, HELD_PA)
 
 
 def test_manual_applies_what_was_written_and_leaves_no_trace() -> None:
@@ -144,10 +143,10 @@ def test_commands_stay_within_the_pressure_limits() -> None:
     bench = automatic(pressure={"minimum_pa": 10e3, "maximum_pa": 90e3})
     bench.ask(reference_m=0.1)
     high = bench.step()
-    assert (high.command_pa, high.why) == (90e3, Why.LAW_BEYOND_LIMITS)
+    assert (high.command_pa, high.why) == (90e3, InhibitReason.LAW_BEYOND_LIMITS)
     bench.ask(reference_m=0.001)
     low = bench.step()
-    assert (low.command_pa, low.why) == (10e3, Why.LAW_BEYOND_LIMITS)
+    assert (low.command_pa, low.why) == (10e3, InhibitReason.LAW_BEYOND_LIMITS)
 
 
 def test_s3_excites_and_gives_back_the_law() -> None:
@@ -187,13 +186,17 @@ def test_s3_by_default_starts_from_what_keeps_the_stem(reference_m: float) -> No
 @pytest.mark.parametrize(
     ("tables", "asked", "why"),
     [
-        ({"valve": {"stroke_m": STROKE_M, "breakaway_pa": 26e3}}, {"alpha_pa": 26e3}, Why.ALPHA_BELOW_BREAKAWAY),
-        ({}, {"beta_pa": 0.0}, Why.AMPLITUDE_ZERO),
-        ({"pressure": {"maximum_pa": 52e3}}, {"alpha_pa": 40e3}, Why.EXCITATION_BEYOND_LIMITS),
+        (
+            {"valve": {"stroke_m": STROKE_M, "breakaway_pa": 26e3}},
+            {"alpha_pa": 26e3},
+            InhibitReason.ALPHA_BELOW_BREAKAWAY,
+        ),
+        ({}, {"beta_pa": 0.0}, InhibitReason.AMPLITUDE_ZERO),
+        ({"pressure": {"maximum_pa": 52e3}}, {"alpha_pa": 40e3}, InhibitReason.EXCITATION_BEYOND_LIMITS),
     ],
 )
 def test_an_excitation_that_may_not_be_is_refused_and_says_why(
-    tables: dict[str, object], asked: dict[str, object], why: Why
+    tables: dict[str, object], asked: dict[str, object], why: InhibitReason
 ) -> None:
     bench = automatic(**tables)
     bench.ask(eta=(0, 0, 0), **asked)
@@ -207,7 +210,7 @@ def test_s3_ends_by_itself_and_does_not_begin_again_until_asked_again() -> None:
     states = [bench.step().state for _ in range(40)]
     assert states[:20] == [State.S3_IDENTIFY] * 20
     assert states[22:] == [State.S0_START] * 18
-    assert bench.step().why is Why.EXCITATION_TOO_LONG
+    assert bench.step().why is InhibitReason.EXCITATION_TOO_LONG
     assert bench.step().command_pa == HELD_PA
     bench.ask(eta=QUIET)
     bench.step()

@@ -2,31 +2,31 @@
 
 import pytest
 
-from config.registers import Why
-from positioner.control.states import Situation, State, state_in, why_not_the_law
+from config.codes import InhibitReason, State
+from positioner.control.states import Situation, state_in, why_not_the_law
 
 S0, S1, S2, S3 = State
 
 TABLE = [
     # automatic, exciting, law ready, delta r -> state, why
-    (False, False, False, 0.0, S0, Why.NOT_AUTOMATIC),
-    (False, False, True, 0.1, S0, Why.NOT_AUTOMATIC),
-    (False, True, True, 0.1, S0, Why.NOT_AUTOMATIC),
-    (True, False, False, 0.0, S0, Why.NO_ESTIMATES),
-    (True, False, False, 0.1, S0, Why.NO_ESTIMATES),
-    (True, False, True, 0.0, S0, Why.NO_MOVE_ASKED),
-    (True, False, True, 0.1, S1, Why.NOTHING),
-    (True, False, True, 1e-12, S1, Why.NOTHING),
-    (True, False, True, -0.1, S2, Why.NOTHING),
-    (True, True, False, 0.0, S3, Why.NOTHING),
-    (True, True, True, 0.1, S3, Why.NOTHING),
-    (True, True, True, -0.1, S3, Why.NOTHING),
+    (False, False, False, 0.0, S0, InhibitReason.NOT_AUTOMATIC),
+    (False, False, True, 0.1, S0, InhibitReason.NOT_AUTOMATIC),
+    (False, True, True, 0.1, S0, InhibitReason.NOT_AUTOMATIC),
+    (True, False, False, 0.0, S0, InhibitReason.NO_ESTIMATES),
+    (True, False, False, 0.1, S0, InhibitReason.NO_ESTIMATES),
+    (True, False, True, 0.0, S0, InhibitReason.NO_MOVE_ASKED),
+    (True, False, True, 0.1, S1, InhibitReason.NOTHING),
+    (True, False, True, 1e-12, S1, InhibitReason.NOTHING),
+    (True, False, True, -0.1, S2, InhibitReason.NOTHING),
+    (True, True, False, 0.0, S3, InhibitReason.NOTHING),
+    (True, True, True, 0.1, S3, InhibitReason.NOTHING),
+    (True, True, True, -0.1, S3, InhibitReason.NOTHING),
 ]
 
 
 @pytest.mark.parametrize(("automatic", "exciting", "ready", "delta", "state", "why"), TABLE)
 def test_state_and_its_reason(
-    automatic: bool, exciting: bool, ready: bool, delta: float, state: State, why: Why
+    automatic: bool, exciting: bool, ready: bool, delta: float, state: State, why: InhibitReason
 ) -> None:
     situation = Situation(automatic, exciting, ready, delta)
     assert state_in(situation) is state

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from config.codes import Fault, Mode, Quality
 from config.device import DeviceStatus
-from config.registers import Fault, Mode, Quality
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.supervision import Limits, Watch, supervise

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from config.codes import Refusal
 from config.registers import BY_NAME
-from positioner.estimation.estimate import Reason
-from tests.daemon.test_supervisory import Panel
+from tests.daemon.test_supervisory_registers import Panel
 
 FORCE_AT_BREAKAWAY_PA = 1708.09 / 0.0645
 
@@ -23,7 +23,7 @@ def test_before_anything_broke_away_there_is_none() -> None:
     panel.run(10)
     assert math.isnan(panel.get("breakaway_e"))
     assert panel.get("breakaway_valid") == 0
-    assert panel.get("breakaway_reason") != Reason.VALID
+    assert panel.get("breakaway_reason") != Refusal.VALID
 
 
 def test_excited_by_a_jump_the_interval_is_wide_and_said_to_be() -> None:
@@ -35,7 +35,7 @@ def test_excited_by_a_jump_the_interval_is_wide_and_said_to_be() -> None:
         panel.set(name, value)
     panel.run(1500)
     assert panel.get("k_over_c_valid") == 1
-    assert panel.get("breakaway_reason") == Reason.TOO_UNCERTAIN
+    assert panel.get("breakaway_reason") == Refusal.TOO_UNCERTAIN
     assert abs(panel.get("breakaway_e") - FORCE_AT_BREAKAWAY_PA) < 2 * panel.get("breakaway_std")
     known = panel.cycle.snapshot.decision.estimates.breakaway
     assert panel.get("breakaway_e") == pytest.approx(known.value, rel=1e-6)

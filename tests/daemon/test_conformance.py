@@ -14,17 +14,17 @@ from threading import Thread
 
 import pytest
 
-from config import modbus_server
-from config.modbus_connection import SEND_TIMEOUT_S
-from config.modbus_server import MOST_CLIENTS, RegisterServer
 from config.registers import BY_NAME, SIZE
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
+from fieldbus.modbus import server as modbus_server
+from fieldbus.modbus.connection import SEND_TIMEOUT_S
+from fieldbus.modbus.server import MOST_CLIENTS, RegisterServer
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 from sim.slave.clocks import Lockstep
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
 
 UNIT = 3
 WITHIN_S = 20.0

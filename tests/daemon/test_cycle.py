@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from config.daemon import DaemonFile
-from config.registers import Mode
+from config.codes import Mode
+from config.daemon_file import DaemonFile
 from drivers.boundary import Capabilities, NoReply, Reading
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests

@@ -13,15 +13,15 @@ from threading import Event, Thread
 
 import pytest
 
-from config.daemon import DaemonFile
-from config.modbus_server import RegisterAnswers, RegisterServer
+from config.codes import Fault, Mode, Quality
+from config.daemon_file import DaemonFile
 from config.recording import read_recording
-from config.registers import Fault, Mode, Quality
-from config.rtu import ECHO, framed, is_whole
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
 from drivers import driver_for
 from drivers.boundary import Capabilities, NoConnection, NoReply, Reading
+from fieldbus.modbus.rtu import ECHO, framed, is_whole
+from fieldbus.modbus.server import RegisterAnswers, RegisterServer
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in, running
 from positioner.control.controller import Controller
@@ -36,8 +36,8 @@ from positioner.daemon.pacing import DevicePace, RealTime
 from positioner.daemon.recorder import Recorder
 from positioner.dcs import Dcs, DcsError
 from sim.slave.clocks import Lockstep
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
 
 WITHIN_S = 30.0
 VALVES = 8

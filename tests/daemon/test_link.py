@@ -2,7 +2,7 @@
 
 import pytest
 
-from config.registers import Quality
+from config.codes import Quality
 from drivers.boundary import Capabilities, DriverError, NoConnection, NoReply, Reading
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace

@@ -5,14 +5,13 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
-from config.daemon import DaemonFile
+from config.codes import Mode
+from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
-from config.registers import Mode
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
 from drivers import driver_for
 from positioner.cli.parts.children import port_in, running
-from positioner.cli.parts.virtual import played, virtual_cycle
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
@@ -22,7 +21,8 @@ from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import InPlace
-from sim.slave.modbus import device_of
+from positioner.virtual.virtual_cycle import played, virtual_cycle
+from sim.slave.modbus_slave import device_of
 
 STROKE_M = 0.1016
 SLAVE = '[clock]\nmode = "lockstep"\nperiod_s = 1e-3\n[sensor]\nnoise_std_m = 1e-5\nseed = 4\n'

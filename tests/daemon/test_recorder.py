@@ -9,7 +9,7 @@ import pytest
 
 from config.errors import InputError
 from config.recording import read_recording
-from config.valve import load_valve, shipped_valve
+from config.valve_file import load_valve, shipped_valve
 from positioner.daemon import recorder as room
 from positioner.daemon.recorder import Recorder, Row
 from workbench.report import Subject

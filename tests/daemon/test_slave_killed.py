@@ -14,17 +14,16 @@ from pathlib import Path
 
 import pytest
 
-from config.canopen import CanopenDevice
-from config.daemon import DaemonFile
+from config.canopen_device import CanopenDevice
+from config.codes import Fault, Mode, Quality, State
+from config.daemon_file import DaemonFile
 from config.device import ModbusRtuDevice, ModbusTcpDevice
-from config.registers import Fault, Mode, Quality
-from config.rtu import SerialPort
+from config.serial_port import SerialPort
 from drivers import driver_for
 from positioner.cli.parts.pseudo_line import pseudo_line
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
-from positioner.control.states import State
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace, RealTime

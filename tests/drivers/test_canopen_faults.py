@@ -12,19 +12,20 @@ from pathlib import Path
 import can
 import pytest
 
-from config.can_bus import free_channel
-from config.canopen import SHIPPED_EDS, SIMULATED_OBJECTS, STATUS_WORD, CanBus, CanopenDevice, Entry, NodeState
+from config.canopen_device import SHIPPED_EDS, SIMULATED_OBJECTS, STATUS_WORD, CanBus, CanopenDevice, Entry
 from config.device import DeviceStatus
 from config.errors import InputError
-from config.slave import SlaveFile
-from config.valve import shipped_valve
-from drivers import canopen as canopen_driver
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
-from drivers.canopen import CanopenDriver, NodeEvent, cause_of
-from sim.slave import canopen as canopen_slave
-from sim.slave.canopen import NodeServer
+from drivers.canopen import driver as canopen_driver
+from drivers.canopen.driver import CanopenDriver, NodeEvent, cause_of
+from fieldbus.canopen.loopback import free_channel
+from fieldbus.canopen.objects import NodeState
+from sim.slave import canopen_slave
+from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Clock, Lockstep, RealTime
-from sim.slave.modbus import device_of
+from sim.slave.modbus_slave import device_of
 
 NODE, HELD_PA, PUSH_PA = 5, 17e3, 60e3
 FILE = SlaveFile.model_validate({"initial": {"position_m": 0.02, "pressure_pa": HELD_PA}})
@@ -334,7 +335,9 @@ def test_a_node_operated_locally_is_no_actuator_and_says_why(
     assert driver.exchange(PUSH_PA + 1e3).status == 0
     assert node.device.command_pa == PUSH_PA + 1e3
     told = [
-        (each.message, each.__dict__["fields"].get("why")) for each in caplog.records if each.name == "drivers.canopen"
+        (each.message, each.__dict__["fields"].get("why"))
+        for each in caplog.records
+        if each.name == "drivers.canopen.driver"
     ]
     assert told == [(NodeEvent.NOT_ACTIVE, "it is operated locally"), (NodeEvent.ACTIVE, None)]
 

@@ -13,17 +13,18 @@ from typing import Protocol
 import pytest
 
 from config.device import SIMULATED_MAP, CommunicationAction, ModbusMap, ModbusTcpDevice, Place
-from config.modbus_server import ExceptionCode, RegisterServer
-from config.slave import SlaveFile
-from config.tls import Guard, Tls
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.tls_table import Tls
+from config.valve_file import shipped_valve
 from drivers.boundary import Driver, NoConnection, NoReply, Reading, Refused
-from drivers.memory import MemoryDriver
+from drivers.in_memory import MemoryDriver
 from drivers.modbus_tcp import ModbusTcpDriver
+from fieldbus.modbus.server import ExceptionCode, RegisterServer
+from fieldbus.modbus.tls import Guard
 from sim.slave.clocks import Lockstep
-from sim.slave.device import Device
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
+from sim.slave.simulated_device import Device
 
 FILE = SlaveFile.model_validate(
     {

@@ -12,7 +12,7 @@ from threading import Thread
 
 import pytest
 
-from config.buses import DEVICES, DRIVERS, offered
+from config.bus_plugins import DEVICES, DRIVERS, offered
 from config.device import Device
 from config.errors import InputError
 from drivers import driver_for

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from config.device import SIMULATED_MAP, ModbusTcpDevice
-from config.modbus_server import RegisterServer
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
+from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
 
 REPLY_TIMEOUT_S = 0.2
 PUSH_PA = 80e3

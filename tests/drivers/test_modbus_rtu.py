@@ -17,18 +17,19 @@ from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusIOException
 
 from config.device import SIMULATED_MAP, ModbusRtuDevice
-from config.rtu import Baud, SerialPort, framed
-from config.serial_line import SerialLine
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.serial_port import Baud, SerialPort
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
 from drivers.modbus_rtu import ModbusRtuDriver
+from fieldbus.modbus.rtu import framed
+from fieldbus.modbus.serial_line import SerialLine
 from positioner.cli.parts.pseudo_line import pseudo_line
 from sim.slave.clocks import Lockstep
-from sim.slave.device import Device
-from sim.slave.modbus import device_of
-from sim.slave.modbus_rtu import RtuServer
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
+from sim.slave.rtu_server import RtuServer
+from sim.slave.simulated_device import Device
 from tests.drivers.test_driver_contract import FILE, WireBench, WireContract
 
 BAUD: Baud = 115200

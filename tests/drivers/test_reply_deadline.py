@@ -11,24 +11,26 @@ from collections.abc import Callable, Iterator
 import pytest
 from pyModbusTCP.constants import MB_NO_ERR, MB_TIMEOUT_ERR
 
-from config import modbus_client
 from config.device import ModbusRtuDevice, ModbusTcpDevice
-from config.modbus_client import PlainClient
-from config.modbus_connection import Connection, place
-from config.modbus_server import RegisterServer
 from config.roles import Role
-from config.rtu import SerialPort, framed
-from config.slave import SlaveFile
-from config.tls import Guard, Tls
-from config.valve import shipped_valve
+from config.serial_port import SerialPort
+from config.slave_file import SlaveFile
+from config.tls_table import Tls
+from config.valve_file import shipped_valve
 from drivers import modbus_rtu
 from drivers.boundary import BadReply, NoConnection, NoReply
 from drivers.modbus_rtu import ModbusRtuDriver
 from drivers.modbus_tcp import ModbusTcpDriver
+from fieldbus.modbus import client as modbus_client
+from fieldbus.modbus.client import PlainClient
+from fieldbus.modbus.connection import Connection, place
+from fieldbus.modbus.rtu import framed
+from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.tls import Guard
 from positioner.cli.parts.pseudo_line import pseudo_line
 from sim.slave.clocks import Lockstep
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
 from tests.certificates import tls
 from tests.drivers.test_modbus_rtu import ScriptedDevice
 

@@ -14,17 +14,18 @@ import pytest
 
 from config.device import ModbusTcpDevice
 from config.errors import InputError
-from config.modbus_server import RegisterServer
 from config.roles import Role
-from config.slave import SlaveFile
-from config.tls import Guard, Tls, client_context, identity_in
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.tls_table import Tls
+from config.valve_file import shipped_valve
 from drivers.boundary import NoConnection, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
+from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.tls import Guard, client_context, identity_in
 from sim.slave.clocks import Lockstep
-from sim.slave.device import Device
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
+from sim.slave.simulated_device import Device
 from tests.certificates import folder, tls
 from tests.drivers import test_driver_contract as contract
 
@@ -215,7 +216,7 @@ def test_a_role_that_is_not_known_to_the_letter_is_none(text: bytes) -> None:
     from cryptography import x509
     from cryptography.hazmat.primitives import serialization
 
-    from config.tls import ROLE_OID, _role
+    from fieldbus.modbus.tls import ROLE_OID, _role
 
     assert _role(b"\x0c" + bytes((len(text),)) + text) is Role.NONE
     parsed = x509.load_pem_x509_certificate((folder() / "engineer.pem").read_bytes())

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from positioner.estimation.identification import Identification, IdentificationSettings
+from positioner.estimation.online import Identification, IdentificationSettings
 
 Array = npt.NDArray[np.float64]
 

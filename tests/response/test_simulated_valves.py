@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from config.recording import Recording, read_recording, write_recording
-from config.valve import find_valve, load_valve
+from config.valve_file import find_valve, load_valve
 from positioner.cli.main import main
 from positioner.response import respond
 from sim.valve import Valve

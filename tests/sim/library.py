@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim import karnopp
 from sim.composition import BASE, Composition
 from sim.effect import Effect, execute, shipped_effect, shipped_effects

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from config.valve import ValveParameters
+from config.valve_file import ValveParameters
 
 Series = npt.NDArray[np.float64]
 Pressure = Callable[[float], float]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.effect import read_effect, shipped_effect, shipped_effects
 from sim.valve import Valve

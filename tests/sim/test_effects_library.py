@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.valve import ValveParameters, load_valve, shipped_valve
+from config.valve_file import ValveParameters, load_valve, shipped_valve
 from sim.composition import BASE, Composition
 from sim.effect import Effect, Parameter, find_effect, read_effect, scale_of
 from sim.effects.__main__ import renewed, unit

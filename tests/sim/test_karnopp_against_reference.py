@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.open_loop import at_rest, follow
 from sim.valve import Valve

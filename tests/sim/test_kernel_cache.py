@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
-from sim import compiled
+from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
+from sim import kernel as compiled
 from sim.composition import Composition
 from sim.effect import SHIPPED, read_effect
 from sim.valve import Valve
@@ -19,7 +19,7 @@ ASYMMETRIC = ValveFile(
     effect=(EffectTable.model_validate({"name": "asymmetric_friction", "asymmetry": 0.2}),),
 )
 PROBE = """
-from config.valve import load_valve, shipped_valve
+from config.valve_file import load_valve, shipped_valve
 from sim.composition import Composition
 from sim.valve import Valve
 

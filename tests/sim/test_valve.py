@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.valve import EffectTable, ValveFile, load_valve, shipped_valve
+from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim import karnopp
 from sim.composition import Composition
 from sim.open_loop import respond

@@ -6,15 +6,16 @@ from dataclasses import dataclass, field
 import pytest
 from canopen.sdo.exceptions import SdoAbortedError
 
-from config.canopen import ACTIVATE, SHIPPED_EDS, Control, NodeState
+from config.canopen_device import SHIPPED_EDS
 from config.device import QUANTITIES, CommunicationAction
-from config.eds import PRODUCT, VENDOR, read_eds
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
+from fieldbus.canopen.eds import PRODUCT, VENDOR, read_eds
+from fieldbus.canopen.objects import ACTIVATE, Control, NodeState
 from sim.slave.canopen_node import CanopenNode, Machine, Nmt
 from sim.slave.clocks import Clock, Lockstep, RealTime
-from sim.slave.device import Device
-from sim.slave.modbus import device_of
+from sim.slave.modbus_slave import device_of
+from sim.slave.simulated_device import Device
 
 NODE, HELD_PA, PUSH_PA = 5, 17e3, 60e3
 SYNC, RPDO, TPDOS = 0x80, 0x200 + NODE, (0x180 + NODE, 0x280 + NODE, 0x380 + NODE)

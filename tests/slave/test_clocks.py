@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
 from sim.slave.clocks import Lockstep, RealTime
-from sim.slave.device import Device
-from sim.slave.modbus import device_of
+from sim.slave.modbus_slave import device_of
+from sim.slave.simulated_device import Device
 
 
 def switched_on(**tables: Any) -> Device:

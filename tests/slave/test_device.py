@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from config.device import CommunicationAction, DeviceStatus
-from config.slave import SlaveFile
-from sim.slave.device import Device
+from config.slave_file import SlaveFile
+from sim.slave.simulated_device import Device
 
 FRICTION = {"coulomb_n": 1000.0, "static_n": 1200.0}
 

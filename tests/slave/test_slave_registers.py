@@ -9,13 +9,13 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 from config.device import SIMULATED_MAP, ModbusMap, Place
-from config.modbus_server import RegisterServer
-from config.slave import SlaveFile
-from config.valve import shipped_valve
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
+from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep, RealTime
-from sim.slave.device import Device
-from sim.slave.modbus import device_of
-from sim.slave.registers import DeviceRegisters
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.modbus_slave import device_of
+from sim.slave.simulated_device import Device
 
 PLACES = SIMULATED_MAP.places
 COMMAND = PLACES["command_pa"].address

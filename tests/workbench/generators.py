@@ -25,8 +25,8 @@ import numpy as np
 import numpy.typing as npt
 
 from config.recording import Recording
-from config.valve import ValveFile, ValveParameters
-from workbench.excitation import excitation, lead_in
+from config.valve_file import ValveFile, ValveParameters
+from workbench.blind.input_signal import excitation, lead_in
 
 Series = npt.NDArray[np.float64]
 Draw = np.random.Generator

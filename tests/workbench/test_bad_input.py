@@ -13,7 +13,7 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, SEED, record_of
 from workbench import compare, diagnose, extend, fit
-from workbench.record import LONGEST_S, MOST_SAMPLES, ready
+from workbench.data.record import LONGEST_S, MOST_SAMPLES, ready
 
 Capture = pytest.CaptureFixture[str]
 Columns = dict[str, Column]

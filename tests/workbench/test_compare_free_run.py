@@ -11,9 +11,9 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench import compare
-from workbench.comparison import as_json
-from workbench.free_run import FINE, ROUGH, Accuracy, FreeRun
-from workbench.record import ready
+from workbench.compare.comparison import as_json
+from workbench.data.record import ready
+from workbench.model.free_run import FINE, ROUGH, Accuracy, FreeRun
 
 
 @pytest.mark.parametrize("seed", range(4))

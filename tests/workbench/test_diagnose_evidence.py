@@ -8,11 +8,11 @@ import pytest
 from config.errors import InputError
 from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
-from workbench.confounding import algebraic_class, bare_parameter, classes
-from workbench.evidence import Errors, Gain, alike, block_logs, fall, fallen, independent
-from workbench.held_out import joined, residual_m, split
-from workbench.record import ready
-from workbench.structure import STRUCTURED, structure
+from workbench.data.held_out import joined, residual_m, split
+from workbench.data.record import ready
+from workbench.select.equivalence import algebraic_class, bare_parameter, classes
+from workbench.select.evidence import Errors, Gain, alike, block_logs, fall, fallen, independent
+from workbench.select.structure import STRUCTURED, structure
 
 LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
 NOISE_M = 5e-5

@@ -13,10 +13,10 @@ from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.generators import case
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
-from workbench.diagnosis import Diagnosis, diagnose
-from workbench.diagnosis_json import as_json
-from workbench.experiment import MENU, experiment
-from workbench.hiding import hide
+from workbench.blind.hiding import hide
+from workbench.select.diagnosis import Diagnosis, diagnose
+from workbench.select.diagnosis_json import as_json
+from workbench.select.experiment import MENU, experiment
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.05)
@@ -67,7 +67,7 @@ def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, t
 
 
 def test_a_valve_is_no_experiment_away_from_itself(diagnosed: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.experiment.MENU", dict(list(MENU.items())[:2]))
+    monkeypatch.setattr("workbench.select.experiment.MENU", dict(list(MENU.items())[:2]))
     twins = [diagnosed.best.fit, replace(diagnosed.best.fit)]
     assert experiment(twins, diagnosed.split.judged.record).separation < 1.1
 

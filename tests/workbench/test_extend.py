@@ -8,12 +8,12 @@ import pytest
 
 from config.errors import InputError
 from config.recording import write_recording
-from config.valve import load_valve
+from config.valve_file import load_valve
 from config.writing import valve_toml
 from positioner.cli.main import main
 from sim.valve import Valve
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.journal import Journal
+from workbench.select.extension_journal import Journal
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAG_S = 0.08

@@ -8,15 +8,15 @@ import pytest
 
 from config.errors import InputError
 from config.recording import Recording
-from config.valve import EffectTable, ValveFile, ValveParameters
+from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import shipped_effect
 from sim.karnopp import Vector
 from tests.workbench.valves import SEED, drawn_valve, error_of, record_of, with_effect
 from workbench import fit
-from workbench.fitting import OF_BASE
-from workbench.parameters import free_parameters
-from workbench.simulation_error import SimulationError
+from workbench.fit.fitting import OF_BASE
+from workbench.fit.objective import SimulationError
+from workbench.model.parameters import free_parameters
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
 

@@ -20,9 +20,9 @@ from tests.workbench.benches import (
     benches,
 )
 from workbench import diagnose
-from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
-from workbench.force_diagnosis_json import as_json
-from workbench.imposed import is_imposed, read_imposed
+from workbench.data.imposed_motion import is_imposed, read_imposed
+from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.forces.force_diagnosis_json import as_json
 
 Capture = pytest.CaptureFixture[str]
 

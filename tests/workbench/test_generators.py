@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from config.valve import EffectTable, ValveFile, ValveParameters
+from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import shipped_effects
 from sim.open_loop import at_rest, follow
 from tests.workbench.generators import CASES, CLEAN, DIRTY, KINDS, LAWS, SMOOTH, Plant, Series, case
 from tests.workbench.generators import follow as followed
-from workbench.excitation import excitation
-from workbench.motion import slips
-from workbench.noise import repeatability_m
+from workbench.blind.input_signal import excitation
+from workbench.data.motion import slips
+from workbench.data.noise import repeatability_m
 
 PERIOD_S = 0.01
 SAME = Plant(law=SMOOTH, v_s=1e-2)

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from config.recording import read_recording
-from config.valve import ValveFile, find_valve, load_valve
+from config.valve_file import ValveFile, find_valve, load_valve
 from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.valves import error_of
-from workbench import trial
-from workbench.excitation import FIRST, excitation
-from workbench.hiding import Hidden, drawn_effects, drawn_valve, hide, known_valve, strength
-from workbench.motion import slips
-from workbench.noise import repeat_lag, repeatability_m
-from workbench.sealing import FILES, SEALED, seal
-from workbench.trial import NOISE_M
+from workbench.blind import trial
+from workbench.blind.hiding import Hidden, drawn_effects, drawn_valve, hide, known_valve, strength
+from workbench.blind.input_signal import FIRST, excitation
+from workbench.blind.sealing import FILES, SEALED, seal
+from workbench.blind.trial import NOISE_M
+from workbench.data.motion import slips
+from workbench.data.noise import repeat_lag, repeatability_m
 
 Capture = pytest.CaptureFixture[str]
 SEED = load_valve(find_valve("seed")).valve
@@ -191,7 +191,7 @@ def test_strengths_that_leave_no_motion_are_drawn_again(monkeypatch: pytest.Monk
     (limit,) = truth.effect
     assert limit.name == "supply_limit"
     assert limit.parameters["supply_pa"] * truth.valve.diaphragm_area_m2 > truth.valve.static_n
-    monkeypatch.setattr("workbench.hiding.LEAST_TRAVEL", -1.0)
+    monkeypatch.setattr("workbench.blind.hiding.LEAST_TRAVEL", -1.0)
     first = hide(21066)
     assert first.truth.effect != truth.effect
     assert np.ptp(first.fit.columns["position_m"]) < 0.01 * truth.valve.stroke_m

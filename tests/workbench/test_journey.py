@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 
 from config.recording import Recording, write_recording
-from config.valve import ValveFile
+from config.valve_file import ValveFile
 from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.generators import case
-from workbench.hiding import hide
+from workbench.blind.hiding import hide
 
 DURATION_S = 10.0
 

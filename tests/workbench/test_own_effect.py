@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from config.recording import write_recording
-from config.valve import load_valve
+from config.valve_file import load_valve
 from config.writing import valve_toml, write_valve
 from positioner.cli.main import main
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.fitting import fit
-from workbench.journal import Journal
+from workbench.fit.fitting import fit
+from workbench.select.extension_journal import Journal
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 BARE = drawn_valve(np.random.default_rng(11))

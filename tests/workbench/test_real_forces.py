@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from config.recording import Recording
-from config.valve import ValveFile
+from config.valve_file import ValveFile
 from positioner.cli.main import main
 from tests.workbench.valves import SEED
-from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
-from workbench.imposed import read_imposed
+from workbench.data.imposed_motion import read_imposed
+from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 BARS = (1, 3, 5, 7)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from config.recording import Recording
-from config.valve import EffectTable, ValveFile
+from config.valve_file import EffectTable, ValveFile
 from workbench import compare, diagnose
-from workbench.diagnosis import Diagnosis
-from workbench.friction_balance import forces
-from workbench.record import ready
+from workbench.compare.friction_balance import forces
+from workbench.data.record import ready
+from workbench.select.diagnosis import Diagnosis
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
 MOTOR = ValveFile.model_validate(

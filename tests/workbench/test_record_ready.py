@@ -6,8 +6,8 @@ import pytest
 from config.errors import InputError
 from config.recording import Column, Recording
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
-from workbench.noise import noise_std_m, quantum_m, repeatability_m
-from workbench.record import ready, require_units
+from workbench.data.noise import noise_std_m, quantum_m, repeatability_m
+from workbench.data.record import ready, require_units
 
 
 def plain(count: int = 1000) -> dict[str, Column]:

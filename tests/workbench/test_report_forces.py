@@ -10,8 +10,8 @@ from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.benches import VALVE, benches
 from tests.workbench.pages import Page, read
-from workbench.force_balance import balanced_n
-from workbench.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.forces.force_balance import balanced_n
+from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.report import Subject, report_forces
 
 plotly = pytest.importorskip("plotly")

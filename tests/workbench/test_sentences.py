@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.motion import Slip
-from workbench.phases import SlipEvents
-from workbench.sentences import Findings, sentences, shortened
+from workbench.compare.phases import SlipEvents
+from workbench.compare.sentences import Findings, sentences, shortened
+from workbench.data.motion import Slip
 
 SLIPS = tuple(Slip(i, i + 1, 0.0, 1e-3 * (-1) ** i, (-1) ** i) for i in range(25))
 FOUND = Findings(

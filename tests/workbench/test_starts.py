@@ -5,10 +5,10 @@ import pytest
 
 from sim.composition import COULOMB, STATIC, Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, with_effect
-from workbench.fitting import fit
-from workbench.hiding import hide
-from workbench.parameters import free_parameters
-from workbench.starts import with_plays
+from workbench.blind.hiding import hide
+from workbench.fit.fitting import fit
+from workbench.fit.starts import with_plays
+from workbench.model.parameters import free_parameters
 
 VALVE = drawn_valve(np.random.default_rng(0))
 

@@ -3,12 +3,12 @@
 import numpy as np
 
 from config.recording import Column, Recording
-from config.valve import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
+from config.valve_file import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.open_loop import respond
-from workbench.free_run import FreeRun
-from workbench.measures import rms
-from workbench.record import ready
+from workbench.compare.measures import rms
+from workbench.data.record import ready
+from workbench.model.free_run import FreeRun
 
 SEED = load_valve(shipped_valve("seed"))
 NOISE_M = 5e-5

@@ -10,10 +10,10 @@ and `charts` draw, `series` thins out what is too long to be drawn, `page` sets 
 are plotly.js's. The same input, the same bytes.
 """
 
-from workbench.report.comparison import report_comparison
-from workbench.report.diagnosis import report_diagnosis
-from workbench.report.forces import report_forces
-from workbench.report.journal import report_journal
+from workbench.report.comparison_report import report_comparison
+from workbench.report.diagnosis_report import report_diagnosis
+from workbench.report.forces_report import report_forces
+from workbench.report.journal_report import report_journal
 from workbench.report.page import Subject, require_plotly
 
 __all__ = ["Subject", "report_comparison", "report_diagnosis", "report_forces", "report_journal", "require_plotly"]

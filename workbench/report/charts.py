@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from workbench.report.series import significant
-from workbench.residuals import Correlation, Profile, Spectrum
+from workbench.compare.residuals import Correlation, Profile, Spectrum
+from workbench.report.plot_series import significant
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]

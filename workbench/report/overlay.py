@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column
-from workbench.phases import PHASES, STUCK, SlipEvents
+from workbench.compare.phases import PHASES, STUCK, SlipEvents
 from workbench.report.charts import GRID, INK, MEASURED, QUIET, Figure, Trace, axis, layout, line
-from workbench.report.series import drawn, rounded, running_s
+from workbench.report.plot_series import drawn, rounded, running_s
 
 SHADES = {
     "slipping up": "rgba(60,130,200,0.13)",

@@ -13,7 +13,7 @@ from string import Template
 from typing import Any
 
 from config.errors import InputError
-from config.valve import ValveFile
+from config.valve_file import ValveFile
 from workbench.report.units import Shown
 
 HERE = Path(__file__).parent

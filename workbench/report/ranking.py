@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.report.charts import EXTENDED, INK, MEASURED, OPEN, QUIET, Figure, axis, layout, marked
-from workbench.report.series import significant
+from workbench.report.plot_series import significant
 from workbench.report.units import Quantity
 
 OUTCOMES = {

@@ -5,17 +5,18 @@ from dataclasses import replace
 
 import pytest
 
-from config.daemon import DaemonFile
-from config.modbus_server import ExceptionCode, RegisterError
-from config.registers import BY_NAME, Fault, HealthCause, Mode, Namur, Why
-from config.slave import SlaveFile
-from config.valve import load_valve, shipped_valve
-from positioner.cli.parts.virtual import virtual_cycle
+from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status
+from config.daemon_file import DaemonFile
+from config.registers import BY_NAME
+from config.slave_file import SlaveFile
+from config.valve_file import load_valve, shipped_valve
+from fieldbus.modbus.server import ExceptionCode, RegisterError
 from positioner.control.requests import Requests
 from positioner.daemon.health import Health, condition
-from positioner.daemon.supervisory import SupervisoryRegisters
-from positioner.estimation.applied import Applied, Ratios
-from sim.slave.modbus import device_of
+from positioner.daemon.supervisory_registers import SupervisoryRegisters
+from positioner.estimation.acceptance import Applied, Ratios
+from positioner.virtual.virtual_cycle import virtual_cycle
+from sim.slave.modbus_slave import device_of
 
 STROKE_M = 0.1016
 LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
@@ -58,24 +59,24 @@ class Panel:
         self.run(0.1)
 
     @property
-    def status(self) -> tuple[Namur, HealthCause]:
-        return Namur(int(self.get("ne107"))), HealthCause(int(self.get("ne107_cause")))
+    def status(self) -> tuple[Ne107Status, Ne107Cause]:
+        return Ne107Status(int(self.get("ne107"))), Ne107Cause(int(self.get("ne107_cause")))
 
 
 def test_from_start_through_identification_to_good() -> None:
     """C while it does not follow the DCS, then good; the first applied identification is the baseline."""
     panel = Panel()
-    assert panel.status == (Namur.FUNCTION_CHECK, HealthCause.NOT_AUTOMATIC)
+    assert panel.status == (Ne107Status.FUNCTION_CHECK, Ne107Cause.NOT_AUTOMATIC)
     panel.set("mode", Mode.AUTOMATIC)
     panel.run(0.1)
-    assert panel.status == (Namur.FUNCTION_CHECK, HealthCause.NOT_IDENTIFIED)
+    assert panel.status == (Ne107Status.FUNCTION_CHECK, Ne107Cause.NOT_IDENTIFIED)
     for name in ("eta_1", "eta_2", "eta_3"):
         panel.set(name, 0)
     panel.run(0.1)
-    assert panel.status == (Namur.FUNCTION_CHECK, HealthCause.EXCITED)
+    assert panel.status == (Ne107Status.FUNCTION_CHECK, Ne107Cause.EXCITED)
     panel.identify()
     assert panel.get("identifications") == 1
-    assert panel.status == (Namur.GOOD, HealthCause.NONE)
+    assert panel.status == (Ne107Status.GOOD, Ne107Cause.NONE)
     seed = load_valve(shipped_valve("seed")).valve
     assert panel.get("friction_baseline") == pytest.approx(seed.coulomb_n / seed.diaphragm_area_m2, rel=0.05)
     assert panel.get("friction_ratio") == 1.0
@@ -109,30 +110,30 @@ def test_moves_add_up_to_travel_reversals_and_stiction() -> None:
         panel.set("reference", 0.31 + 0.01 * (small % 2) * 1.2 + 0.0)
         panel.run(0.5)
     assert panel.get("stiction_index") == pytest.approx(6 / 10, abs=0.01)
-    assert panel.status == (Namur.MAINTENANCE_REQUIRED, HealthCause.STICTION)
+    assert panel.status == (Ne107Status.MAINTENANCE_REQUIRED, Ne107Cause.STICTION)
     panel.set("health_reset", 1)
     panel.run(0.01)
     assert [panel.get(name) for name in ("travel", "reversals", "stiction_index", "moves_judged")] == [0, 0, 0, 0]
-    assert panel.status == (Namur.GOOD, HealthCause.NONE)
+    assert panel.status == (Ne107Status.GOOD, Ne107Cause.NONE)
 
 
 @pytest.mark.parametrize(
     ("factor", "alpha_pa", "cause"),
     [
-        (1.7, 100e3, HealthCause.FRICTION_HIGH),
-        (0.4, 70e3, HealthCause.FRICTION_LOW),
-        (1.2, 90e3, HealthCause.NONE),
+        (1.7, 100e3, Ne107Cause.FRICTION_HIGH),
+        (0.4, 70e3, Ne107Cause.FRICTION_LOW),
+        (1.2, 90e3, Ne107Cause.NONE),
     ],
 )
 def test_a_packing_that_ages_is_found_by_the_next_identification(
-    factor: float, alpha_pa: float, cause: HealthCause
+    factor: float, alpha_pa: float, cause: Ne107Cause
 ) -> None:
     seed = load_valve(shipped_valve("seed")).valve
     aged = {"at_s": 2.0, "coulomb_n": factor * seed.coulomb_n, "static_n": factor * seed.static_n}
     panel = Panel(change=(aged,))
     panel.set("mode", Mode.AUTOMATIC)
     panel.identify()
-    assert panel.status == (Namur.GOOD, HealthCause.NONE)
+    assert panel.status == (Ne107Status.GOOD, Ne107Cause.NONE)
     panel.run(1.0)
     panel.set("alpha", alpha_pa)
     panel.identify()
@@ -170,39 +171,41 @@ def with_friction(panel: Panel, ratio: float) -> Health:
     ("ratio", "causes"),
     [
         (1.49, ()),
-        (1.51, (HealthCause.FRICTION_HIGH,)),
+        (1.51, (Ne107Cause.FRICTION_HIGH,)),
         (0.51, ()),
-        (0.49, (HealthCause.FRICTION_LOW,)),
+        (0.49, (Ne107Cause.FRICTION_LOW,)),
     ],
 )
-def test_friction_far_from_its_baseline_asks_for_maintenance(ratio: float, causes: tuple[HealthCause, ...]) -> None:
+def test_friction_far_from_its_baseline_asks_for_maintenance(ratio: float, causes: tuple[Ne107Cause, ...]) -> None:
     panel = Panel(LAW)
     panel.set("mode", Mode.AUTOMATIC)
     panel.run(0.01)
-    decision = replace(panel.cycle.snapshot.decision, why=Why.NO_MOVE_ASKED)
+    decision = replace(panel.cycle.snapshot.decision, why=InhibitReason.NO_MOVE_ASKED)
     assert condition(decision, with_friction(panel, ratio)).causes == causes
 
 
 def test_the_worst_class_decides_and_every_cause_is_told() -> None:
     panel = Panel(LAW)
     health = with_friction(panel, 2.0)
-    decision = replace(panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, why=Why.NOT_AUTOMATIC)
+    decision = replace(
+        panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, why=InhibitReason.NOT_AUTOMATIC
+    )
     now = condition(decision, health)
-    assert (now.status, now.cause) == (Namur.FAILURE, HealthCause.FAULT)
-    assert now.causes == (HealthCause.FAULT, HealthCause.NOT_AUTOMATIC, HealthCause.FRICTION_HIGH)
+    assert (now.status, now.cause) == (Ne107Status.FAILURE, Ne107Cause.FAULT)
+    assert now.causes == (Ne107Cause.FAULT, Ne107Cause.NOT_AUTOMATIC, Ne107Cause.FRICTION_HIGH)
     assert now.bits == 0b10000011
 
 
 @pytest.mark.parametrize(
     ("fault", "why", "status", "cause"),
     [
-        (Fault.DEVICE, Why.NOT_AUTOMATIC, Namur.FAILURE, HealthCause.FAULT),
-        (Fault.DCS_SILENT, Why.NOT_AUTOMATIC, Namur.OUT_OF_SPECIFICATION, HealthCause.DCS_SILENT),
-        (Fault.NONE, Why.LAW_BEYOND_LIMITS, Namur.OUT_OF_SPECIFICATION, HealthCause.BEYOND_LIMITS),
-        (Fault.NONE, Why.STUCK, Namur.OUT_OF_SPECIFICATION, HealthCause.STUCK),
+        (Fault.DEVICE, InhibitReason.NOT_AUTOMATIC, Ne107Status.FAILURE, Ne107Cause.FAULT),
+        (Fault.DCS_SILENT, InhibitReason.NOT_AUTOMATIC, Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.DCS_SILENT),
+        (Fault.NONE, InhibitReason.LAW_BEYOND_LIMITS, Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.BEYOND_LIMITS),
+        (Fault.NONE, InhibitReason.STUCK, Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.STUCK),
     ],
 )
-def test_the_class_of_each_fault(fault: Fault, why: Why, status: Namur, cause: HealthCause) -> None:
+def test_the_class_of_each_fault(fault: Fault, why: InhibitReason, status: Ne107Status, cause: Ne107Cause) -> None:
     panel = Panel(LAW)
     mode = Mode.HOLD if fault else Mode.AUTOMATIC
     decision = replace(panel.cycle.snapshot.decision, mode=mode, fault=fault, why=why)
@@ -218,6 +221,6 @@ def test_limits_of_travel_and_reversals_of_0_are_none() -> None:
         panel.set("reference", reference)
         panel.run(0.3)
     decision = panel.cycle.snapshot.decision
-    assert condition(decision, panel.health).causes == (HealthCause.TRAVEL, HealthCause.REVERSALS)
+    assert condition(decision, panel.health).causes == (Ne107Cause.TRAVEL, Ne107Cause.REVERSALS)
     free = Health(replace(panel.health.settings, travel_limit_m=0.0, reversal_limit=0), panel.health.record)
     assert condition(decision, free).causes == ()

@@ -1,0 +1,134 @@
+"""The daemon's full cycle against a bare pymodbus loop on the same slave, and the control core alone.
+
+Full cycle: sample to command on the wire, with supervision, states, law, estimation, publishing and recording. The
+slave is a process of its own in lockstep; the ways take turns cycle by cycle, so the ratio holds on a noisy machine and
+each begins, as in real time, with the caches of others' work. Half of the time the daemon identifies.
+"""
+
+import itertools
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from pymodbus.client import ModbusTcpClient
+
+from benchmarks.bus import COMMAND, PUSH_PA, measured, ratio, slave
+from config.codes import Mode
+from config.daemon_file import DaemonFile
+from config.device import ModbusTcpDevice
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
+from drivers import driver_for
+from positioner.control.controller import Controller
+from positioner.control.requests import QUIET, Requests
+from positioner.control.sample import Sample
+from positioner.control.settings import Settings
+from positioner.daemon.cycle import Cycle
+from positioner.daemon.link import Link
+from positioner.daemon.pacing import DevicePace
+from positioner.daemon.recorder import Recorder
+from positioner.daemon.snapshot import Snapshot
+from positioner.virtual.virtual_cycle import Script, played, virtual_cycle
+from sim.slave.modbus_slave import device_of
+
+STROKE_M = 0.1016
+DAEMON = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}})
+FIRST = Requests(mode=Mode.AUTOMATIC, mode_writes=1, alpha_pa=44e3, beta_pa=13e3)
+TURN_S = 1.0
+TARGET_RATIO, TARGET_US = 0.8, 40.0
+
+
+def report() -> list[str]:
+    """Return lines: rates of the bare loop and the full cycle, their ratio, and the core's time a step."""
+    bare_us, full_us = full_cycle()
+    core_us = sorted(core_alone())
+    return [
+        f"bare pymodbus, function 23        {1e6 / statistics.median(bare_us):7.0f} cycles/s",
+        f"the daemon's full cycle           {1e6 / statistics.median(full_us):7.0f} cycles/s",
+        f"ratio                             {ratio(bare_us, full_us)}, target at least {TARGET_RATIO}",
+        f"control core alone                {statistics.fmean(core_us):7.1f} us a step on average, median "
+        f"{statistics.median(core_us):.1f}, 99 % {core_us[int(0.99 * len(core_us))]:.1f} (target below {TARGET_US:g})",
+    ]
+
+
+def busy_dcs() -> Script:
+    """Identify for a second, step for a second, and so on: what a working daemon does, and more of it.
+
+    It writes when something changes, as a DCS does: its writes are no part of the cycle's work.
+    """
+
+    def ask(snapshot: Snapshot, requests: Requests) -> Requests:
+        turn = int(snapshot.sample.time_s / TURN_S)
+        if turn % 2 == 0:
+            return requests if requests.eta == (0, 0, 0) else replace(requests, eta=(0, 0, 0))
+        reference_m = (0.65 if turn % 4 == 1 else 0.4) * STROKE_M
+        if (requests.eta, requests.reference_m) == (QUIET, reference_m):
+            return requests
+        new = requests.reference_m != reference_m
+        return replace(
+            requests, eta=QUIET, reference_m=reference_m, reference_writes=requests.reference_writes + int(new)
+        )
+
+    return ask
+
+
+def full_cycle() -> tuple[list[float], list[float]]:
+    """Return the times of bare and full cycles, us."""
+    with slave() as port, slave() as other_port, tempfile.TemporaryDirectory() as folder:
+        pace = DevicePace()
+        link = Link(driver_for(ModbusTcpDevice(port=port, reply_timeout_s=1.0)), pace)
+        held_pa, _ = link.open()
+        recorder = Recorder(Path(folder), "v", 50_000_000, 2)
+        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa), pace, FIRST, recorder)
+        recorder.start()
+        with ModbusTcpClient("127.0.0.1", port=other_port) as bare:
+            times = measured({"bare": bare_loop(bare), "full": full_loop(cycle)})
+        recorder.stop()
+        link.release()
+    return times["bare"], times["full"]
+
+
+def bare_loop(client: ModbusTcpClient) -> Callable[[], object]:
+    """Return one cycle of a loop that only talks."""
+    words = COMMAND.format.encode(PUSH_PA)
+    return lambda: client.readwrite_registers(
+        read_address=0, read_count=COMMAND.address, write_address=COMMAND.address, values=words
+    )
+
+
+def full_loop(cycle: Cycle) -> Callable[[], object]:
+    """Return one cycle of the daemon, its DCS included."""
+    script = busy_dcs()
+
+    def once() -> None:
+        cycle.requests = script(cycle.snapshot, cycle.requests)
+        cycle.once()
+
+    return once
+
+
+def core_alone() -> Iterator[float]:
+    """Yield the time of each step of the control core on the samples of a virtual run, us."""
+    file = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "sensor": {"noise_std_m": 1e-5}})
+    cycle = virtual_cycle(DAEMON, device_of(file, shipped_valve("seed")), FIRST)
+    script = busy_dcs()
+    seen: list[tuple[Sample, Requests]] = []
+
+    def noting(snapshot: Snapshot, requests: Requests) -> Requests:
+        seen.append((snapshot.sample, requests))
+        return script(snapshot, requests)
+
+    for _ in itertools.islice(played(cycle, noting, 8 * TURN_S), None):
+        pass
+    controller = Controller(Settings.of(DAEMON), 0.0)
+    for sample, requests in seen:
+        start_ns = time.perf_counter_ns()
+        controller.step(sample, requests)
+        yield (time.perf_counter_ns() - start_ns) / 1e3
+
+
+if __name__ == "__main__":
+    print("\n".join(report()))

@@ -1,0 +1,140 @@
+"""Every code that a register serves: modes, states, faults, and why something was not done. Texts are said here only.
+
+The numbers go over the wire: never renumber. A member is written `NAME = number, text`; the register table and the
+documents list the texts by `listed`, so that none of them says otherwise.
+"""
+
+from enum import IntEnum
+from typing import Self
+
+
+class Code(IntEnum):
+    """A number that is served, and what it says in plain words."""
+
+    text: str
+
+    def __new__(cls, number: int, text: str = "") -> Self:
+        """Make a member of its number and its text."""
+        member = int.__new__(cls, number)
+        member._value_ = number
+        member.text = text
+        return member
+
+
+def listed(codes: type[Code]) -> str:
+    """Return `number text, number text, ...` of all members."""
+    return ", ".join(f"{int(each)} {each.text}" for each in codes)
+
+
+class Mode(Code):
+    """Who commands the pressure."""
+
+    HOLD = 0, "hold"
+    MANUAL = 1, "manual"
+    AUTOMATIC = 2, "automatic"
+
+
+class State(Code):
+    """The states of the seed's control logic (4.1)."""
+
+    S0_START = 0, "S0 start"
+    S1_UP = 1, "S1 up"
+    S2_DOWN = 2, "S2 down"
+    S3_IDENTIFY = 3, "S3 identify"
+
+
+class Fault(Code):
+    """Why the positioner has let go of the valve; latched until acknowledged."""
+
+    NONE = 0, "none"
+    NO_REPLY = 1, "no reply"
+    STALE = 2, "stale"
+    IMPLAUSIBLE = 3, "implausible"
+    DEVICE = 4, "device"
+    RESTARTED = 5, "device restarted"
+    DCS_SILENT = 6, "DCS silent"
+
+
+class Quality(Code):
+    """What the last measurement is worth."""
+
+    GOOD = 0, "good"
+    REPEATED = 1, "repeated"
+    LOST = 2, "lost"
+
+
+class InhibitReason(Code):
+    """Why the law, or the excitation, is not doing what was asked; served as register `why`."""
+
+    NOTHING = 0, "it is"
+    NOT_AUTOMATIC = 1, "not automatic"
+    NO_ESTIMATES = 2, "no estimates"
+    NO_MOVE_ASKED = 3, "no move asked"
+    ALPHA_BELOW_BREAKAWAY = 4, "alpha below break-away"
+    EXCITATION_BEYOND_LIMITS = 5, "excitation beyond pressure limits"
+    EXCITATION_TOO_LONG = 6, "excitation too long"
+    AMPLITUDE_ZERO = 7, "amplitude is zero"
+    LAW_BEYOND_LIMITS = 8, "the law asks for a pressure beyond the limits"
+    STUCK = 9, "stuck: the strongest pulse allowed does not move the stem"
+    TRIM_ENDED = 10, "the trim ended outside its dead band"
+
+
+class Refusal(Code):
+    """Why an estimate is not valid; 0 when it is."""
+
+    VALID = 0, "valid"
+    NOT_STARTED = 1, "identification has not been started"
+    NOT_ASKED = 2, "this estimate was not asked for"
+    WAITING_FOR_MOTION = 3, "the stem has not been seen to move yet"
+    WINDOW_TOO_SHORT = 4, "the stem moves, but not for long enough yet"
+    MOTION_ENDED = 5, "the stem stopped or turned round before it had moved for long enough"
+    RECORD_BROKEN = 6, "the samples had a gap or their clock jumped back; waiting for a new stretch of motion"
+    ILL_CONDITIONED = 7, "pressure or position varied too little while the stem moved to tell a, b and c apart"
+    NOISE_DOMINATES = (
+        8,
+        "noise of the sensors, or what lies between the samples, outweighs what tells a, b and c apart: biased",
+    )
+    TOO_UNCERTAIN = 9, "the standard deviation is larger than allowed"
+    PARAMETERS_MISSING = 10, "friction needs a, b and c, and none have been identified yet"
+    A_POSITIVE = 11, "a came out positive: viscous friction would drive the stem"
+    B_NOT_NEGATIVE = 12, "b did not come out negative: the spring would push the stem away from rest"
+    C_NOT_POSITIVE = 13, "c did not come out positive: pressure would pull the stem back"
+    K_NOT_NEGATIVE = 14, "k did not come out negative: Coulomb friction would drive the stem"
+    B_OVER_C_NOT_NEGATIVE = 15, "b/c did not come out negative: more pressure would hold the stem lower"
+    K_OVER_C_NOT_NEGATIVE = 16, "k/c did not come out negative: friction would drive the stem"
+    IMPLAUSIBLE_CHANGE = 17, "the value is too far from the one in use"
+    COMMANDS_MISSED = 18, "commands were missed in a gap of the samples: a, b and c singly hang on each of them"
+    MASS_NOT_IDENTIFIABLE = (
+        19,
+        "the motion does not tell the mass: pressure changes, or samples follow, too slowly; "
+        "only b/c and k/c can be known",
+    )
+    MODEL_DOES_NOT_FIT = 20, "the motion is not that of the model: the residuals outweigh the sensor's noise"
+
+
+class Ne107Status(Code):
+    """Status of a device by NAMUR NE 107, best first."""
+
+    GOOD = 0, "good"
+    MAINTENANCE_REQUIRED = 1, "M maintenance"
+    OUT_OF_SPECIFICATION = 2, "S specification"
+    FUNCTION_CHECK = 3, "C check"
+    FAILURE = 4, "F failure"
+
+
+class Ne107Cause(Code):
+    """What a valve's NE 107 status rests on."""
+
+    NONE = 0, "nothing"
+    FAULT = 1, "fault (see there)"
+    NOT_AUTOMATIC = 2, "not automatic"
+    EXCITED = 3, "excited"
+    NOT_IDENTIFIED = 4, "not identified"
+    DCS_SILENT = 5, "DCS silent"
+    BEYOND_LIMITS = 6, "the law asks for a pressure beyond the limits"
+    STUCK = 7, "stuck"
+    FRICTION_HIGH = 8, "friction high: packing tight"
+    FRICTION_LOW = 9, "friction low: packing leaks"
+    STICTION = 10, "stiction"
+    TRAVEL = 11, "travel"
+    REVERSALS = 12, "reversals"

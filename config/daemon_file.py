@@ -1,0 +1,277 @@
+"""The file of the daemon: `positioner run CONFIG.toml`.
+
+One valve is table `[valve]`, with the other tables beside it. Several are `[[valve]]`, each with a `unit`: the other
+tables then say what the valves have in common, and `[valve.device]`, `[valve.safety]` and so on what is this one's,
+key by key (save a device on another bus, which has all its keys itself). They share the log and the supervisory server,
+where the unit tells them apart.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from config.bus_plugins import AnyDevice
+from config.device import ActionName, ModbusTcpDevice
+from config.errors import InputError
+from config.loading import Fraction, NonNegative, Positive, Schema, read_toml, validated
+from config.tls_table import Tls
+
+
+class PositionedValve(Schema):
+    """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
+
+    name: str = "valve"
+    stroke_m: Positive
+    breakaway_pa: Positive | None = None
+    """F_s / A where it is known: the excitation's constant part must exceed it."""
+
+
+class Cycle(Schema):
+    """Table `[cycle]`: in real time, or as fast as a device in lockstep answers, on the device's clock."""
+
+    pace: Literal["real_time", "device"] = "real_time"
+    period_s: Annotated[float, Field(ge=2e-4, le=10)] = 1e-3
+    """Of the loop in real time; a device in lockstep has its own."""
+
+
+class PressureLimits(Schema):
+    """Table `[pressure]`: every command lies between these."""
+
+    minimum_pa: NonNegative = 0.0
+    maximum_pa: Positive = 420e3
+
+    @model_validator(mode="after")
+    def _minimum_is_below_maximum(self) -> Self:
+        if self.minimum_pa >= self.maximum_pa:
+            raise ValueError(f"minimum_pa must be below maximum_pa ({self.maximum_pa:g} Pa)")
+        return self
+
+
+class Safety(Schema):
+    """Table `[safety]`: what ends in the safe state, and what that is."""
+
+    action: ActionName = "hold"
+    """On a fault of the device or its bus, and when the daemon ends."""
+    lost_after_cycles: Annotated[int, Field(ge=1)] = 3
+    stale_after_s: Positive = 0.1
+    travel_margin: Fraction = 0.1
+    """A position farther than this fraction of the stroke outside the stroke is implausible."""
+    heartbeat_timeout_s: NonNegative = 0.0
+    """Silence of the DCS that is a fault; 0 is never."""
+    heartbeat_action: ActionName = "hold"
+
+
+class Identification(Schema):
+    """Table `[identification]`: the window of the algebraic identifier, its derivative filters, the sensors' noise."""
+
+    window_s: Positive = 0.8
+    minimum_window_s: Positive = 0.4
+    derivative_window_s: Positive = 0.05
+    noise_std_m: Positive | None = None
+    """Standard deviation of the position sensor's noise; measured at rest where nobody has said."""
+    pressure_noise_std_pa: NonNegative = 0.0
+    pressure_held: bool = True
+    """Whether the pressure is held between samples; false for an actuator that lags: then it runs on linearly."""
+
+    @model_validator(mode="after")
+    def _windows_nest(self) -> Self:
+        if self.minimum_window_s > self.window_s:
+            raise ValueError(f"minimum_window_s must be at most window_s ({self.window_s:g} s)")
+        return self
+
+
+class Excitation(Schema):
+    """Table `[excitation]`: what S3 applies until the DCS writes otherwise, and how long at the most."""
+
+    alpha_pa: NonNegative = 0.0
+    beta_pa: NonNegative = 13238.0
+    omega_rad_per_s: Positive = 1.0
+    limit_s: Positive = 10.0
+
+
+class Law(Schema):
+    """Table `[law]`: an earlier identification's ratios, so that a restart need not excite the valve again."""
+
+    b_over_c_pa_per_m: Annotated[float, Field(lt=0)]
+    k_over_c_pa: Annotated[float, Field(lt=0)]
+
+
+class Control(Schema):
+    """Table `[control]`: which law follows the reference, and what the law for small moves may do."""
+
+    law: Literal["seed", "breakaway"] = "seed"
+    dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
+    """Error at rest that is left alone, as a fraction of the stroke."""
+    push_limit_pa: Positive | None = None
+    """The most a pulse may push beyond the balance of the moving stem; F_c / A as identified where nobody says."""
+
+
+class Supervisory(Schema):
+    """Table `[supervisory]`: where the DCS finds the registers. Port 0 takes any free one; the daemon says which."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 5502
+    unit: Annotated[int, Field(ge=1, le=247)] = 1
+    tls: Tls | None = None
+    """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
+
+
+class Recorder(Schema):
+    """Table `[recorder]`: recordings in a folder, a new file at a size, the oldest deleted beyond a number."""
+
+    folder: str
+    file_bytes: Annotated[int, Field(ge=10_000)] = 50_000_000
+    keep_files: Annotated[int, Field(ge=1)] = 20
+
+
+class Health(Schema):
+    """Table `[health]`: what counts as wear, from where on it calls for maintenance, and where its counts are kept.
+
+    A limit of 0 is none.
+    """
+
+    folder: str | None = None
+    """One small file for each valve there keeps counts and baseline over restarts; without it they begin anew."""
+    dead_band: Annotated[float, Field(gt=0, le=0.1)] = 0.005
+    """Motion that does not count as travel, as a fraction of the stroke; widened to 12 times the noise."""
+    settle_s: Positive = 1.0
+    """A reference must stand for so long before the move to it is judged."""
+    friction_high: Annotated[float, Field(ge=0)] = 1.5
+    """Friction over its baseline, above which the packing is too tight."""
+    friction_low: Annotated[float, Field(ge=0, lt=1)] = 0.5
+    """Friction over its baseline, below which the packing leaks."""
+    stiction_limit: Fraction = 0.5
+    travel_limit_strokes: NonNegative = 0.0
+    reversal_limit: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _high_is_above_the_baseline(self) -> Self:
+        if 0 < self.friction_high <= 1:
+            raise ValueError(f"friction_high must be above 1, or 0 for no limit, got {self.friction_high:g}")
+        return self
+
+
+class Log(Schema):
+    """Table `[log]`: JSON lines on standard error."""
+
+    level: Literal["debug", "info", "warning", "error"] = "info"
+
+
+class DaemonFile(Schema):
+    """A whole daemon file."""
+
+    valve: PositionedValve
+    device: AnyDevice = ModbusTcpDevice()
+    cycle: Cycle = Cycle()
+    pressure: PressureLimits = PressureLimits()
+    safety: Safety = Safety()
+    identification: Identification = Identification()
+    excitation: Excitation = Excitation()
+    law: Law | None = None
+    control: Control = Control()
+    supervisory: Supervisory = Supervisory()
+    recorder: Recorder | None = None
+    health: Health = Health()
+    log: Log = Log()
+
+
+SHARED = frozenset({"supervisory", "log"})
+"""Tables that the valves of a daemon have together."""
+OWN = frozenset(DaemonFile.model_fields) - SHARED - {"valve"}
+"""Tables that each valve of several may have for itself."""
+
+
+def load_daemon(path: Path, valve: str | None = None) -> DaemonFile:
+    """Read the file of a daemon and return the valve of that name; without a name, the only one.
+
+    Raises:
+        InputError: names file, key, value and what is allowed; or which valves there are.
+    """
+    files = load_valves(path)
+    names = [file.valve.name for file in files]
+    if valve is None and len(files) > 1:
+        raise InputError(str(path), f"has several valves, say which: {', '.join(names)}")
+    if valve is not None and valve not in names:
+        raise InputError(str(path), f"valve: allowed are {', '.join(names)}, got {valve}")
+    return files[0 if valve is None else names.index(valve)]
+
+
+def load_valves(path: Path) -> tuple[DaemonFile, ...]:
+    """Read the file of a daemon; return each of its valves as if it were alone in it.
+
+    Raises:
+        InputError: names file, key, value and what is allowed.
+    """
+    tables, source = read_toml(path), str(path)
+    if not tables.get("valve") or not isinstance(tables["valve"], list):
+        return (validated(DaemonFile, tables, source, path.parent),)
+    alone = (_alone(tables, entry, f"{source}: valve {number}") for number, entry in enumerate(tables["valve"], 1))
+    files = tuple(validated(DaemonFile, each, where, path.parent) for each, where in alone)
+    if problem := _clash(files) or _crowded_line(files):
+        raise InputError(source, problem)
+    return files
+
+
+def _alone(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, Any], str]:
+    """Return the tables that would describe this valve alone, and what to call it in a complaint."""
+    if not isinstance(entry, dict):
+        raise InputError(where, "is not a table")
+    where = f"{where} ({entry['name']})" if "name" in entry else where
+    allowed = {*PositionedValve.model_fields, "unit", *OWN}
+    if unknown := entry.keys() - allowed:
+        raise InputError(where, f"valve.{min(unknown)}: unknown key; allowed here: {', '.join(sorted(allowed))}")
+    for key in ("name", "unit"):
+        if key not in entry:
+            raise InputError(where, f"valve.{key}: is required and missing")
+    own = {key: _merged(tables.get(key, {}), entry[key]) for key in entry.keys() & OWN}
+    supervisory = tables.get("supervisory", {})
+    if "unit" in supervisory:
+        raise InputError(where, "supervisory.unit: each of several valves has its own unit, in [[valve]]")
+    valve = {key: value for key, value in entry.items() if key in PositionedValve.model_fields}
+    return {**tables, **own, "valve": valve, "supervisory": {**supervisory, "unit": entry["unit"]}}, where
+
+
+def _merged(common: Any, own: Any) -> Any:
+    """Return a table with what is this valve's put over what is everybody's; what is no table is left to the schema."""
+    if not isinstance(common, dict) or not isinstance(own, dict):
+        return own
+    # A device on another bus has nothing in common with the others'.
+    return own if own.get("bus") not in (None, common.get("bus", "modbus")) else {**common, **own}
+
+
+def _clash(files: Sequence[DaemonFile]) -> str | None:
+    """Say which two valves cannot be told apart, or are one."""
+    for first, second in combinations(files, 2):
+        names = f"{first.valve.name} and {second.valve.name}"
+        if first.valve.name == second.valve.name:
+            return f"valve.name: two valves have {first.valve.name!r}, allowed is one each"
+        if first.supervisory.unit == second.supervisory.unit:
+            return f"valve.unit: {names} have {first.supervisory.unit}, allowed is one each"
+        if problem := first.device.clash(second.device):
+            return f"valve.device: {names} have {problem}, allowed is one each"
+    return None
+
+
+def _crowded_line(files: Sequence[DaemonFile]) -> str | None:
+    """Say which valve does not get by with its turn on a line that it shares with others.
+
+    Each gets an equal share of the period, so that one that does not answer takes time from nobody but itself.
+    """
+    users = Counter(file.device.line for file in files)
+    for file in files:
+        line, turn_s = file.device.line, file.device.turn_s
+        if line is None or users[line] == 1:
+            continue
+        if file.cycle != (first := next(each for each in files if each.device.line == line)).cycle:
+            return f"{file.valve.name}: cycle must be that of {first.valve.name}, which is on the same line {line}"
+        share_s = file.cycle.period_s / users[line]
+        if file.cycle.pace == "real_time" and turn_s > share_s:
+            return (
+                f"{file.valve.name}: cycle.period_s must be at least {users[line] * turn_s:.3g} s, for {users[line]} "
+                f"valves on line {line} of which each may take {turn_s:.3g} s, got {file.cycle.period_s:g}"
+            )
+    return None

@@ -1,0 +1,72 @@
+"""Numbers as 16-bit registers: the one place where a value becomes words on the wire and back.
+
+A value of several words is sent most significant word first (`big`) or last (`little`); inside a word the most
+significant byte always comes first, as the Modbus specification has it.
+"""
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+WireType = Literal["uint16", "int16", "uint32", "int32", "uint64", "float32", "float64"]
+WordOrder = Literal["big", "little"]
+
+LETTER: dict[WireType, str] = {
+    "uint16": "H",
+    "int16": "h",
+    "uint32": "I",
+    "int32": "i",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
+"""Of the module `struct`, for each type."""
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """How one value lies in registers."""
+
+    type: WireType
+    word_order: WordOrder = "big"
+
+    @property
+    def words(self) -> int:
+        """How many registers the value takes."""
+        return struct.calcsize(">" + LETTER[self.type]) // 2
+
+    @property
+    def is_float(self) -> bool:
+        """Whether the value is a floating-point number."""
+        return self.type in ("float32", "float64")
+
+    def encode(self, value: float) -> list[int]:
+        """Return the registers of a value; whole-number types are rounded to nearest.
+
+        Raises:
+            ValueError: the type cannot hold the value (out of range, or not a number where it must be one).
+        """
+        if not self.is_float:
+            if not math.isfinite(value):
+                raise ValueError(f"{value} does not fit {self.type}")
+            value = round(value)
+        try:
+            packed = struct.pack(">" + LETTER[self.type], value)
+        except (struct.error, OverflowError):
+            raise ValueError(f"{value} does not fit {self.type}") from None
+        words = list(struct.unpack(f">{self.words}H", packed))
+        return words if self.word_order == "big" else words[::-1]
+
+    def decode(self, words: Sequence[int]) -> float:
+        """Return the value in as many registers as `words` says; a float even of a whole-number type.
+
+        Raises:
+            ValueError: not that many registers.
+        """
+        if len(words) != self.words:
+            raise ValueError(f"{self.type} takes {self.words} registers, not {len(words)}")
+        ordered = words if self.word_order == "big" else words[::-1]
+        (value,) = struct.unpack(">" + LETTER[self.type], struct.pack(f">{self.words}H", *ordered))
+        return float(value)

@@ -1,0 +1,152 @@
+"""The file of a simulated slave: `positioner sim CONFIG.toml`."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, Tag, model_validator
+
+from config.canopen_device import CanBus
+from config.device import ActionName
+from config.errors import InputError
+from config.loading import NonNegative, Port, Positive, Schema, chosen_by, load
+from config.serial_port import RtuUnit, SerialPort
+from config.tls_table import Tls
+from config.valve_file import shipped_valve
+
+
+class ModbusTcpBus(Schema):
+    """Table `[bus]`: where the slave listens on Modbus TCP."""
+
+    kind: Literal["modbus"] = "modbus"
+    host: str = "127.0.0.1"
+    port: Port = 5020
+    unit: Annotated[int, Field(ge=1, le=247)] = 1
+    tls: Tls | None = None
+    """Modbus/TCP Security in place of Modbus TCP; an operator may write, an observer read."""
+
+
+class ModbusRtuBus(Schema):
+    """Table `[bus]`: the serial line that the slave is on, on Modbus RTU."""
+
+    kind: Literal["rtu"] = "rtu"
+    serial: SerialPort
+    unit: RtuUnit = 1
+
+
+class CanopenBus(CanBus):
+    """Table `[bus]`: the CAN bus on which the slave is a CANopen node."""
+
+    kind: Literal["canopen"] = "canopen"
+
+
+AnyBus = Annotated[
+    Annotated[ModbusTcpBus, Tag("modbus")]
+    | Annotated[ModbusRtuBus, Tag("rtu")]
+    | Annotated[CanopenBus, Tag("canopen")],
+    chosen_by("kind", "modbus"),
+]
+"""A slave's place on any bus; `kind` says which."""
+
+
+class SlaveClock(Schema):
+    """Table `[clock]`: in real time, or one period per pressure command received (lockstep)."""
+
+    mode: Literal["real_time", "lockstep"] = "real_time"
+    period_s: Positive = 1e-3
+
+    @property
+    def period_us(self) -> int:
+        """The period in whole microseconds, the unit of the device's clock."""
+        return round(self.period_s * 1e6)
+
+    @model_validator(mode="after")
+    def _period_is_whole_microseconds(self) -> Self:
+        if self.period_us < 1 or abs(self.period_s * 1e6 - self.period_us) > 1e-6 * self.period_us:
+            raise ValueError("period_s must be a whole number of microseconds")
+        return self
+
+
+class Sensor(Schema):
+    """Table `[sensor]`: the position transmitter. White noise, then rounding to the quantum (0 is none)."""
+
+    noise_std_m: NonNegative = 0.0
+    quantum_m: NonNegative = 0.0
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+class Initial(Schema):
+    """Table `[initial]`: the stem at rest when the device is switched on."""
+
+    position_m: float = 0.0
+    pressure_pa: NonNegative = 0.0
+
+
+class Supply(Schema):
+    """Table `[supply]`: what the I/P can deliver; vent gives 0, fill gives the maximum."""
+
+    maximum_pa: Positive = 420e3
+
+
+class CommunicationTimeout(Schema):
+    """Table `[communication]`: the device's own defence against a silent master."""
+
+    timeout_s: NonNegative = 0.0
+    action: ActionName = "hold"
+
+
+class Change(Schema):
+    """Table `[[change]]`: parameters that take new values at a time, or drift there over a while."""
+
+    at_s: NonNegative
+    over_s: NonNegative = 0.0
+    coulomb_n: NonNegative | None = None
+    static_n: NonNegative | None = None
+    viscous_ns_per_m: NonNegative | None = None
+    spring_n_per_m: Positive | None = None
+
+    @property
+    def targets(self) -> dict[str, float]:
+        """The parameters that change, by name, with their new values."""
+        return self.model_dump(exclude={"at_s", "over_s"}, exclude_none=True)
+
+    @model_validator(mode="after")
+    def _something_changes(self) -> Self:
+        if not self.targets:
+            raise ValueError("names no parameter to change")
+        return self
+
+
+class SlaveFile(Schema):
+    """A whole slave file. `valve` is a path from this file's folder, or the name of a shipped valve."""
+
+    valve: str = "seed"
+    bus: AnyBus = ModbusTcpBus()
+    clock: SlaveClock = SlaveClock()
+    sensor: Sensor = Sensor()
+    initial: Initial = Initial()
+    supply: Supply = Supply()
+    communication: CommunicationTimeout = CommunicationTimeout()
+    change: tuple[Change, ...] = ()
+
+
+def load_slave(path: Path) -> SlaveFile:
+    """Read a slave file.
+
+    Raises:
+        InputError: names file, key, value and what is allowed.
+    """
+    return load(SlaveFile, path)
+
+
+def valve_path(slave: SlaveFile, path: Path) -> Path:
+    """Return the valve file that a slave file at `path` names.
+
+    Raises:
+        InputError: neither a file beside it nor a shipped valve.
+    """
+    beside = path.parent / slave.valve
+    if slave.valve.endswith(".toml"):
+        if not beside.is_file():
+            raise InputError(str(path), f"valve: no file {slave.valve!r} beside it")
+        return beside
+    return shipped_valve(slave.valve)

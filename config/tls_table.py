@@ -1,0 +1,12 @@
+"""The tables that ask for Modbus/TCP Security: whose certificate, whose key, and who signs for the other end."""
+
+from config.loading import NearFile, Positive, Schema
+
+
+class Tls(Schema):
+    """Table `[device.tls]` and the like: this end's certificate and key, and who signs for the other end."""
+
+    authority: NearFile
+    certificate: NearFile
+    key: NearFile
+    handshake_timeout_s: Positive = 0.5

@@ -1,0 +1,1 @@
+"""The CANopen driver: `driver` is what the daemon opens, reads and writes."""

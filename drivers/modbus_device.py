@@ -1,0 +1,218 @@
+"""A device on any Modbus: its quantities by the map of its registers, in requests and replies without frames.
+
+One transaction a cycle (function 23), or two where it must be (16, then 3 or 4). Checked here: function, byte count,
+length, echo, and that every number is one. How a request travels, a subclass knows.
+"""
+
+import math
+import struct
+from abc import ABC, abstractmethod
+
+from pyModbusTCP.constants import EXP_TXT
+
+from config.device import CommunicationAction, ModbusDevice, ModbusMap, Place
+from drivers.boundary import BadReply, Capabilities, Reading, Refused
+from fieldbus.modbus.layout import layout
+
+ILLEGAL_FUNCTION = 1
+ILLEGAL_VALUE = 3
+
+
+class ModbusDriver(ABC):
+    """Drives a device by the map of its registers.
+
+    Args:
+        config: how long the device may take, what its registers hold.
+        who: the device, as errors name it.
+    """
+
+    def __init__(self, config: ModbusDevice, who: str) -> None:
+        self._config = config
+        self._who = who
+        self._sample = _Sample(config.map)
+        self._command = _Setting("command_pa", config.map.command_pa)
+        self._one_transaction = self._sample.table == "holding"  # function 23 reads holding registers only
+
+    @abstractmethod
+    def _connect(self) -> None:
+        """Reach the device (again).
+
+        Raises:
+            DriverError: it cannot be reached.
+        """
+
+    @abstractmethod
+    def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
+        """Return the reply to a request: it begins with `head`, has that length, and is the answer to no other.
+
+        Raises:
+            DriverError: none such came, as `drivers.boundary` has it.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of the device; it keeps its last command until its own time-out."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the device can do; a device without function 23 is known by its first exchange."""
+        return Capabilities(
+            one_transaction=self._one_transaction,
+            device_time=self._config.map.device_time_us is not None,
+            sample_counter=self._config.map.sample_counter is not None,
+        )
+
+    def open(self) -> float:
+        """Connect and return the command the device holds, in Pa; set its time-out and action where it has them.
+
+        Raises:
+            DriverError: not reached within the reply time-out, or one of these refused or garbled; it is closed.
+        """
+        try:
+            self._connect()
+            held_pa = self._held_command_pa()
+            self._configure()
+        except BaseException:
+            self.close()
+            raise
+        return held_pa
+
+    def read(self) -> Reading:
+        """Return a measurement."""
+        sample = self._sample
+        return self._reading(self._ask(sample.read, sample.head, sample.length))
+
+    def write(self, command_pa: float) -> None:
+        """Command a pressure."""
+        self._tell(self._command, command_pa)
+
+    def exchange(self, command_pa: float) -> Reading:
+        """Command a pressure and return the newest measurement after that."""
+        if self._one_transaction:
+            try:
+                return self._write_and_read(command_pa)
+            except Refused as refusal:
+                if refusal.code != ILLEGAL_FUNCTION:
+                    raise
+                self._one_transaction = False
+        self.write(command_pa)
+        return self.read()
+
+    def _held_command_pa(self) -> float:
+        place = self._config.map.command_pa
+        words = place.format.words
+        request = struct.pack(">BHH", 3, place.address, words)
+        (raw,) = layout([place]).unpack(self._ask(request, bytes((3, 2 * words)), 2 + 2 * words))
+        held_pa = place.value(raw)
+        if not math.isfinite(held_pa):
+            raise BadReply(f"{self._about(request)}: the command it holds is {held_pa}")
+        return held_pa
+
+    def _configure(self) -> None:
+        # The action first: a time-out must never start with another's action.
+        config, places = self._config, self._config.map
+        if places.communication_action:
+            action = CommunicationAction[config.communication_action.upper()]
+            self._tell(_Setting("communication_action", places.communication_action), action)
+        if places.communication_timeout_s:
+            self._tell(
+                _Setting("communication_timeout_s", places.communication_timeout_s), config.communication_timeout_s
+            )
+
+    def _write_and_read(self, command_pa: float) -> Reading:
+        sample, command = self._sample, self._command
+        request = sample.read_after + command.head + self._data(command, command_pa)
+        return self._reading(self._ask(request, sample.head_after, sample.length))
+
+    def _tell(self, setting: "_Setting", value: float) -> None:
+        request = b"\x10" + setting.head + self._data(setting, value)
+        self._ask(request, request[:5], 5)
+
+    def _data(self, setting: "_Setting", value: float) -> bytes:
+        try:
+            return setting.data(value)
+        except ValueError as error:
+            raise Refused(f"{self._who}: {setting.name} not sent: {error}", ILLEGAL_VALUE) from None
+
+    def _reading(self, data: bytes) -> Reading:
+        values = self._sample.values(data)
+        if not all(map(math.isfinite, values)):
+            said = ", ".join(f"{name} {value}" for name, value in zip(self._sample.names, values, strict=True))
+            raise BadReply(f"{self._who}: a measurement that is no number: {said}")
+        return self._sample.reading(values)
+
+    def _ask(self, request: bytes, head: bytes, length: int) -> bytes:
+        """Return what follows `head` in the reply, which must begin with it and have that length."""
+        return self._transact(request, head, length)[len(head) :]
+
+    def _refused(self, request: bytes, code: int) -> Refused:
+        """Return what an exception of the device means."""
+        reason = EXP_TXT.get(code, "not in the specification")
+        return Refused(f"{self._about(request)}: exception {code}, {reason}", code)
+
+    def _about(self, request: bytes) -> str:
+        """Say who was asked what."""
+        return f"{self._who}: {_question(request)}"
+
+
+class _Sample:
+    """The registers of one measurement: how to ask for them and what they say."""
+
+    def __init__(self, registers: ModbusMap) -> None:
+        self._places = list(registers.sampled.values())
+        self._layout = layout(self._places)
+        self._is_plain = all(place.is_plain for place in self._places)
+        self.names = list(registers.sampled)
+        self.table = registers.position_m.table
+        where = (self._layout.address, self._layout.words)
+        size = 2 * self._layout.words
+        function = 3 if self.table == "holding" else 4
+        self.length = 2 + size
+        self.read, self.head = struct.pack(">BHH", function, *where), bytes((function, size))
+        self.read_after, self.head_after = struct.pack(">BHH", 23, *where), bytes((23, size))
+
+    def values(self, data: bytes) -> list[float]:
+        """Return the quantities, in the order of `names`."""
+        raw = self._layout.unpack(data)
+        if self._is_plain:
+            return list(raw)
+        return [place.value(each) for place, each in zip(self._places, raw, strict=True)]
+
+    def reading(self, values: list[float]) -> Reading:
+        """Return the quantities as a reading."""
+        said = dict(zip(self.names, values, strict=True))
+        counter, time_us = said.get("sample_counter"), said.get("device_time_us")
+        return Reading(
+            position_m=said["position_m"],
+            pressure_pa=said.get("pressure_pa"),
+            sample_counter=None if counter is None else round(counter),
+            device_time_s=None if time_us is None else time_us / 1e6,
+            status=round(said.get("status", 0)),
+        )
+
+
+class _Setting:
+    """The registers of one quantity that is set: how to write it."""
+
+    def __init__(self, name: str, place: Place) -> None:
+        self.name = name
+        self._place = place
+        self._layout = layout([place])
+        self.head = struct.pack(">HHB", place.address, self._layout.words, 2 * self._layout.words)
+
+    def data(self, value: float) -> bytes:
+        """Return the registers that say a value.
+
+        Raises:
+            ValueError: it is not a finite number, or they cannot hold it.
+        """
+        return self._layout.pack((self._place.raw(value),))
+
+
+def _question(request: bytes) -> str:
+    """Say in words what was asked."""
+    function, address, count = struct.unpack(">BHH", request[:5])
+    if function == 23:
+        to, words = struct.unpack(">HH", request[5:9])
+        return f"function 23, write {words} at {to}, read {count} at {address}"
+    return f"function {function}, {'write' if function == 16 else 'read'} {count} at {address}"

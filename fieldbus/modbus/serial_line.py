@@ -1,0 +1,174 @@
+"""A serial line as Modbus RTU needs it, for both towers: raw bytes, deadlines, and silence before each frame.
+
+termios, of the standard library, does what is needed; times are of the monotonic clock. A line belongs to one
+process at a time (an advisory lock) and to one thread of it, where several devices on it take turns.
+"""
+
+import errno
+import fcntl
+import os
+import select
+import termios
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from config.serial_port import SerialPort
+from fieldbus.modbus.rtu import LARGEST_FRAME
+
+CHUNK = 4 * LARGEST_FRAME
+PSEUDO_TERMINALS = range(136, 144)
+"""Their major device numbers on Linux; they carry bytes and know no parity."""
+_PARITY = {"none": 0, "even": termios.PARENB, "odd": termios.PARENB | termios.PARODD}
+_SHAPE = termios.CSIZE | termios.PARENB | termios.PARODD | termios.CSTOPB
+
+
+class NeverSilent(OSError):
+    """Somebody keeps sending, so no frame can begin."""
+
+    def __init__(self) -> None:
+        super().__init__(errno.EBUSY, "the line is never silent")
+
+
+@dataclass(slots=True)
+class _Taken:
+    """A line that this process has, once for all who use it."""
+
+    fd: int
+    users: int
+    active_s: float
+    """When the last character was on it, as far as known."""
+
+
+_TAKEN: dict[str, _Taken] = {}
+"""By the real path of the line."""
+
+
+class SerialLine:
+    """A serial line, closed until `open`.
+
+    Args:
+        port: where it is and how its characters look.
+    """
+
+    def __init__(self, port: SerialPort) -> None:
+        self._port = port
+        self._real = ""
+        self._taken: _Taken | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether frames can be sent."""
+        return self._taken is not None
+
+    def open(self) -> None:
+        """Take the line (anew).
+
+        Raises:
+            OSError: it is not there, not a serial line, not permitted, of another process, or not that fast.
+        """
+        self.close()
+        self._real = os.path.realpath(self._port.path)
+        taken = _TAKEN.get(self._real)
+        if taken is None:
+            taken = _TAKEN[self._real] = _Taken(_opened(self._port), 0, time.monotonic())
+        taken.users += 1
+        self._taken = taken
+
+    def close(self) -> None:
+        """Let go of the line. Never raises."""
+        taken, self._taken = self._taken, None
+        if taken is None:
+            return
+        taken.users -= 1
+        if taken.users == 0:
+            del _TAKEN[self._real]
+            os.close(taken.fd)
+
+    def send(self, frame: bytes, within_s: float) -> float:
+        """Send a frame once the line has been silent for long enough; return when its last character will be out, s.
+
+        What arrives before that nobody has asked for: it is thrown away, and the silence begins anew.
+
+        Raises:
+            NeverSilent: no silence came within `within_s`.
+            OSError: the line is gone, or takes nothing.
+        """
+        taken = self._open_line()
+        give_up_s = time.monotonic() + within_s
+        while True:
+            free_s = taken.active_s + self._port.silence_s
+            now_s = time.monotonic()
+            if now_s < free_s:
+                time.sleep(free_s - now_s)
+            if not self.receive(0.0):
+                break
+            if now_s > give_up_s:
+                raise NeverSilent
+        if os.write(taken.fd, frame) != len(frame):
+            raise OSError(errno.EIO, "the line takes no more")
+        taken.active_s = time.monotonic() + len(frame) * self._port.character_s
+        return taken.active_s
+
+    def receive(self, until_s: float) -> bytes:
+        """Return what has arrived, waiting for something until a time; b"" when that passes.
+
+        Raises:
+            OSError: the line is gone.
+        """
+        taken = self._open_line()
+        ready, _, _ = select.select((taken.fd,), (), (), max(0.0, until_s - time.monotonic()))
+        if not ready:
+            return b""
+        data = os.read(taken.fd, CHUNK)
+        if not data:
+            raise OSError(errno.EIO, "the line hung up")
+        taken.active_s = time.monotonic()
+        return data
+
+    def _open_line(self) -> _Taken:
+        if self._taken is None:
+            raise OSError(errno.EBADF, "the line is closed")
+        return self._taken
+
+
+def _opened(port: SerialPort) -> int:
+    """Return the line, open for this process alone, with nothing in it of before."""
+    fd = os.open(port.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        _configure(fd, port)
+    except BaseException:
+        os.close(fd)
+        raise
+    return fd
+
+
+def _configure(fd: int, port: SerialPort) -> None:
+    if not os.isatty(fd):
+        raise OSError(errno.ENOTTY, "is not a serial line")
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise OSError(errno.EBUSY, "is used by another process") from None
+    wanted = _attributes(fd, port)
+    try:
+        termios.tcsetattr(fd, termios.TCSANOW, wanted)
+        termios.tcflush(fd, termios.TCIOFLUSH)
+        taken = termios.tcgetattr(fd)
+    except termios.error as error:
+        raise OSError(*error.args) from None
+    if taken[4] != wanted[4] or (taken[2] ^ wanted[2]) & _SHAPE:
+        raise OSError(errno.EINVAL, f"cannot do {port.baud} baud, parity {port.parity}, {port.stop_bits} stop bits")
+
+
+def _attributes(fd: int, port: SerialPort) -> list[Any]:
+    """Return the terminal's attributes: raw bytes in the port's characters."""
+    speed = getattr(termios, f"B{port.baud}")
+    is_pseudo = os.major(os.fstat(fd).st_rdev) in PSEUDO_TERMINALS
+    parity = 0 if is_pseudo else _PARITY[port.parity]
+    stop = termios.CSTOPB if port.stop_bits == 2 else 0
+    # CLOCAL and no HUPCL: modem lines neither hold us up nor reset the device when we let go.
+    control: list[bytes | int] = [b"\0"] * len(termios.tcgetattr(fd)[6])
+    control[termios.VMIN], control[termios.VTIME] = 1, 0
+    cflag = termios.CS8 | termios.CREAD | termios.CLOCAL | parity | stop
+    return [termios.INPCK if parity else 0, 0, cflag, 0, speed, speed, control]

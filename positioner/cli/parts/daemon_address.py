@@ -1,0 +1,50 @@
+"""Where the daemon is, for the commands that talk to its registers."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from positioner.dcs import Dcs
+
+HANDSHAKE_TIMEOUT_S = 2.0
+
+
+def add_connection(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say where."""
+    parser.add_argument("--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, which says where")
+    parser.add_argument("--valve", metavar="NAME", help="which of that file's valves")
+    parser.add_argument("--host", help="the daemon's host (127.0.0.1)")
+    parser.add_argument("--port", type=int, help="its supervisory port (5502)")
+    parser.add_argument("--unit", type=int, help="the valve's Modbus unit (1)")
+    parser.add_argument(
+        "--tls",
+        nargs=3,
+        type=Path,
+        metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
+        help="connect with Modbus/TCP Security: who signed for the daemon, and this end's certificate and key",
+    )
+
+
+def connected(arguments: argparse.Namespace) -> "Dcs":
+    """Return a DCS for that place, to be used as a context.
+
+    Raises:
+        InputError: a fault in the daemon's file, or a valve is named without it.
+    """
+    from config.daemon_file import Supervisory, load_daemon
+    from config.errors import InputError
+    from config.tls_table import Tls
+    from positioner.dcs import Dcs
+
+    if arguments.valve is not None and arguments.config is None:
+        raise InputError("--valve", "needs --config, the daemon's file that names it; or say --unit")
+    where = load_daemon(arguments.config, arguments.valve).supervisory if arguments.config else Supervisory()
+    host, port, unit = (
+        getattr(where, key) if (said := getattr(arguments, key)) is None else said for key in ("host", "port", "unit")
+    )
+    if arguments.tls is None:
+        return Dcs(host, port, unit)
+    authority, certificate, key = arguments.tls
+    tls = Tls(authority=authority, certificate=certificate, key=key, handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
+    return Dcs(host, port, unit, tls=tls)

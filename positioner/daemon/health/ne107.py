@@ -1,0 +1,89 @@
+"""The status of a valve by NAMUR NE 107, with its causes: a pure function of the last cycle and of the counts.
+
+    F  failure                the valve or its bus does not answer as it should (register `fault` says how)
+    C  function check         the valve does not follow the DCS on purpose: hold, manual, excitation, not identified
+    S  out of specification   it cannot do what is asked of it, or nobody asks
+    M  maintenance required   it does, and somebody should see to it soon
+    good
+
+The worst class counts, and in it the cause that stands first in `Ne107Cause`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, State
+from positioner.control.controller import Decision
+from positioner.daemon.health.valve_health import Health
+
+CLASS = {
+    Ne107Cause.FAULT: Ne107Status.FAILURE,
+    Ne107Cause.NOT_AUTOMATIC: Ne107Status.FUNCTION_CHECK,
+    Ne107Cause.EXCITED: Ne107Status.FUNCTION_CHECK,
+    Ne107Cause.NOT_IDENTIFIED: Ne107Status.FUNCTION_CHECK,
+    Ne107Cause.DCS_SILENT: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.BEYOND_LIMITS: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.STUCK: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.FRICTION_HIGH: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.FRICTION_LOW: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.STICTION: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.TRAVEL: Ne107Status.MAINTENANCE_REQUIRED,
+    Ne107Cause.REVERSALS: Ne107Status.MAINTENANCE_REQUIRED,
+}
+"""The class of each cause, worst first."""
+
+FEWEST_MOVES = 5
+"""Moves judged before the stiction index says anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A status and what it rests on, the first cause deciding."""
+
+    causes: tuple[Ne107Cause, ...]
+
+    @property
+    def status(self) -> Ne107Status:
+        """The NE 107 class."""
+        return CLASS[self.causes[0]] if self.causes else Ne107Status.GOOD
+
+    @property
+    def cause(self) -> Ne107Cause:
+        """The cause that decides."""
+        return self.causes[0] if self.causes else Ne107Cause.NONE
+
+    @property
+    def bits(self) -> int:
+        """All causes: bit n - 1 is cause n."""
+        return sum(1 << (cause - 1) for cause in self.causes)
+
+
+def condition(decision: Decision, health: Health) -> Condition:
+    """Return the condition of a valve."""
+    silent = decision.fault is Fault.DCS_SILENT
+    holds = {
+        Ne107Cause.FAULT: decision.fault is not Fault.NONE and not silent,
+        Ne107Cause.NOT_AUTOMATIC: decision.mode is not Mode.AUTOMATIC and not silent,
+        Ne107Cause.EXCITED: decision.state is State.S3_IDENTIFY,
+        Ne107Cause.NOT_IDENTIFIED: decision.mode is Mode.AUTOMATIC and decision.applied.ratios is None,
+        Ne107Cause.DCS_SILENT: silent,
+        Ne107Cause.BEYOND_LIMITS: decision.why is InhibitReason.LAW_BEYOND_LIMITS,
+        Ne107Cause.STUCK: decision.why is InhibitReason.STUCK,
+    }
+    worn = set(_wear(health))
+    return Condition(tuple(cause for cause in CLASS if cause in worn or holds.get(cause, False)))
+
+
+def _wear(health: Health) -> Iterator[Ne107Cause]:
+    """Yield what calls for maintenance. No comparison holds of the NaN that stands for a ratio not known yet."""
+    settings, record, ratio = health.settings, health.record, health.friction_ratio
+    if 0 < settings.friction_high < ratio:
+        yield Ne107Cause.FRICTION_HIGH
+    if ratio < settings.friction_low:
+        yield Ne107Cause.FRICTION_LOW
+    if record.moves_judged >= FEWEST_MOVES and 0 < settings.stiction_limit < record.stiction_index:
+        yield Ne107Cause.STICTION
+    if 0 < settings.travel_limit_m < record.travel_m:
+        yield Ne107Cause.TRAVEL
+    if 0 < settings.reversal_limit < record.reversals:
+        yield Ne107Cause.REVERSALS

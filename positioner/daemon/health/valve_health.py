@@ -1,0 +1,125 @@
+"""A valve's health as it runs: travel, reversals, stiction index, and the friction with its baseline.
+
+    friction        -k/c = F_c / A of the estimates that the law uses, Pa
+    baseline        the friction of the first identification that is applied, or of the engineer's command
+    friction ratio  friction / baseline: high where the packing is too tight, low where it leaks
+
+`enter` is called once a cycle by the cycle thread: a few comparisons, nothing is made anew. Others read what it leaves.
+"""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+
+from config.codes import Mode, Quality, State
+from config.daemon_file import Health as HealthTable
+from positioner.control.controller import Decision
+from positioner.control.requests import Requests
+from positioner.control.sample import Sample
+from positioner.daemon.health.health_file import HealthRecord
+from positioner.daemon.health.stiction_index import StictionIndex
+from positioner.daemon.health.travel_accumulator import TravelAccumulator
+from positioner.estimation.acceptance import Applied
+
+
+@dataclass(frozen=True, slots=True)
+class HealthSettings:
+    """What health is judged by; a limit of 0 is none."""
+
+    stroke_m: float
+    dead_band_m: float
+    settle_s: float
+    friction_high: float
+    friction_low: float
+    stiction_limit: float
+    travel_limit_m: float
+    reversal_limit: int
+
+    @classmethod
+    def of(cls, health: HealthTable, stroke_m: float) -> "HealthSettings":
+        """Return the settings that table `[health]` asks for, for a valve of that stroke."""
+        return cls(
+            stroke_m=stroke_m,
+            dead_band_m=health.dead_band * stroke_m,
+            settle_s=health.settle_s,
+            friction_high=health.friction_high,
+            friction_low=health.friction_low,
+            stiction_limit=health.stiction_limit,
+            travel_limit_m=health.travel_limit_strokes * stroke_m,
+            reversal_limit=health.reversal_limit,
+        )
+
+
+class Health:
+    """The counts of one valve, from what was kept of it."""
+
+    def __init__(self, settings: HealthSettings, kept: HealthRecord | None = None) -> None:
+        kept = kept or HealthRecord()
+        self.settings = settings
+        self._baseline_pa = nan if kept.baseline_pa is None else kept.baseline_pa
+        self._travel = TravelAccumulator(settings.stroke_m, settings.dead_band_m)
+        self._travel.travel_m, self._travel.reversals = kept.travel_m, kept.reversals
+        self._stiction = StictionIndex(settings.settle_s, lambda: self._travel.band_m)
+        self._stiction.index, self._stiction.judged = kept.stiction_index, kept.moves_judged
+        self._applied: Applied | None = None
+        self._friction_pa = nan
+        self._requests = Requests()
+
+    @classmethod
+    def idle(cls, stroke_m: float) -> "Health":
+        """Return the health of a valve that nobody looks after."""
+        return cls(HealthSettings.of(HealthTable(), stroke_m))
+
+    @property
+    def friction_pa(self) -> float:
+        """F_c / A as the law uses it; NaN: none yet."""
+        return self._friction_pa
+
+    @property
+    def baseline_pa(self) -> float:
+        """The friction that is called normal; NaN: none yet."""
+        return self._baseline_pa
+
+    @property
+    def friction_ratio(self) -> float:
+        """Friction over baseline; NaN while either is missing."""
+        return self._friction_pa / self._baseline_pa
+
+    @property
+    def record(self) -> HealthRecord:
+        """What is to be kept over a restart."""
+        travel, stiction = self._travel, self._stiction
+        baseline_pa = self._baseline_pa if isfinite(self._baseline_pa) else None
+        return HealthRecord(travel.travel_m, travel.reversals, stiction.index, stiction.judged, baseline_pa)
+
+    def enter(self, sample: Sample, decision: Decision, requests: Requests) -> None:
+        """Take one cycle."""
+        if decision.applied is not self._applied:
+            self._take(decision.applied)
+        if requests is not self._requests:
+            self._obey(requests)
+        if sample.quality is not Quality.GOOD or not isfinite(sample.position_m):
+            return
+        self._travel.enter(sample.position_m)
+        if decision.mode is Mode.AUTOMATIC and decision.state is not State.S3_IDENTIFY:
+            self._stiction.enter(sample.now_s, sample.position_m, decision.reference_m)
+        else:
+            self._stiction.interrupt()
+
+    def _take(self, applied: Applied) -> None:
+        self._applied = applied
+        if applied.ratios is None:
+            return
+        self._friction_pa = -applied.ratios.k_over_c
+        if applied.count and not isfinite(self._baseline_pa):
+            self._baseline_pa = self._friction_pa
+
+    def _obey(self, requests: Requests) -> None:
+        before, self._requests = self._requests, requests
+        if requests.baseline_writes != before.baseline_writes:
+            self._baseline_pa = self._friction_pa
+        if requests.health_resets != before.health_resets:
+            self._reset()
+
+    def _reset(self) -> None:
+        self._travel.travel_m, self._travel.reversals = 0.0, 0
+        self._stiction.index, self._stiction.judged = 0.0, 0

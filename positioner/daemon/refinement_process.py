@@ -1,0 +1,166 @@
+"""The process that refines: one beside the daemon, for all its valves, so that no fit ever takes a cycle's time.
+
+A job goes down a pipe, its result comes back up another, pickled: both ends are this file. A thread waits for it; the
+control thread only looks whether a result lies there. Jobs of several valves are done one after another. The process
+is started at once, and does a small job of its own first, so that the first window is answered as fast as any. It is
+as nice as can be and leaves the terminal's Ctrl-C to the daemon; it ends when its pipe does. If it dies, jobs are
+refused from then on and the algebraic estimates stand: one line in the log says so.
+
+    python -m positioner.daemon.refinement_process      is what it runs
+"""
+
+import logging
+import os
+import pickle
+import subprocess
+import sys
+from contextlib import suppress
+from queue import SimpleQueue
+from threading import Event, Thread
+from typing import IO, cast
+
+import numpy as np
+
+from positioner.daemon.logs import say
+from positioner.estimation.batch import Recorded, RecordSettings
+from positioner.estimation.refiner import Job
+
+log = logging.getLogger(__name__)
+
+LONGEST_WAIT_S = 10.0
+"""That a patient refiner waits for a result."""
+ENDING_S = 2.0
+"""Time the process has to end by itself."""
+
+
+class RefinementProcess:
+    """The process, and the thread that speaks with it. Made once; `refiner` gives each valve its own side."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._jobs: SimpleQueue[tuple[ProcessRefiner, Job] | None] = SimpleQueue()
+        self.alive = True
+        self._thread = Thread(target=self._serve, name="refinement", daemon=True)
+        self._thread.start()
+
+    def refiner(self, *, patient: bool = False) -> "ProcessRefiner":
+        """Return a side for one valve; a patient one waits for its results, as a device in lockstep does."""
+        return ProcessRefiner(self, patient=patient)
+
+    def stop(self) -> None:
+        """End the process."""
+        self._jobs.put(None)
+        self._thread.join(ENDING_S)
+        if self._process is None:
+            return
+        self._process.terminate()  # it may be starting still, and holds nothing that would be lost
+        try:
+            self._process.wait(ENDING_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def put(self, refiner: "ProcessRefiner", job: Job) -> None:
+        """Queue a job."""
+        self._jobs.put((refiner, job))
+
+    def _started(self) -> "subprocess.Popen[bytes]":
+        one_core = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        return subprocess.Popen(
+            [sys.executable, "-m", "positioner.daemon.refinement_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+            env={**os.environ, **one_core},
+        )
+
+    def _serve(self) -> None:
+        """Start the process, and hand it one job after another."""
+        self._process = process = self._started()
+        down, up = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
+        task = self._jobs.get()
+        with suppress(OSError), down, up:
+            while task is not None:
+                refiner, job = task
+                try:
+                    pickle.dump(job, down)
+                    down.flush()
+                    result: Recorded | None = pickle.load(up)
+                except (OSError, EOFError, pickle.UnpicklingError) as error:
+                    self.alive = False
+                    result = None
+                    say(log, logging.ERROR, "the refinement process is gone", reason=str(error))
+                refiner.give(result)
+                task = self._jobs.get()
+
+
+class ProcessRefiner:
+    """One valve's side: a `Refiner`."""
+
+    def __init__(self, process: RefinementProcess, *, patient: bool) -> None:
+        self._process = process
+        self._patient = patient
+        self._there = Event()
+        self._result: Recorded | None = None
+        self._pending = False
+
+    @property
+    def pending(self) -> bool:
+        """Whether a result is still to come."""
+        return self._pending
+
+    def submit(self, job: Job) -> bool:
+        """Send a job; False when one is under way or the process is gone."""
+        if self._pending or not self._process.alive:
+            return False
+        self._there.clear()
+        self._pending = True
+        self._process.put(self, job)
+        return True
+
+    def collect(self) -> Recorded | None:
+        """Return the result, once."""
+        if not self._pending:
+            return None
+        if not (self._there.wait(LONGEST_WAIT_S) if self._patient else self._there.is_set()):
+            return None
+        result, self._result = self._result, None
+        self._pending = False
+        return result
+
+    def give(self, result: Recorded | None) -> None:
+        """Take a result from the process; None when there will be none."""
+        self._result = result
+        self._there.set()
+
+
+def _warm_up() -> None:
+    """Do a small job, of a jump's answer: what is loaded at first use is loaded then."""
+    time_s = np.arange(0.0, 0.2, 1e-3)
+    pressure_pa = np.where(time_s > 0.05, 1.0, 0.0)
+    moved = np.maximum(time_s - 0.05, 0.0)
+    Job(time_s, moved**2, pressure_pa, RecordSettings(noise_std_m=1e-5, pressure_held=True)).done()
+
+
+def _work() -> None:
+    """Do the jobs that come down the pipe until it closes."""
+    os.nice(19)
+    _warm_up()
+    down, up = sys.stdin.buffer, sys.stdout.buffer
+    while True:
+        try:
+            job: Job = pickle.load(down)
+        except EOFError:
+            return
+        result: Recorded | None
+        try:
+            result = job.done()
+        except (ArithmeticError, ValueError) as error:  # numpy.linalg.LinAlgError is a ValueError
+            print(f"refinement failed: {error}", file=sys.stderr)
+            result = None
+        pickle.dump(result, up)
+        up.flush()
+
+
+if __name__ == "__main__":
+    _work()

@@ -1,0 +1,312 @@
+"""The supervisory registers: what the DCS reads of the last snapshot, and what its writes ask for.
+
+A request is all or nothing: every value in it is checked before the first is taken. A write that is refused gets a
+Modbus exception and one line in the log, and changes nothing:
+
+    2  no such register, a read-only one, or a part of a value
+    3  a value outside its range
+    6  a value that cannot be taken now (a fault is latched)
+
+The cycle thread is never waited for, nor made to wait: it reads `Cycle.requests` once a cycle, and every write
+replaces that snapshot whole.
+"""
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from importlib.metadata import version
+
+from config.codes import Fault, Mode
+from config.registers import (
+    BY_NAME,
+    ESTIMATED,
+    FLOAT_TEST,
+    LONG_TEST,
+    MAP_VERSION,
+    REGISTERS,
+    SIZE,
+    WORD_TEST,
+    Register,
+)
+from fieldbus.modbus.server import ExceptionCode, RegisterError, Table
+from positioner.control.requests import Requests
+from positioner.daemon.cycle import Cycle
+from positioner.daemon.health import Health, condition
+from positioner.daemon.logs import about, say
+from positioner.daemon.snapshot import Snapshot
+
+log = logging.getLogger(__name__)
+
+AT = {address: register for register in REGISTERS for address in range(register.address, register.end)}
+"""The register that each word belongs to."""
+
+SCALE = 10_000
+"""Whole numbers per p.u. in the scaled registers."""
+
+
+class SupervisoryRegisters:
+    """The registers of one valve, by its name in the log. `maximum_pa` and `minimum_pa` bound the manual pressure."""
+
+    def __init__(
+        self, cycle: Cycle, stroke_m: float, minimum_pa: float, maximum_pa: float, valve: str | None = None
+    ) -> None:
+        self._cycle = cycle
+        self._valve = valve
+        self._stroke_m = stroke_m
+        self._minimum_pa = minimum_pa
+        self._maximum_pa = maximum_pa
+        self._heartbeat = 0
+        self._values = _getters(cycle, stroke_m)
+
+    def read(self, table: Table, address: int, count: int) -> Sequence[int]:  # noqa: ARG002 - both tables are the same
+        """Return words of one snapshot; addresses between registers read 0.
+
+        Raises:
+            RegisterError: ILLEGAL_ADDRESS, beyond the map.
+        """
+        if address + count > SIZE:
+            raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+        snapshot, requests = self._cycle.snapshot, self._cycle.requests
+        words = [0] * count
+        for register in dict.fromkeys(AT[each] for each in range(address, address + count) if each in AT):
+            encoded = self._encoded(register, snapshot, requests)
+            for offset, word in enumerate(encoded, start=register.address - address):
+                if 0 <= offset < count:
+                    words[offset] = word
+        return words
+
+    def write(self, address: int, words: Sequence[int], peer: str) -> None:
+        """Take what is written, all or nothing.
+
+        Raises:
+            RegisterError: see the head of this module.
+        """
+        with about(self._valve):
+            try:
+                values = self._decoded(address, words)
+                self._cycle.requests = self._asked(values)
+            except _Refusal as refusal:
+                say(log, logging.WARNING, "write refused", peer=peer, address=address, reason=refusal.reason)
+                raise RegisterError(refusal.code) from None
+            level = logging.DEBUG if values.keys() <= {"reference", "reference_scaled", "heartbeat"} else logging.INFO
+            say(log, level, "write", peer=peer, **values)
+
+    def _encoded(self, register: Register, snapshot: Snapshot, requests: Requests) -> list[int]:
+        if register.name == "heartbeat":
+            return [self._heartbeat]
+        value = self._values[register.name](snapshot, requests)
+        if register.format.is_float:
+            return register.format.encode(value)
+        low, high = (-32768, 32767) if register.type == "int16" else (0, (1 << 16 * register.format.words) - 1)
+        return register.format.encode(min(max(value, low), high) if math.isfinite(value) else 0)
+
+    def _decoded(self, address: int, words: Sequence[int]) -> dict[str, float]:
+        """Return the values written, by name, in the order of their addresses."""
+        values: dict[str, float] = {}
+        at, end = address, address + len(words)
+        while at < end:
+            register = AT.get(at)
+            if register is None or register.access == "r":
+                raise _Refusal(
+                    ExceptionCode.ILLEGAL_ADDRESS, f"{register.name if register else at}: nothing to write there"
+                )
+            if register.address != at or register.end > end:
+                raise _Refusal(ExceptionCode.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words")
+            value = register.format.decode(words[at - address : register.end - address])
+            if problem := register.problem_with(value):
+                raise _Refusal(ExceptionCode.ILLEGAL_VALUE, problem)
+            values[register.name] = value
+            at = register.end
+        return values
+
+    def _asked(self, values: Mapping[str, float]) -> Requests:
+        """Return what is asked for after these writes."""
+        requests = self._cycle.requests
+        if {"reference", "reference_scaled"} & values.keys():
+            requests = replace(
+                requests, reference_m=self._reference_m(values), reference_writes=requests.reference_writes + 1
+            )
+        if "mode" in values:
+            requests = replace(requests, mode=self._mode(values["mode"]), mode_writes=requests.mode_writes + 1)
+        if {"eta_1", "eta_2", "eta_3"} & values.keys():
+            eta_1, eta_2, eta_3 = (
+                int(values.get(f"eta_{each}", now)) for each, now in enumerate(requests.eta, start=1)
+            )
+            requests = replace(requests, eta=(eta_1, eta_2, eta_3))
+        if "manual_pressure" in values:
+            requests = replace(
+                requests,
+                manual_pa=self._manual_pa(values["manual_pressure"]),
+                manual_writes=requests.manual_writes + 1,
+            )
+        if values.get("acknowledge") == 1:
+            requests = replace(requests, acknowledgements=requests.acknowledgements + 1)
+        if values.get("health_baseline") == 1:
+            self._require_friction()
+            requests = replace(requests, baseline_writes=requests.baseline_writes + 1)
+        if values.get("health_reset") == 1:
+            requests = replace(requests, health_resets=requests.health_resets + 1)
+        if "heartbeat" in values:
+            self._heartbeat = int(values["heartbeat"])
+            requests = replace(requests, heartbeats=requests.heartbeats + 1)
+        return replace(
+            requests,
+            alpha_pa=values.get("alpha", requests.alpha_pa),
+            beta_pa=values.get("beta", requests.beta_pa),
+            omega_rad_per_s=values.get("omega", requests.omega_rad_per_s),
+        )
+
+    def _reference_m(self, values: Mapping[str, float]) -> float:
+        scaled = values.get("reference_scaled", math.nan) / SCALE
+        reference = values.get("reference", scaled)
+        if abs(reference - scaled) > 1 / SCALE:
+            raise _Refusal(ExceptionCode.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
+        return reference * self._stroke_m
+
+    def _mode(self, value: float) -> Mode:
+        mode, fault = Mode(int(value)), self._cycle.snapshot.decision.fault
+        if mode is not Mode.HOLD and fault is not Fault.NONE:
+            raise _Refusal(ExceptionCode.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
+        return mode
+
+    def _require_friction(self) -> None:
+        if self._cycle.snapshot.decision.applied.ratios is None:
+            raise _Refusal(ExceptionCode.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
+
+    def _manual_pa(self, value: float) -> float:
+        if not self._minimum_pa <= value <= self._maximum_pa:
+            allowed = f"{self._minimum_pa:g} to {self._maximum_pa:g} Pa"
+            raise _Refusal(ExceptionCode.ILLEGAL_VALUE, f"manual_pressure: allowed is {allowed}, got {value:g}")
+        return value
+
+
+class _Refusal(Exception):
+    def __init__(self, code: ExceptionCode, reason: str) -> None:
+        self.code = code
+        self.reason = reason
+
+
+Getter = Callable[[Snapshot, Requests], float]
+
+
+def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
+    """Return, by register, what it serves of a snapshot."""
+    getters = {
+        **_command_getters(stroke_m),
+        **_status_getters(stroke_m),
+        **_estimate_getters(),
+        **_statistics_getters(cycle),
+        **_identity_getters(),
+        **_health_getters(cycle, stroke_m),
+    }
+    assert getters.keys() == BY_NAME.keys() - {"heartbeat"}, getters.keys() ^ BY_NAME.keys()
+    return getters
+
+
+def _command_getters(stroke_m: float) -> dict[str, Getter]:
+    def reference(snapshot: Snapshot, requests: Requests) -> float:
+        written = requests.reference_writes > 0
+        return (requests.reference_m if written else snapshot.decision.reference_m) / stroke_m
+
+    return {
+        "reference": reference,
+        "reference_scaled": lambda s, r: SCALE * reference(s, r),
+        "mode": lambda s, _: s.decision.mode,
+        "eta_1": lambda _, r: r.eta[0],
+        "eta_2": lambda _, r: r.eta[1],
+        "eta_3": lambda _, r: r.eta[2],
+        "acknowledge": lambda _s, _r: 0,
+        "manual_pressure": lambda s, r: r.manual_pa if r.manual_writes else s.decision.command_pa,
+        "alpha": lambda _, r: r.alpha_pa,
+        "beta": lambda _, r: r.beta_pa,
+        "omega": lambda _, r: r.omega_rad_per_s,
+    }
+
+
+def _status_getters(stroke_m: float) -> dict[str, Getter]:
+    return {
+        "state": lambda s, _: s.decision.state,
+        "fault": lambda s, _: s.decision.fault,
+        "quality": lambda s, _: s.sample.quality,
+        "why": lambda s, _: s.decision.why,
+        "position": lambda s, _: s.sample.position_m / stroke_m,
+        "position_scaled": lambda s, _: SCALE * s.sample.position_m / stroke_m,
+        "device_status": lambda s, _: s.sample.status,
+        "position_m": lambda s, _: s.sample.position_m,
+        "pressure": lambda s, _: s.sample.pressure_pa,
+        "command": lambda s, _: s.decision.command_pa,
+        "delta_r": lambda s, _: s.decision.delta_r_m / stroke_m,
+        "sample_age": lambda s, _: s.decision.sample_age_s,
+        "reference_in_force": lambda s, _: s.decision.reference_m / stroke_m,
+    }
+
+
+def _estimate_getters() -> dict[str, Getter]:
+    getters: dict[str, Getter] = {
+        "progress": lambda s, _: s.decision.estimates.progress,
+        "estimate_age": lambda s, _: s.sample.time_s - s.decision.estimates.time_s,
+        "b_over_c_applied": lambda s, _: r.b_over_c if (r := s.decision.applied.ratios) else math.nan,
+        "k_over_c_applied": lambda s, _: r.k_over_c if (r := s.decision.applied.ratios) else math.nan,
+        "identifications": lambda s, _: s.decision.applied.count & 0xFFFF,
+        "refusals": lambda s, _: s.decision.applied.refusals & 0xFFFF,
+        "refusal": lambda s, _: s.decision.applied.refused,
+    }
+    for name in (*ESTIMATED, "breakaway"):
+        getters |= _estimate_getters_of(name)
+    return getters
+
+
+def _estimate_getters_of(name: str) -> dict[str, Getter]:
+    return {
+        f"{name}_e": lambda s, _: getattr(s.decision.estimates, name).value,
+        f"{name}_std": lambda s, _: getattr(s.decision.estimates, name).std,
+        f"{name}_valid": lambda s, _: getattr(s.decision.estimates, name).valid,
+        f"{name}_reason": lambda s, _: getattr(s.decision.estimates, name).reason,
+    }
+
+
+def _statistics_getters(cycle: Cycle) -> dict[str, Getter]:
+    statistics, counts = cycle.statistics, cycle.link.counts
+    return {
+        "cycles": lambda _s, _r: statistics.cycles & 0xFFFFFFFF,
+        "missed_periods": lambda _s, _r: statistics.missed_periods,
+        "lost_samples": lambda _s, _r: counts.lost_samples,
+        "lost_replies": lambda _s, _r: counts.lost_replies,
+        "period": lambda _s, _r: statistics.period_s(),
+        "jitter_99": lambda _s, _r: statistics.jitter_99_s(),
+        "cycle_time": lambda _s, _r: statistics.cycle_time_s(),
+        "unrecorded": lambda _s, _r: cycle.recorder.unrecorded if cycle.recorder else 0,
+    }
+
+
+def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
+    health = cycle.health or Health.idle(stroke_m)
+    return {
+        "health_baseline": lambda _s, _r: 0,
+        "health_reset": lambda _s, _r: 0,
+        "ne107": lambda s, _: condition(s.decision, health).status,
+        "ne107_cause": lambda s, _: condition(s.decision, health).cause,
+        "ne107_causes": lambda s, _: condition(s.decision, health).bits,
+        "friction": lambda _s, _r: health.friction_pa,
+        "friction_baseline": lambda _s, _r: health.baseline_pa,
+        "friction_ratio": lambda _s, _r: health.friction_ratio,
+        "travel": lambda _s, _r: health.record.travel_m / stroke_m,
+        "stem_cycles": lambda _s, _r: int(health.record.travel_m / (2 * stroke_m)),
+        "reversals": lambda _s, _r: health.record.reversals,
+        "stiction_index": lambda _s, _r: health.record.stiction_index,
+        "moves_judged": lambda _s, _r: health.record.moves_judged,
+    }
+
+
+def _identity_getters() -> dict[str, Getter]:
+    major, minor, patch = (float(part) for part in version("positioner").split(".")[:3])
+    return {
+        "map_version": lambda _s, _r: MAP_VERSION,
+        "version_major": lambda _s, _r: major,
+        "version_minor": lambda _s, _r: minor,
+        "version_patch": lambda _s, _r: patch,
+        "word_test": lambda _s, _r: WORD_TEST,
+        "long_test": lambda _s, _r: LONG_TEST,
+        "float_test": lambda _s, _r: FLOAT_TEST,
+    }

@@ -1,0 +1,74 @@
+"""Estimated and applied are two things: a bad identification never replaces a good one.
+
+    applied' = accept(applied, estimated)
+
+The two numbers of the law are taken together: each that was asked for must be valid and not too far from the one in
+use, or both stay as they are.
+"""
+
+from dataclasses import dataclass, replace
+
+from config.codes import Refusal
+from positioner.estimation.estimates import Estimate, Estimates
+
+LARGEST_CHANGE = 4.0
+"""Factor by which b/c and k/c may differ from those in use, up or down."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ratios:
+    """What the law needs of the valve: b/c in Pa/m and k/c in Pa, both negative."""
+
+    b_over_c: float
+    k_over_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """What the law uses, and how it came to be.
+
+    Attributes:
+        ratios: in use; None before the first identification.
+        count: how many identifications were accepted.
+        refusals: how many were refused.
+        refused: why the last identification was refused; `Refusal.VALID` when it was accepted.
+    """
+
+    ratios: Ratios | None = None
+    count: int = 0
+    refusals: int = 0
+    refused: Refusal = Refusal.NOT_STARTED
+
+
+def accept(applied: Applied, estimated: Estimates) -> Applied:
+    """Return what is applied after an identification: its numbers, or those in use and why."""
+    reason = _why_not(applied.ratios, estimated)
+    if reason is not Refusal.VALID:
+        return replace(applied, refusals=applied.refusals + 1, refused=reason)
+    return Applied(_ratios(applied.ratios, estimated), applied.count + 1, applied.refusals, Refusal.VALID)
+
+
+def _why_not(ratios: Ratios | None, estimated: Estimates) -> Refusal:
+    slope, friction = estimated.b_over_c, estimated.k_over_c
+    for each in (slope, friction):
+        if not (each.valid or each.reason is Refusal.NOT_ASKED):
+            return each.reason
+    if not (slope.valid or friction.valid):
+        return Refusal.NOT_ASKED
+    if ratios is None:
+        missing = slope if not slope.valid else friction
+        return missing.reason
+    if _far(slope, ratios.b_over_c) or _far(friction, ratios.k_over_c):
+        return Refusal.IMPLAUSIBLE_CHANGE
+    return Refusal.VALID
+
+
+def _far(new: Estimate, in_use: float) -> bool:
+    return new.valid and not 1 / LARGEST_CHANGE <= new.value / in_use <= LARGEST_CHANGE
+
+
+def _ratios(in_use: Ratios | None, estimated: Estimates) -> Ratios:
+    slope, friction = estimated.b_over_c, estimated.k_over_c
+    if in_use is None or estimated.law_ready:
+        return Ratios(slope.value, friction.value)
+    return Ratios(slope.value, in_use.k_over_c) if slope.valid else Ratios(in_use.b_over_c, friction.value)

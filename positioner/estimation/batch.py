@@ -1,0 +1,326 @@
+"""Identification from a whole record at once: cut it into motions, fit them by maximum likelihood, judge the result.
+
+The daemon's refinement and `positioner estimate` are this one function. What is not known is not guessed:
+
+- how the pressure goes between the samples, when nobody says: held (the value at a sample is that of the interval
+  before it), held ahead (of the interval after it) or linear; each is fitted and the likeliest taken;
+- whether stamps that jitter tell when the samples were taken, or when they arrived of samples taken evenly: the stem
+  moves by more than its sensor's noise within a tenth of a period of its jerk. Both are fitted, the likelier taken;
+- a, b, c and k hang on μ = m/k_s, g and q do not. When the standard deviation of ln μ exceeds what is allowed, or more
+  than three quarters of what is known of it hangs on a single sample, the mass is not identifiable: a, b, c, k are
+  refused singly, b/c = -1/g and k/c = q/g stand on their own;
+- a fit whose residuals are more than white noise of the sensor's size is no model of the motion: nothing is valid. An
+  actuator that lags behind a command taken for its pressure shows here. Correlated residuals of whatever size widen
+  every standard deviation by sqrt((1 + ρ) / (1 - ρ)), ρ the correlation of neighbours, when ρ is significant;
+- where no jump of the pressure begins a motion, its first milliseconds are the drop from F_s to F_c, whose course the
+  model leaves out. The mass must then be identifiable from what follows after five of the stem's time constants.
+
+Break-away: F_s/A lies between the largest force at which the stem was seen to rest and the force at which it left,
+both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
+their intervals share (`breaking_away`).
+"""
+
+from dataclasses import dataclass, replace
+from functools import reduce
+from math import nan, sqrt
+
+import numpy as np
+
+from config.codes import Refusal
+from positioner.estimation.array import Array
+from positioner.estimation.breakaway_force import between, narrowed
+from positioner.estimation.breakaway_force import judged as judged_breakaway
+from positioner.estimation.estimates import Estimate, Estimates, no_estimates, none
+from positioner.estimation.likelihood import CLEAR, Fit, Prior, refine
+from positioner.estimation.running_noise import PositionNoise
+from positioner.estimation.segmentation import Cut, cut
+from positioner.estimation.stretch import Stretch
+
+MOST_STRETCHES = 8
+"""The farthest motions of a record are fitted together; more add little and cost much."""
+SIGNIFICANT = 4.0
+"""Correlation of the residuals in its own standard deviations, beyond which they are not white."""
+MISFIT = 1.6
+"""Ratio of the residuals to white noise beyond which the model does not fit."""
+LARGEST_LEVERAGE = 0.75
+"""Share of one sample in what is known of the mass, beyond which nothing would show that this sample is wrong."""
+SETTLED = 5.0
+"""Time constants after which nothing is left of how a motion began."""
+FEWEST_LATER = 12
+LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
+"""Of time stamps about an even grid, shares of the period, between which they may be those of samples taken evenly."""
+SEEN_WITHIN = 3
+"""Samples after which a stem that left its rest is seen to have."""
+LEAST_MISFIT = 2e-4
+"""Share of the travel below which residuals are no misfit worth the name."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordSettings:
+    """How a record is identified.
+
+    Attributes:
+        noise_std_m: of the position; None: measured.
+        pressure_noise_std_pa: of the pressure.
+        pressure_held: held or linear between the samples; None: the likelier.
+        moving_threshold_m_per_s: velocity below which the stem counts as stopped.
+        largest_relative_std: up to which an estimate is valid.
+    """
+
+    noise_std_m: float | None = None
+    pressure_noise_std_pa: float = 0.0
+    pressure_held: bool | None = None
+    moving_threshold_m_per_s: float = 1e-3
+    largest_relative_std: float = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a record says.
+
+    Attributes:
+        estimates: with standard deviations and reasons.
+        fit: behind them; None when nothing could be fitted.
+        pressure: how it was taken between the samples: "held", "held ahead" or "linear".
+        evened: whether the time stamps were taken to jitter about samples taken evenly.
+        noise_std_m: of the position, as given or measured.
+        stretches: motions fitted, and how many were seen but cut out.
+        condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
+    """
+
+    estimates: Estimates
+    fit: Fit | None
+    pressure: str
+    evened: bool
+    noise_std_m: float
+    stretches: int
+    left_out: int
+    condition: float
+
+
+def identify(
+    time_s: Array, position_m: Array, pressure_pa: Array, settings: RecordSettings, prior: Prior | None = None
+) -> Recorded:
+    """Identify the valve from a record.
+
+    Args:
+        time_s: N strictly increasing time stamps.
+        position_m: N positions; NaN counts as missing.
+        pressure_pa: N pressures; NaN counts as missing.
+        settings: see there.
+        prior: what is known beforehand.
+    """
+    whole = np.isfinite(time_s) & np.isfinite(position_m) & np.isfinite(pressure_pa)
+    t, x, u = time_s[whole], position_m[whole], pressure_pa[whole]
+    if settings.noise_std_m is None:
+        noise_std_m = measured_noise_m(x)
+        if noise_std_m == 0.0 and len(x) > 1:  # rounding hides it at rest
+            noise_std_m = _resolution_m(x) / sqrt(12)
+    else:
+        noise_std_m = settings.noise_std_m
+    tries = [_fitted(t, x, shown, u_taken, noise_std_m, settings, prior) for shown, u_taken in _taken(u, settings)]
+    best = min(tries, key=_misses_m)
+    even_s = evened(t) if best.fit is not None else None
+    if even_s is not None and best.fit is not None:
+        again = _fitted(even_s, x, best.shown, best.pressure_pa, noise_std_m, settings, prior, near=best.fit.p[:2])
+        best = min((best, replace(again, evened=True)), key=_misses_m)
+    if best.fit is None:
+        reason = Refusal.WAITING_FOR_MOTION if best.cut.moving_share == 0 else Refusal.WINDOW_TOO_SHORT
+        nothing = no_estimates(reason)
+        return Recorded(nothing, None, best.shown, False, noise_std_m, 0, best.cut.too_short, nan)
+    estimates = _judged(best, noise_std_m, settings, float(t[-1]))
+    return Recorded(
+        estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
+        fit=best.fit,
+        pressure=best.shown,
+        evened=best.evened,
+        noise_std_m=noise_std_m,
+        stretches=len(best.chosen),
+        left_out=best.cut.too_short + len(best.cut.stretches) - len(best.chosen),
+        condition=condition(best.fit),
+    )
+
+
+def evened(time_s: Array) -> Array | None:
+    """Return the even instants about which time stamps jitter; None when they do not, or are not even at all.
+
+    Samples that are missing leave their instants out.
+    """
+    if len(time_s) < FEWEST_LATER:
+        return None
+    steps = np.diff(time_s)
+    number = np.append(0.0, np.cumsum(np.round(steps / np.median(steps))))
+    if number[-1] < len(steps):
+        return None
+    period_s, start_s = np.polyfit(number, time_s, 1)
+    even_s = start_s + period_s * number
+    off = np.abs(time_s - even_s) / period_s
+    jitters = off.std() > LEAST_JITTER and off.max() < LARGEST_JITTER and np.diff(number).min() > 0
+    return np.asarray(even_s) if jitters else None
+
+
+def measured_noise_m(position_m: Array) -> float:
+    """Return the standard deviation of the position's white noise, as `PositionNoise` finds it."""
+    noise = PositionNoise()
+    noise.add_all(position_m, max(8, min(64, len(position_m) // 4)))
+    return noise.std_m
+
+
+def _resolution_m(position_m: Array) -> float:
+    """Return the smallest step between positions; rounding of numbers is none."""
+    steps = np.diff(np.unique(position_m))
+    steps = steps[steps > 1e-9 * float(np.ptp(position_m))]
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def _taken(pressure_pa: Array, settings: RecordSettings) -> list[tuple[str, Array]]:
+    """Return the ways in which the pressure may go between the samples, each with the pressures that say so."""
+    if settings.pressure_held is not None:
+        return [("held" if settings.pressure_held else "linear", pressure_pa)]
+    ahead = np.append(pressure_pa[:1], pressure_pa[:-1])
+    return [("held", pressure_pa), ("held ahead", ahead), ("linear", pressure_pa)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Try:
+    shown: str
+    pressure_pa: Array
+    cut: Cut
+    chosen: tuple[Stretch, ...]
+    fit: Fit | None
+    evened: bool = False
+
+
+def _misses_m(each: _Try) -> float:
+    return each.fit.residual_std_m if each.fit is not None else float("inf")
+
+
+def _misfits(each: _Try, noise_std_m: float) -> bool:
+    """Whether the residuals are more than the sensor's noise."""
+    if each.fit is None:
+        return False
+    travel_m = max(float(np.ptp(stretch.position_m)) for stretch in each.chosen)
+    return each.fit.residual_std_m > max(MISFIT * noise_std_m, LEAST_MISFIT * travel_m)
+
+
+def _fitted(
+    t: Array,
+    x: Array,
+    shown: str,
+    u: Array,
+    noise_std_m: float,
+    settings: RecordSettings,
+    prior: Prior | None,
+    near: Array | None = None,
+) -> _Try:
+    found = cut(t, x, u, noise_std_m, settings.moving_threshold_m_per_s)
+    chosen = _farthest(found.stretches)
+    fit = refine(list(chosen), held=shown != "linear", prior=prior, near=near) if chosen else None
+    return _Try(shown, u, found, chosen, fit)
+
+
+def _farthest(stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+    """Return the motions that go farthest, in order of time; both directions where there are both."""
+    order = sorted(range(len(stretches)), key=lambda each: -float(np.ptp(stretches[each].position_m)))
+    chosen = order[:MOST_STRETCHES]
+    other = [each for each in order if stretches[each].direction != stretches[order[0]].direction] if order else []
+    if other and not set(other) & set(chosen):
+        chosen = [*chosen[:-1], other[0]]
+    return tuple(stretches[each] for each in sorted(chosen))
+
+
+def condition(fit: Fit) -> float:
+    """Return the condition of the information about (ln τ, ln μ, ln g, ln q), its diagonal scaled to 1."""
+    std = np.sqrt(np.diag(fit.covariance))
+    if not np.isfinite(std).all() or not std.all():
+        return float("inf")
+    sizes = np.linalg.svd(fit.covariance / np.outer(std, std), compute_uv=False)
+    return float(sizes[0] / sizes[-1]) if sizes[-1] > 0 else float("inf")
+
+
+def _judged(best: _Try, noise_std_m: float, settings: RecordSettings, time_s: float) -> Estimates:
+    """Return the estimates of a fit, each valid or not and why."""
+    assert best.fit is not None
+    fit = _widened(best.fit, settings)
+    values, std = fit.theta.tolist(), np.sqrt(np.abs(np.diag(fit.theta_covariance))).tolist()
+    singly = _why_not_singly(best, fit, settings.largest_relative_std)
+    together = Refusal.MODEL_DOES_NOT_FIT if _misfits(best, noise_std_m) else Refusal.VALID
+    unphysical = (
+        values[0] > 0 and Refusal.A_POSITIVE,
+        values[1] >= 0 and Refusal.B_NOT_NEGATIVE,
+        values[2] <= 0 and Refusal.C_NOT_POSITIVE,
+        values[3] >= 0 and Refusal.K_NOT_NEGATIVE,
+        values[4] >= 0 and Refusal.B_OVER_C_NOT_NEGATIVE,
+        values[5] >= 0 and Refusal.K_OVER_C_NOT_NEGATIVE,
+    )
+    found = []
+    for number in range(6):
+        reason = singly if number < 4 and together is Refusal.VALID else together
+        if reason is Refusal.VALID and not std[number] <= settings.largest_relative_std * abs(values[number]):
+            reason = Refusal.TOO_UNCERTAIN
+        if reason is Refusal.VALID and unphysical[number]:
+            reason = Refusal(unphysical[number])
+        found.append(Estimate(values[number], std[number], reason))
+    a, b, c, k, b_over_c, k_over_c = found
+    return Estimates(a, b, c, k, b_over_c, k_over_c, progress=1.0, time_s=time_s)
+
+
+def _widened(fit: Fit, settings: RecordSettings) -> Fit:
+    """Return the fit with the covariance that correlated residuals and noise of the pressure leave."""
+    factor = 1.0
+    if fit.correlation > SIGNIFICANT:
+        share = min(fit.correlation / sqrt(fit.count), 0.98)
+        factor = (1 + share) / (1 - share)
+    drive_m = float(fit.p[2]) * settings.pressure_noise_std_pa
+    factor *= 1 + (drive_m / max(fit.residual_std_m, 1e-12)) ** 2
+    return replace(fit, covariance=fit.covariance * factor)
+
+
+def _why_not_singly(best: _Try, fit: Fit, largest: float) -> Refusal:
+    if fit.jumps == 0 and not _mass_shows_later(best, fit, largest):
+        return Refusal.MASS_NOT_IDENTIFIABLE
+    if fit.leverage > LARGEST_LEVERAGE or not float(fit.covariance[1, 1]) ** 0.5 <= largest:
+        return Refusal.MASS_NOT_IDENTIFIABLE
+    return Refusal.VALID
+
+
+def _mass_shows_later(best: _Try, fit: Fit, largest: float) -> bool:
+    """Whether ln μ is known well enough without the first five time constants of every motion."""
+    settled_s = SETTLED * float(np.exp(max(fit.p[0], fit.p[1] / 2)))
+    later = []
+    for each in best.chosen:
+        first = int(np.searchsorted(each.time_s, each.time_s[each.begins] + settled_s))
+        if len(each.time_s) - first >= FEWEST_LATER:
+            rows = slice(first, None)
+            time_s, position_m, pressure_pa = each.time_s[rows], each.position_m[rows], each.pressure_pa[rows]
+            later.append(Stretch(each.direction, time_s, position_m, pressure_pa, begins=0, earliest=0, rests_from=0))
+    again = refine(later, held=best.shown != "linear", guess=fit.p[:2]) if later else None
+    return again is not None and float(again.covariance[1, 1]) ** 0.5 <= largest
+
+
+def _breakaway(best: _Try, estimates: Estimates, largest: float) -> Estimate:
+    """Return F_s/A from the rests and what ended them."""
+    if not estimates.b_over_c.valid:
+        return none(estimates.b_over_c.reason)
+    slope, slope_std = estimates.b_over_c.value, estimates.b_over_c.std
+    bounds = []
+    for stretch in best.chosen:
+        if stretch.begins == 0:
+            continue
+        i = stretch.begins
+        rest_m = float(stretch.position_m[:i].mean())
+        force_pa = stretch.direction * (stretch.pressure_pa + slope * rest_m)
+        steps = np.diff(force_pa[stretch.earliest : i + 3])
+        jump = stretch.earliest + int(steps.argmax())
+        others = np.delete(steps, steps.argmax())
+        if len(others) and others.max() > CLEAR * steps.max():  # a ramp: the stem left within a few samples
+            low, high = i - SEEN_WITHIN, i + 1
+        else:
+            low, high = jump, jump + 1
+        bounds.append((float(force_pa[: max(0, low) + 1].max()), float(force_pa[high]), slope_std * abs(rest_m)))
+    least_pa = -estimates.k_over_c.value if estimates.k_over_c.valid else 0.0
+    events = [(max(low, least_pa), high, std) for low, high, std in bounds if high > max(low, least_pa)]
+    if not events:
+        return none(Refusal.WAITING_FOR_MOTION)
+    together = reduce(narrowed, (between(low, high, std) for low, high, std in events))
+    return judged_breakaway(together, largest)

@@ -1,0 +1,87 @@
+"""What the identification hands on: each value with its standard deviation, and valid or why not."""
+
+from dataclasses import dataclass, replace
+from math import nan
+
+from config.codes import Refusal
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A value and its standard deviation, SI units; both NaN when there is none."""
+
+    value: float
+    std: float
+    reason: Refusal
+
+    @property
+    def valid(self) -> bool:
+        """Whether the value may be used."""
+        return self.reason is Refusal.VALID
+
+
+def none(reason: Refusal) -> Estimate:
+    """Return the estimate of which only is known why there is none."""
+    return Estimate(nan, nan, reason)
+
+
+NO_BREAKAWAY = none(Refusal.WAITING_FOR_MOTION)
+"""Nothing has been seen to break away yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """All of them.
+
+    Attributes:
+        a: -F_v / m, in 1/s.
+        b: -k_s / m, in 1/s^2.
+        c: A / m, in m/(s^2 Pa).
+        k: -F_c / m, in m/s^2.
+        b_over_c: -k_s / A, in Pa/m.
+        k_over_c: -F_c / A, in Pa.
+        progress: of the window that is being filled, 0 to 1.
+        time_s: of the last sample used, by the device's clock; NaN when none was.
+        breakaway: F_s / A, in Pa; from where the stem broke away, which only a whole record shows.
+    """
+
+    a: Estimate
+    b: Estimate
+    c: Estimate
+    k: Estimate
+    b_over_c: Estimate
+    k_over_c: Estimate
+    progress: float
+    time_s: float
+    breakaway: Estimate = NO_BREAKAWAY
+
+    @property
+    def law_ready(self) -> bool:
+        """Whether both numbers of the control law are valid."""
+        return self.b_over_c.valid and self.k_over_c.valid
+
+    def only(self, *, parameters: bool, friction: bool) -> "Estimates":
+        """Return what was asked for: a, b, c and b/c; k and k/c."""
+        unasked = none(Refusal.NOT_ASKED)
+        kept = self
+        if not parameters:
+            kept = replace(kept, a=unasked, b=unasked, c=unasked, b_over_c=unasked)
+        return kept if friction else replace(kept, k=unasked, k_over_c=unasked)
+
+    @property
+    def doubt(self) -> float:
+        """Sum of the variances, relative, of the numbers of the control law that were asked for."""
+        asked = [each for each in (self.b_over_c, self.k_over_c) if each.reason is not Refusal.NOT_ASKED]
+        return sum((each.std / each.value) ** 2 for each in asked)
+
+    @property
+    def acceptable(self) -> bool:
+        """Whether each number of the control law that was asked for, one at least, is valid."""
+        asked = [each for each in (self.b_over_c, self.k_over_c) if each.reason is not Refusal.NOT_ASKED]
+        return bool(asked) and all(each.valid for each in asked)
+
+
+def no_estimates(reason: Refusal) -> Estimates:
+    """Return estimates of which only is known why there are none."""
+    nothing = none(reason)
+    return Estimates(nothing, nothing, nothing, nothing, nothing, nothing, progress=0.0, time_s=nan, breakaway=nothing)

@@ -1,0 +1,361 @@
+"""Identification of a sticking valve, sample by sample: motion, identifier, friction and judgement put together.
+
+A record of the last N samples, one derivative window, goes ahead of the identifier: a sample is used when it leaves
+the record at its old end. So when motion is seen, its beginning is still to come and time zero is put exactly there;
+when the stem is found to have stopped, the samples of the standstill that were taken for motion are dropped unused.
+The estimates are one derivative window old for that, and say so by `time_s`.
+
+With a `Refiner`, the samples since the restart go out to be fitted by maximum likelihood when the window is complete,
+and the progress stays short of 1 until the result is back: it replaces the algebraic one if it is acceptable. With
+eta_1 = 1 (`passive`), no excitation will fill a window: each ordinary move goes out when the stem has come to rest,
+with what the moves before it told as the prior (`moves`).
+"""
+
+from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
+
+import numpy as np
+
+from config.codes import Refusal
+from positioner.estimation.algebraic import Identifier
+from positioner.estimation.batch import Recorded, RecordSettings
+from positioner.estimation.breakaway_force import followed, judged
+from positioner.estimation.derivatives import Derivatives
+from positioner.estimation.estimates import NO_BREAKAWAY, Estimate, Estimates, no_estimates, none
+from positioner.estimation.friction_estimator import RunningMeans
+from positioner.estimation.motion_detector import Motion, beginning
+from positioner.estimation.passive import Known, absorbed
+from positioner.estimation.refiner import Job, Refiner
+from positioner.estimation.running_noise import PositionNoise
+from positioner.estimation.sample_window import Record
+from positioner.estimation.validity import Judge
+from positioner.estimation.weighted import Solution
+
+READINGS = 16
+"""Times per window at which (13) is solved."""
+ALMOST = 0.99
+"""Progress while the refinement is awaited."""
+PATIENCE_S = 2.0
+"""Time after which a refinement is no longer awaited."""
+MOST_KEPT = 200_000
+"""Samples kept for a refinement: a window at the seed's 10 us twice over."""
+MOVE_REST_S = 0.2
+"""Of the rest before a move, that goes out with it; and the longest time a move takes, below."""
+MOVE_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationSettings:
+    """How the identification is done.
+
+    Attributes:
+        stroke_m: full travel, the unit of position.
+        pressure_pa: span of the actuator pressure, the unit of pressure.
+        noise_std_m: standard deviation of the position's white noise, resolution / sqrt(12) included; None: measured.
+        pressure_noise_std_pa: the same of the pressure. 1 Pa does what A / k_s = 1.2 um would do (the seed's valve).
+        pressure_held: see `Identifier`.
+        window_s: length of motion after which the identification is complete.
+        minimum_window_s: length of motion before which nothing is estimated.
+        derivative_window_s: length of the derivative filters.
+        moving_threshold_m_per_s: velocity below which the stem counts as stopped; above the model's dead zone.
+        largest_relative_std: standard deviation up to which an estimate is valid, as a share of its value.
+    """
+
+    stroke_m: float
+    pressure_pa: float
+    noise_std_m: float | None = None
+    pressure_noise_std_pa: float = 0.0
+    pressure_held: bool = True
+    window_s: float = 0.8
+    minimum_window_s: float = 0.4
+    derivative_window_s: float = 0.05
+    moving_threshold_m_per_s: float = 1e-3
+    largest_relative_std: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name in ("stroke_m", "pressure_pa", "derivative_window_s", "moving_threshold_m_per_s"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, it is {getattr(self, name)!r}")
+        if not 0 < self.minimum_window_s <= self.window_s:
+            raise ValueError(
+                f"minimum_window_s must be positive and at most window_s ({self.window_s!r} s), "
+                f"it is {self.minimum_window_s!r}"
+            )
+
+
+class Identification:
+    """The estimates of one valve from its samples.
+
+    Attributes:
+        estimates: what is known by now.
+        velocity_m_per_s, acceleration_m_per_s2: (19), (21) at the latest sample; NaN until the filters are full.
+        direction: of the motion seen, +1 up, -1 down, 0 none.
+        moves: ordinary moves that gave acceptable estimates, by passive identification.
+    """
+
+    def __init__(self, settings: IdentificationSettings, refiner: Refiner | None = None) -> None:
+        self._settings = settings
+        self._refiner = refiner
+        self._kept: list[tuple[float, float, float]] = []
+        self._awaited_since_s: float | None = None
+        self._known: Known | None = None
+        self._broke_away, self._broke_away_s = NO_BREAKAWAY, 0.0
+        self._passive = False
+        self.moves = 0
+        self._rest_in: int | None = None  # samples until a move's rest is long enough
+        self._identifier = Identifier(
+            settings.window_s, settings.stroke_m, settings.pressure_pa, pressure_held=settings.pressure_held
+        )
+        self._record = Record(settings.derivative_window_s)
+        self._noise = PositionNoise()
+        self._derivatives = Derivatives()
+        self._motion = Motion(settings.moving_threshold_m_per_s)
+        self._means = RunningMeans()
+        self._solution: Solution | None = None  # the last whose b/c was valid
+        self._asked = (False, False)
+        self._doubt = inf  # of the estimates, by what was asked for last
+        self._age = 0  # of the oldest sample in the record, in samples since the motion began
+        self._clear_record()
+        self._restart_window()
+        self.estimates = no_estimates(Refusal.NOT_STARTED)
+
+    @property
+    def direction(self) -> int:
+        """Direction of the motion seen."""
+        return self._motion.direction
+
+    def restart(self) -> None:
+        """Begin a new identification: all is forgotten, but for (a, b, c) to find friction with."""
+        self._clear_record()
+        self._noise.restart()
+        self._restart_window()
+        self._kept.clear()
+        self._awaited_since_s = self._rest_in = None
+        self._doubt = inf
+        self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
+
+    def update(
+        self,
+        time_s: float,
+        position_m: float,
+        pressure_pa: float,
+        *,
+        parameters: bool,
+        friction: bool,
+        passive: bool = False,
+    ) -> Estimates:
+        """Take a fresh sample.
+
+        A gap as long as the record, or a clock that does not advance, breaks the record, which then begins anew. A
+        sample with a value that is not a finite number counts as missing.
+
+        Args:
+            time_s: the device's time stamp.
+            position_m: stem position.
+            pressure_pa: actuator pressure.
+            parameters: whether to identify a, b, c.
+            friction: whether to estimate k, from a, b, c of this identification or of the last one.
+            passive: whether the stem moves as the DCS asks, without excitation.
+        """
+        if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
+            return self.estimates
+        if (parameters, friction) != self._asked:
+            self._ask(parameters, friction)
+        self._passive = passive and self._refiner is not None
+        self._take(time_s, position_m, pressure_pa)
+        if self._refiner is not None:
+            self._refine(self._refiner, time_s, position_m, pressure_pa)
+        if self._record.full:
+            self._watch()
+            wanted = any(self._asked) and not self._complete and not self._passive
+            if wanted and self._motion.direction and self._age >= 0:
+                self._collect()
+        return self.estimates
+
+    @property
+    def _noise_std_m(self) -> float:
+        known = self._settings.noise_std_m
+        return self._noise.std_m if known is None else known
+
+    def _refine(self, refiner: Refiner, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Keep the sample, hand out what is complete, take what comes back."""
+        kept = self._kept
+        if kept and time_s <= kept[-1][0]:
+            kept.clear()
+        kept.append((time_s, position_m, pressure_pa))
+        if len(kept) > MOST_KEPT or (self._passive and time_s - kept[0][0] > 2 * MOVE_S):
+            del kept[: len(kept) // 2]
+        if self._rest_in is not None:
+            self._rest_in -= 1
+            if self._rest_in <= 0:
+                self._rest_in = None
+                self._hand_out(refiner, time_s)
+        result = refiner.collect()
+        if result is not None:
+            self._take_refined(result, time_s)
+        elif self._awaited_since_s is not None and (not refiner.pending or time_s - self._awaited_since_s > PATIENCE_S):
+            self._awaited_since_s = None
+            self.estimates = replace(self.estimates, progress=1.0)
+
+    def _hand_out(self, refiner: Refiner, time_s: float) -> None:
+        """Let what was kept be fitted."""
+        settings = self._settings
+        columns = np.array(self._kept).T
+        asked = RecordSettings(
+            noise_std_m=settings.noise_std_m,
+            pressure_noise_std_pa=settings.pressure_noise_std_pa,
+            pressure_held=settings.pressure_held,
+            moving_threshold_m_per_s=settings.moving_threshold_m_per_s,
+            largest_relative_std=settings.largest_relative_std,
+        )
+        prior = self._known.prior(time_s) if self._passive and self._known is not None else None
+        if refiner.submit(Job(columns[0], columns[1], columns[2], asked, prior)) and not self._passive:
+            self._awaited_since_s = time_s
+        if self._passive:
+            self._kept = [each for each in self._kept if each[0] > time_s - MOVE_REST_S]
+
+    def _take_refined(self, result: Recorded, time_s: float) -> None:
+        self._awaited_since_s = None
+        fits = result.fit is not None and result.estimates.b_over_c.reason is not Refusal.MODEL_DOES_NOT_FIT
+        if result.fit is not None and fits:
+            self._known = absorbed(self._known if self._passive else None, result.fit, time_s)
+        parameters, friction = self._asked
+        refined = result.estimates.only(parameters=parameters, friction=friction)
+        if refined.acceptable:
+            before = self._broke_away if self._passive else NO_BREAKAWAY
+            broke_away = followed(before, refined.breakaway, time_s - self._broke_away_s)
+            self._broke_away, self._broke_away_s = broke_away, time_s
+            self.estimates = replace(refined, breakaway=judged(broke_away, self._settings.largest_relative_std))
+            self.moves += self._passive
+        elif not self._passive:
+            self.estimates = replace(self.estimates, progress=1.0)
+
+    def _ask(self, parameters: bool, friction: bool) -> None:
+        self._asked = (parameters, friction)
+        self._doubt = inf  # what was known before gives way to whatever is acceptable
+        self._restart_window()
+        if any(self._asked) and not self.estimates.acceptable:
+            self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
+
+    def _restart_window(self) -> None:
+        self._collecting = self._complete = False
+        self._elapsed_s = 0.0
+
+    def _take(self, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Append a sample to the record, or begin a new one with it."""
+        record = self._record
+        if record.breaks(time_s):
+            self._kept.clear()
+            self._clear_record()
+            self._interrupt(Refusal.RECORD_BROKEN)
+        record.append(time_s, position_m, pressure_pa)
+
+    def _clear_record(self) -> None:
+        self._record.clear()
+        self._motion.stop()
+        self._until_block = 0
+        self.velocity_m_per_s = self.acceleration_m_per_s2 = nan
+
+    def _watch(self) -> None:
+        """Take the derivatives at the latest sample and see whether, and since when, the stem moves."""
+        record = self._record
+        time_s, position_m = record.time_s, record.position_m
+        velocity, acceleration, slope = self._derivatives.estimate(time_s, position_m)
+        record.set_derivatives(velocity, acceleration)
+        self.velocity_m_per_s, self.acceleration_m_per_s2 = velocity, acceleration
+
+        if not self._until_block:
+            self._noise.add(position_m)
+            self._until_block = record.length
+        self._until_block -= 1
+        noise_m = self._noise_std_m
+        before = self._motion.direction
+        direction = self._motion.update(slope, self._derivatives.slope_gain * noise_m)
+        self._age += 1
+        if direction == before:
+            return
+        if before:
+            self._interrupt(Refusal.MOTION_ENDED)
+            if self._passive and any(self._asked):
+                self._rest_in = record.length
+        if direction:
+            self._age = -beginning(position_m, direction, noise_m)
+
+    def _collect(self) -> None:
+        """Use the oldest sample of the record, on its way out."""
+        time_s, position_m, pressure_pa, velocity, acceleration = self._record.oldest()
+        if not self._collecting:
+            self._collecting = True
+            self._identifier.restart()
+            self._means.restart()
+            self._zero_s, self._next_reading_s = time_s, 0.0
+        parameters, friction = self._asked
+        if parameters:
+            self._identifier.update(time_s, position_m, pressure_pa)
+        settings = self._settings
+        self._elapsed_s = time_s - self._zero_s
+        # The jerk with which motion begins is no polynomial: the filters' window has to be clear of it.
+        settled = self._age >= self._record.length - 1 and self._elapsed_s >= settings.minimum_window_s / 2
+        if friction and settled:
+            if settings.pressure_held:  # the step at this instant counts half before it, half after it
+                pressure_pa = float(self._record.pressure_pa[:2].sum()) / 2
+            self._means.add(acceleration, velocity, position_m, pressure_pa)
+        self._complete = self._elapsed_s >= settings.window_s
+        if self._elapsed_s >= self._next_reading_s or self._complete:
+            self._next_reading_s += settings.window_s / READINGS
+            self._publish(self._read(time_s))
+        if self._complete and self._refiner is not None and not self._passive:
+            self._hand_out(self._refiner, float(self._record.time_s[-1]))
+            if self._awaited_since_s is not None:
+                self.estimates = replace(self.estimates, progress=ALMOST)
+
+    def _read(self, time_s: float) -> Estimates:
+        """Return what the window says so far."""
+        progress = min(1.0, self._elapsed_s / self._settings.window_s)
+        if self._elapsed_s < self._settings.minimum_window_s:
+            return replace(no_estimates(Refusal.WINDOW_TOO_SHORT), progress=progress)
+        a, b, c, b_over_c = self._read_parameters()
+        k, k_over_c = self._read_friction()
+        return Estimates(a, b, c, k, b_over_c, k_over_c, progress=progress, time_s=time_s)
+
+    def _read_parameters(self) -> tuple[Estimate, Estimate, Estimate, Estimate]:
+        if not self._asked[0]:
+            return (none(Refusal.NOT_ASKED),) * 4
+        solution = self._identifier.solve(self._noise_std_m, self._settings.pressure_noise_std_pa)
+        if solution is None:
+            return (none(Refusal.ILL_CONDITIONED),) * 4
+        a, b, c, b_over_c = self._judge().parameters(solution)
+        if b_over_c.valid:
+            self._solution = solution
+        return a, b, c, b_over_c
+
+    def _read_friction(self) -> tuple[Estimate, Estimate]:
+        if not self._asked[1]:
+            return (none(Refusal.NOT_ASKED),) * 2
+        if self._solution is None:
+            return (none(Refusal.PARAMETERS_MISSING),) * 2
+        means = self._means.means(self._derivatives.weights)
+        if means is None:
+            return (none(Refusal.WINDOW_TOO_SHORT),) * 2
+        return self._judge().friction(self._solution, means, self._motion.direction)
+
+    def _judge(self) -> Judge:
+        settings = self._settings
+        return Judge(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
+
+    def _publish(self, fresh: Estimates) -> None:
+        """Take fresh estimates, unless what an earlier stretch of motion has given is known better."""
+        doubt = fresh.doubt if fresh.acceptable else inf
+        if doubt < self._doubt or not self.estimates.acceptable:
+            self.estimates = replace(fresh, breakaway=self.estimates.breakaway)
+            self._doubt = doubt
+        else:
+            self.estimates = replace(self.estimates, progress=fresh.progress)
+
+    def _interrupt(self, reason: Refusal) -> None:
+        """Close the window; say why if it was too short to have given anything."""
+        if self._complete or not any(self._asked):
+            return
+        if self._elapsed_s < self._settings.minimum_window_s and not self.estimates.acceptable:
+            self.estimates = no_estimates(reason)
+        self._restart_window()

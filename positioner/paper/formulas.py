@@ -1,0 +1,331 @@
+"""The seed's formulas evaluated on a course: as printed, and corrected. The printed ones live here and nowhere else.
+
+    (13)        a, b, c from running integrals by the trapezoidal rule, as its section 5.1 has it
+    (19), (21)  velocity and acceleration by FIR filters over the last window, as its section 5.2 has it
+    (22)        friction k_e from these, instant by instant
+    (1)-(3), (23), (24), 4.2, 5    a number each, where the printed form and the corrected one differ
+
+What the daemon does instead is exact on the samples (`estimation.identifier`, `estimation.derivatives`).
+"""
+
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+
+from config.errors import InputError
+from config.loading import validated
+from config.valve_file import ValveFile, ValveParameters
+from positioner.control.balance_law import balance_pa
+from positioner.estimation import Ratios
+from positioner.estimation.array import Array
+from positioner.estimation.derivatives import weights
+from positioner.paper.scenario import (
+    AMPLITUDE_PU,
+    HONEST_SINE,
+    LITERAL,
+    S1_FROM_S,
+    S2_FROM_S,
+    UNTIL_S,
+    Course,
+    Noise,
+    derivative_window_s,
+)
+from positioner.virtual.true_parameters import truth
+from sim.valve import Valve
+
+GRAPHS_FROM_S = 0.4
+"""The seed's graphs begin here: before, its (13) is not solved well."""
+PRINTED_STATIC_N = 284.6862
+PRESSURE_UNIT_PA = 1e5
+QUANTITIES = ("a", "b", "c")
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """The two coefficients in which printed and corrected forms of (8) differ: 6 in (10), 3 in (11) and (12)."""
+
+    of_10: float = 6.0
+    of_11_12: float = 3.0
+
+
+CORRECTED = Identity()
+PRINTED_7 = Identity(of_11_12=1.0)
+PRINTED_10 = Identity(of_10=-6.0)
+
+
+def solved(time_s: Array, position_m: Array, pressure_pa: Array, at: Array, identity: Identity = CORRECTED) -> Array:
+    """Return a, b, c (3, len(at)) by (13) at some rows of evenly sampled motion from rest; SI units.
+
+    Args:
+        time_s, position_m, pressure_pa: the motion; time zero is its first row.
+        at: row numbers.
+        identity: with which coefficients.
+    """
+    t, x, u = time_s - time_s[0], position_m, pressure_pa / PRESSURE_UNIT_PA
+    h = float(t[1])
+
+    def P(f: Array, n: int) -> Array:  # noqa: N802 - n-fold integral, the field's letter
+        for _ in range(n):
+            f = np.concatenate(([0.0], np.cumsum((f[1:] + f[:-1]) * (h / 2))))
+        return f
+
+    q = P(-(t**3) * x, 1) + 9 * P(t**2 * x, 2) + 18 * P(-t * x, 3) + 6 * P(x, 4)
+    p_a = P(-(t**3) * x, 2) + identity.of_10 * P(t**2 * x, 3) + 6 * P(-t * x, 4)
+    p_b = P(-(t**3) * x, 3) + identity.of_11_12 * P(t**2 * x, 4)
+    p_c = P(-(t**3) * u, 3) + identity.of_11_12 * P(t**2 * u, 4)
+    q_rows, a_rows, b_rows, c_rows = ([P(column, n)[at] for n in range(3)] for column in (q, p_a, p_b, p_c))
+    matrices = np.array([a_rows, b_rows, c_rows]).transpose(2, 1, 0)
+    theta = np.linalg.solve(matrices, np.array(q_rows).T[:, :, None])[:, :, 0].T
+    return np.asarray(theta / [[1.0], [1.0], [PRESSURE_UNIT_PA]])
+
+
+def printed_filters(samples: int, period_s: float) -> Array:
+    """Return (19) and (21) as printed, by the trapezoidal rule: weights (2, samples), oldest first."""
+    T = (samples - 1) * period_s
+    tau = np.linspace(0.0, T, samples)
+    k_19 = -12 / T**4 * (3 * T**2 - 16 * T * tau + 15 * tau**2)
+    k_21 = 120 / T**6 * (4 * T**3 - 45 * T**2 * tau + 108 * T * tau**2 - 70 * tau**3)
+    trapezoids = np.full(samples, period_s)
+    trapezoids[[0, -1]] /= 2
+    return np.array([k_19 * trapezoids, k_21 * trapezoids])
+
+
+def corrected_filters(samples: int, period_s: float) -> Array:
+    """Return the same run on the window reversed in time, under which the odd derivative changes its sign."""
+    k_19, k_21 = printed_filters(samples, period_s)[:, ::-1]
+    return np.array([-k_19, k_21])
+
+
+def exact_filters(samples: int, period_s: float) -> Array:
+    """Return the daemon's: exact for polynomials on the samples there are, where the trapezoidal rule is not."""
+    return weights(period_s * np.arange(samples, dtype=np.float64))[:2]
+
+
+def derivatives(course: Course, filters: Array) -> Array:
+    """Return velocity and acceleration (2, rows) from the window that ends at each row; NaN before the first."""
+    empty = np.full(filters.shape[1] - 1, np.nan)
+    return np.array([np.concatenate((empty, np.correlate(course.measured_m, each, "valid"))) for each in filters])
+
+
+def fir_length(course: Course) -> int:
+    """Return the number of samples in the derivative filters, the seed's 500 at its period."""
+    return round(derivative_window_s(course.period_s) / course.period_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """What the seed's figures 3 to 5 show, sample by sample from 0.4 to 0.8 s: a, b, c by (13), SI units.
+
+    Attributes:
+        rows: of the course.
+        theta: a, b, c (3, samples).
+    """
+
+    rows: Array
+    theta: Array
+
+
+def tracks(course: Course) -> Tracks:
+    """Return the seed's a, b, c over the stretch its graphs show."""
+    seen = course.identifying
+    rows = np.arange(course.row_at(GRAPHS_FROM_S), seen.stop)
+    theta = solved(course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], rows)
+    return Tracks(rows, theta)
+
+
+def friction(course: Course, seen: Tracks, filters: Array, position_m: Array) -> Array:
+    """Return k_e by (22), corrected, over that stretch, with a, b, c of the same time; figure 6.
+
+    Args:
+        course: the course.
+        seen: its a, b, c.
+        filters: of the derivatives.
+        position_m: taken for x_e, for which the seed gives no estimator; a row per sample of the course.
+    """
+    a, b, c = seen.theta
+    velocity, acceleration = derivatives(course, filters)[:, seen.rows]
+    return np.asarray(
+        acceleration - a * velocity - b * position_m[seen.rows] - c * course.pressure_pa[seen.rows], dtype=np.float64
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Erratum:
+    """One quantity by the printed form and by the corrected one, against what the simulated valve does."""
+
+    where: str
+    quantity: str
+    unit: str
+    printed: float
+    corrected: float
+    true: float
+
+    @property
+    def printed_fails(self) -> bool:
+        """Whether the printed form is farther off than the corrected one, and by more than 10 % of the truth."""
+        off = abs(self.printed - self.true)
+        return off > abs(self.corrected - self.true) and off > 0.1 * abs(self.true)
+
+
+def errata(course: Course, file: ValveFile) -> list[Erratum]:
+    """Return where printed and corrected forms differ; the course is one without noise."""
+    valve = file.valve
+    breakaway_n = _breakaway_force_n(file)
+    return [
+        *_model(course, file, breakaway_n),
+        *_identifier(course, valve),
+        *_filters(course),
+        *_control(course, valve),
+        Erratum("5", "F_s", "N", PRINTED_STATIC_N, valve.static_n, breakaway_n),
+        _sampled_sine(course),
+    ]
+
+
+def _model(course: Course, file: ValveFile, breakaway_n: float) -> list[Erratum]:
+    """(1), (2) at rest under the first pressure of S3, (3) in the middle of the graphs."""
+    valve = file.valve
+    m, static_n, coulomb_n = valve.mass_kg, valve.static_n, valve.coulomb_n
+    start_pa = float(course.command_pa[0])
+    force_n = valve.diaphragm_area_m2 * start_pa
+    row = course.row_at((GRAPHS_FROM_S + S1_FROM_S) / 2)
+    x, v, u = (float(each[row]) for each in (course.true_m, course.true_m_per_s, course.pressure_pa))
+    acceleration = float(np.gradient(course.true_m_per_s, course.time_s)[row])
+    numbers = truth(valve)
+    a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
+    stribeck = -(static_n - coulomb_n) / m * exp(-((v / valve.stribeck_velocity_m_per_s) ** 2))
+    return [
+        Erratum("(1)", "friction as v -> 0", "N", coulomb_n - (static_n - coulomb_n), static_n, breakaway_n),
+        Erratum(
+            "(2)",
+            "x'' at breakaway",
+            "m/s^2",
+            (force_n + static_n) / m,
+            (force_n - static_n) / m,
+            _breakaway(file, start_pa),
+        ),
+        Erratum(
+            "(3)",
+            "x'' at 0.6 s",
+            "m/s^2",
+            -a * v - b * x + k - stribeck + c * u,
+            a * v + b * x + k + stribeck + c * u,
+            acceleration,
+        ),
+    ]
+
+
+def _breakaway(file: ValveFile, pressure_pa: float, over_s: float = 1e-7) -> float:
+    """Return the simulated acceleration over the first instant, in which the stem stays within Karnopp's band."""
+    valve = Valve.from_file(file, step_s=over_s)
+    valve.advance(pressure_pa, over_s)
+    return valve.velocity_m_per_s / over_s
+
+
+def _breakaway_force_n(file: ValveFile) -> float:
+    """Return the force at which the simulated stem moves when the pressure rises slowly, 1 Pa each 10 us."""
+    valve = Valve.from_file(file)
+    ramp = valve.run(np.arange(0.0, 2 * file.valve.static_n / file.valve.diaphragm_area_m2), 1e-5)
+    moved = int(np.flatnonzero(ramp.velocity_m_per_s)[0])
+    return file.valve.diaphragm_area_m2 * float(ramp.pressure_pa[moved])
+
+
+def _identifier(course: Course, valve: ValveParameters) -> list[Erratum]:
+    """(7) and (10) by a, b, c at 0.8 s."""
+    seen = course.identifying
+    at = np.array([seen.stop - 1])
+    rows = course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], at
+    units = {"a": "1/s", "b": "1/s^2", "c": "m/(s^2 Pa)"}
+    corrected, true = solved(*rows)[:, 0], truth(valve)
+    return [
+        Erratum(where, name, units[name], float(solved(*rows, identity)[i, 0]), float(corrected[i]), true[name])
+        for where, identity in (("(7)", PRINTED_7), ("(10)", PRINTED_10))
+        for i, name in enumerate(QUANTITIES)
+    ]
+
+
+def _filters(course: Course) -> list[Erratum]:
+    """(19) and (21) by their delay: the one with which they fit the true motion of the first jerk best."""
+    n, h = fir_length(course), course.period_s
+    printed, corrected = (derivatives(course, filters(n, h)) for filters in (printed_filters, corrected_filters))
+    true = course.true_m_per_s, np.gradient(course.true_m_per_s, course.time_s)
+    return [
+        Erratum(
+            where,
+            f"delay of {name}",
+            "ms",
+            1e3 * _delay_s(course, printed[i], true[i]),
+            1e3 * _delay_s(course, corrected[i], true[i]),
+            0.0,
+        )
+        for i, (where, name) in enumerate((("(19)", "x'"), ("(21)", "x''")))
+    ]
+
+
+def _delay_s(course: Course, estimate: Array, true: Array) -> float:
+    n = fir_length(course)
+    rows = slice(3 * n, 20 * n)
+    lags = np.arange(2 * n)
+    misfits = [float(np.mean((estimate[rows] - true[rows.start - lag : rows.stop - lag]) ** 2)) for lag in lags]
+    return float(lags[int(np.argmin(misfits))]) * course.period_s
+
+
+def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
+    """(22) at 0.8 s; (23), (24) and the coordinate of 4.2 at the ends of S1 and S2, where the stem stands at r."""
+    last = course.identifying.stop - 1
+    numbers = truth(valve)
+    a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
+    filters = corrected_filters(fir_length(course), course.period_s)
+    velocity, acceleration = derivatives(course, filters)[:, last].tolist()
+    x, u = float(course.measured_m[last]), float(course.pressure_pa[last])
+    up, down = course.row_at(S2_FROM_S), course.row_at(UNTIL_S)
+    r_up, r_down = float(course.reference_m[up]), float(course.reference_m[down])
+    ratios = Ratios(numbers["b_over_c"], numbers["k_over_c"])
+    return [
+        Erratum(
+            "(22)",
+            "k_e at 0.8 s",
+            "m/s^2",
+            acceleration + a * velocity + b * x - c * u,
+            acceleration - a * velocity - b * x - c * u,
+            k,
+        ),
+        Erratum(
+            "(23)", "u in S1", "Pa", (r_up - b * k) / c, balance_pa(r_up, 1, ratios), float(course.pressure_pa[up])
+        ),
+        Erratum(
+            "(24)",
+            "u in S2",
+            "Pa",
+            (r_down + b * k) / c,
+            balance_pa(r_down, -1, ratios),
+            float(course.pressure_pa[down]),
+        ),
+        Erratum("4.2", "y when x = r", "m", float(course.true_m[up]) + r_up, float(course.true_m[up]) - r_up, 0.0),
+    ]
+
+
+def _sampled_sine(course: Course) -> Erratum:
+    """The largest sample of the seed's noise: as printed, in rad/s, and what its amplitude says."""
+    return Erratum(
+        "5",
+        "largest noise sample",
+        "p.u.",
+        largest_sample_pu(LITERAL, course),
+        largest_sample_pu(HONEST_SINE, course),
+        AMPLITUDE_PU,
+    )
+
+
+def largest_sample_pu(noise: Noise, course: Course) -> float:
+    """Return the largest absolute sample of a sine on the grid of a course."""
+    return max(abs(noise.sine_pu(time_s)) for time_s in course.time_s.tolist())
+
+
+def refusal_of_printed_static_friction(valve: ValveParameters) -> str:
+    """Return what is said to a person whose valve file has F_s as printed; empty if nothing is."""
+    try:
+        validated(ValveParameters, valve.model_dump() | {"static_n": PRINTED_STATIC_N}, "F_s as printed")
+    except InputError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,162 @@
+"""All figures of a recording: its steps, and what they say together.
+
+Steps are looked for in `reference_m`; where that column is not there, never steps, or merely follows the stem (as the
+daemon's does outside automatic), in `command_pa`. The recording is cut where its clock is set back and where the daemon
+excites the valve (state 3), and rows without a position are left out; each is told.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.recording import Column, Recording
+from positioner.response.dead_band import answered, dead_band_and_resolution
+from positioner.response.figure import Figure, untold
+from positioner.response.rest_level import quantum
+from positioner.response.step_detection import Step, find_steps
+from positioner.response.step_figures import FIGURES, StepFigures, figures_of
+
+EXCITED = 3
+"""The state column's number for S3."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One figure over all steps that tell it."""
+
+    count: int
+    smallest: float
+    median: float
+    largest: float
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What a recording says of a valve's response, SI units."""
+
+    input: str
+    """The column that steps: `reference_m` or `command_pa`."""
+    steps: tuple[StepFigures, ...]
+    noise_m: float | None
+    static_gain: Figure
+    """Position over input between the outermost levels stepped to."""
+    dead_band: Figure
+    resolution: Figure
+    notes: tuple[str, ...]
+
+    def summary(self, name: str) -> Summary | None:
+        """Return one of `FIGURES` over the steps that the stem answered; None when no step tells it."""
+        gain = self.static_gain.value
+        asked = [each for each in self.steps if gain and answered(each, gain)]
+        told = [figure.value for each in asked if (figure := getattr(each, name)).value is not None]
+        return Summary(len(told), min(told), median(told), max(told)) if told else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """Rows without a break of the clock; positions and input finite."""
+
+    time_s: Column
+    position_m: Column
+    input: Column
+
+
+def respond(recording: Recording) -> Response:
+    """Return the response figures of a recording; without steps it has none, and says so."""
+    notes: list[str] = []
+    whole = _usable(recording, notes)
+    for name in ("reference_m", "command_pa"):
+        if name not in recording.columns:
+            continue
+        stretches = list(_stretches(recording, name, whole))
+        found = [(stretch, _steps(stretch, follows=name == "reference_m")) for stretch in stretches]
+        if any(steps for _, steps in found):
+            return _response(name, found, notes)
+        notes.append(f"{name} does not step from one held value to another")
+    nothing = untold("the recording holds no step")
+    return Response("none", (), None, nothing, nothing, nothing, tuple(notes))
+
+
+def _usable(recording: Recording, notes: list[str]) -> NDArray[np.bool_]:
+    """Return which rows tell anything, and note those that do not."""
+    finite = np.isfinite(recording.position_m)
+    if missing := int((~finite).sum()):
+        notes.append(f"{missing} of {len(finite)} rows have no position and were left out")
+    state = recording.columns.get("state")
+    excited = np.zeros(len(finite), dtype=np.bool_) if state is None else state == EXCITED
+    if excited.any():
+        notes.append(f"{int(excited.sum())} rows of the daemon's own excitation (state S3) were left out")
+    if backward := int((np.diff(recording.time_s) <= 0).sum()):
+        notes.append(f"the clock was set back {backward} times; the recording is cut there")
+    usable: NDArray[np.bool_] = finite & ~excited
+    return usable
+
+
+def _stretches(recording: Recording, name: str, whole: NDArray[np.bool_]) -> Iterator[_Stretch]:
+    held = recording.columns[name]
+    rows = np.flatnonzero(whole & np.isfinite(held))
+    state = recording.columns.get("state", np.zeros(len(held)))
+    excitations = np.cumsum(state == EXCITED)
+    breaks = (np.diff(recording.time_s[rows]) <= 0) | (np.diff(excitations[rows]) > 0)
+    for part in np.split(rows, np.flatnonzero(breaks) + 1):
+        if part.size:
+            yield _Stretch(recording.time_s[part], recording.position_m[part], held[part])
+
+
+def _steps(stretch: _Stretch, *, follows: bool) -> list[Step]:
+    """Return the steps; a reference that is the very position when it changes only follows the stem."""
+    steps = find_steps(stretch.time_s, stretch.input)
+    same = stretch.input == stretch.position_m
+    return [step for step in steps if not (follows and same[step.first])]
+
+
+def _response(name: str, found: list[tuple[_Stretch, list[Step]]], notes: list[str]) -> Response:
+    is_reference = name == "reference_m"
+    quantum_m = quantum(np.concatenate([stretch.position_m for stretch, _ in found]))
+    if quantum_m:
+        notes.append(f"positions are whole multiples of {quantum_m:.3g} m")
+    steps = tuple(
+        figures_of(stretch.time_s, stretch.position_m, step, quantum_m, is_reference=is_reference)
+        for stretch, steps in found
+        for step in steps
+    )
+    noises = [each.noise_m for each in steps if each.noise_m is not None]
+    gain = _static_gain(steps)
+    dead_band, resolution = (
+        dead_band_and_resolution(steps, gain.value, "m" if is_reference else "Pa")
+        if gain.value
+        else (untold("the stem did not answer any step"), untold("the stem did not answer any step"))
+    )
+    return Response(name, steps, median(noises) if noises else None, gain, dead_band, resolution, tuple(notes))
+
+
+def _static_gain(steps: tuple[StepFigures, ...]) -> Figure:
+    """Return position over input between the outermost levels stepped to; of a single level, the step's own."""
+    told = [each for each in steps if each.level_m is not None and each.travel_m.value is not None]
+    if not told:
+        return untold("no step has enough samples")
+    points = [(each.input_to, each.level_m or 0.0) for each in told]
+    low, high = min(points), max(points)
+    if low[0] == high[0]:
+        return told[0].static_gain
+    error = max(each.travel_m.plus_minus or 0.0 for each in told)
+    return Figure((high[1] - low[1]) / (high[0] - low[0]), error / (high[0] - low[0]))
+
+
+def as_json(response: Response) -> Mapping[str, object]:
+    """Return everything as plain values, None for what cannot be told."""
+    steps = [asdict(each) for each in response.steps]
+    summaries = {name: response.summary(name) for name in FIGURES}
+    return {
+        "input": response.input,
+        "noise_m": response.noise_m,
+        "steps": steps,
+        "summary": {name: None if each is None else asdict(each) for name, each in summaries.items()},
+        "static_gain": asdict(response.static_gain),
+        "dead_band": asdict(response.dead_band),
+        "resolution": asdict(response.resolution),
+        "notes": list(response.notes),
+    }

@@ -1,0 +1,41 @@
+"""A daemon's cycle on a simulated device, in one process and virtual time: for `play` and `reproduce`.
+
+The cycle, the link and the controller are the daemon's own; only the driver is the in-memory one, and the pace is
+the device's clock. The device is the one that the slaves on a bus serve, so they behave the same.
+"""
+
+from collections.abc import Callable, Iterator
+
+from config.daemon_file import DaemonFile
+from drivers.in_memory import MemoryDriver, Plant
+from positioner.control.controller import Controller
+from positioner.control.requests import Requests
+from positioner.control.settings import Settings
+from positioner.daemon.cycle import Cycle
+from positioner.daemon.health import Health, HealthSettings
+from positioner.daemon.link import Link
+from positioner.daemon.pacing import DevicePace
+from positioner.daemon.snapshot import Snapshot
+from positioner.estimation.refiner import InPlace
+
+Script = Callable[[Snapshot, Requests], Requests]
+"""A DCS: what it asks for after a snapshot, given what it asked for before."""
+
+
+def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests) -> Cycle:
+    """Return a daemon's cycle that commands a device in memory, such as that of `sim.slave.modbus_slave`."""
+    pace = DevicePace()
+    link = Link(MemoryDriver(device), pace)
+    held_pa, _ = link.open()
+    health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
+    controller = Controller(Settings.of(daemon), held_pa, InPlace())
+    return Cycle(link, controller, pace, requests, recorder=None, health=health)
+
+
+def played(cycle: Cycle, script: Script, until_s: float) -> Iterator[Snapshot]:
+    """Yield the snapshot of every cycle up to a time of the device, s, the script playing the DCS between them."""
+    yield cycle.snapshot
+    while cycle.snapshot.sample.time_s < until_s:
+        cycle.requests = script(cycle.snapshot, cycle.requests)
+        cycle.once()
+        yield cycle.snapshot

@@ -1,0 +1,83 @@
+"""The device as Modbus registers: its map read as one image, written by whole quantities.
+
+The same map is served as holding and as input registers. A read takes one image of the device, so no value is torn;
+registers between two quantities read 0. A write covers whole writable quantities, and all of it is checked before
+any of it is obeyed.
+"""
+
+import struct
+from collections.abc import Sequence
+from operator import attrgetter
+
+from config.device import SIMULATED_MAP, WRITABLE, CommunicationAction, ModbusMap
+from fieldbus.modbus.layout import layout
+from fieldbus.modbus.server import ExceptionCode, RegisterError, Table
+from sim.slave.clocks import Clock
+from sim.slave.simulated_device import Device
+
+
+class DeviceRegisters:
+    """Serves a device by its map.
+
+    Args:
+        device: the device.
+        clock: lets its time pass.
+        registers: where its quantities lie.
+    """
+
+    def __init__(self, device: Device, clock: Clock, registers: ModbusMap = SIMULATED_MAP) -> None:
+        self._device = device
+        self._clock = clock
+        self._places = list(registers.places.values())
+        self._values = attrgetter(*registers.places)
+        self._layout = layout(self._places)
+        self._words = struct.Struct(f">{self._layout.words}H")
+        self._writable = {place.address: (name, place) for name, place in registers.places.items() if name in WRITABLE}
+
+    def read(self, _table: Table, address: int, count: int) -> Sequence[int]:
+        """Return words of one image of the device, brought up to date.
+
+        Raises:
+            RegisterError: ILLEGAL_ADDRESS, some lie outside the map.
+        """
+        first = address - self._layout.address
+        if not 0 <= first <= first + count <= self._layout.words:
+            raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+        self._clock.catch_up()
+        raw = [place.raw(value) for place, value in zip(self._places, self._values(self._device), strict=True)]
+        return self._words.unpack(self._layout.pack(raw))[first : first + count]
+
+    def write(self, address: int, words: Sequence[int], _peer: str) -> None:
+        """Obey the quantities written, all or none.
+
+        Raises:
+            RegisterError: ILLEGAL_ADDRESS, not whole writable quantities; ILLEGAL_VALUE.
+        """
+        written = self._quantities(address, words)
+        device = self._device
+        try:
+            timeout_s = written.get("communication_timeout_s", device.communication_timeout_s)
+            action = CommunicationAction(int(written.get("communication_action", device.communication_action)))
+            if "command_pa" in written:
+                device.check(written["command_pa"])
+            if len(written) > ("command_pa" in written):
+                self._clock.catch_up()
+                device.supervise(timeout_s, action)
+            if "command_pa" in written:
+                self._clock.command(written["command_pa"])
+        except ValueError:
+            raise RegisterError(ExceptionCode.ILLEGAL_VALUE) from None
+
+    def _quantities(self, address: int, words: Sequence[int]) -> dict[str, float]:
+        """Return the values written, by name."""
+        values, at = {}, 0
+        while at < len(words):
+            if address + at not in self._writable:
+                raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+            name, place = self._writable[address + at]
+            end = at + place.format.words
+            if end > len(words):
+                raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+            values[name] = place.value(place.format.decode(words[at:end]))
+            at = end
+        return values

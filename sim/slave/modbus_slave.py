@@ -1,0 +1,72 @@
+"""The simulated slave on Modbus TCP: valve, device, clock, registers and server put together from its file."""
+
+from pathlib import Path
+
+from config.errors import InputError
+from config.roles import Role
+from config.slave_file import ModbusRtuBus, ModbusTcpBus, SlaveFile, load_slave, valve_path
+from config.valve_file import load_valve
+from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.tls import Guard
+from sim.slave.clocks import clock_of
+from sim.slave.device_registers import DeviceRegisters
+from sim.slave.rtu_server import RtuServer
+from sim.slave.simulated_device import Device
+from sim.valve import Valve
+
+VALVE_STEP_S = 1e-5
+"""The integration step, or the period if that is shorter."""
+
+
+class ModbusSlave:
+    """A simulated slave, listening as soon as it is made.
+
+    Args:
+        path: the slave file.
+        port: another TCP port than the file's; 0 takes any free one.
+
+    Raises:
+        InputError: a fault in the slave file or its valve file, or the port is in use.
+    """
+
+    def __init__(self, path: Path, port: int | None = None) -> None:
+        file = load_slave(path)
+        device = device_of(file, valve_path(file, path))
+        self._clock = clock_of(file, device)
+        assert isinstance(file.bus, ModbusTcpBus | ModbusRtuBus)
+        self._server = _server(DeviceRegisters(device, self._clock), file.bus, port)
+        self._server.start()
+        self.address = self._server.address
+
+    def catch_up(self) -> None:
+        """Let the time pass that is due; call it often enough that no request has much to catch up."""
+        with self._server.lock:
+            self._clock.catch_up()
+
+    def stop(self) -> None:
+        """Close the port and the connections."""
+        self._server.stop()
+
+
+def _server(
+    registers: DeviceRegisters, bus: ModbusTcpBus | ModbusRtuBus, port: int | None
+) -> RegisterServer | RtuServer:
+    if isinstance(bus, ModbusRtuBus):
+        if port is not None:
+            raise InputError("--port", "is of Modbus TCP; the slave is on a serial line")
+        return RtuServer(registers, bus.serial, bus.unit)
+    # As a device has it: what an observer may not, an operator may.
+    guard = Guard(bus.tls, lambda _: Role.OPERATOR) if bus.tls else None
+    return RegisterServer(registers, bus.host, bus.port if port is None else port, bus.unit, guard)
+
+
+def device_of(file: SlaveFile, valve_file: Path) -> Device:
+    """Return the device of a slave file, its valve at rest.
+
+    Raises:
+        InputError: a fault in the valve file, or the changes contradict each other.
+    """
+    described = load_valve(valve_file)
+    valve = Valve.from_file(described, step_s=min(VALVE_STEP_S, file.clock.period_s), source=str(valve_file))
+    valve.rest_at(file.initial.position_m, file.initial.pressure_pa)
+    return Device(valve, file, described.valve.model_dump(exclude={"name"}))

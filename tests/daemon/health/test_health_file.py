@@ -1,0 +1,110 @@
+"""What is kept over a restart: whole or not at all, and never mended in silence."""
+
+import json
+import logging
+from pathlib import Path
+
+import pytest
+
+from config.errors import InputError
+from positioner.control.controller import Decision
+from positioner.daemon.health import Health, HealthKeeper, HealthRecord, Kept
+from positioner.daemon.health.health_file import read_record, write_record
+
+KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)
+
+
+def test_what_was_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "valve.json"
+    for record in (KEPT, HealthRecord()):
+        write_record(path, "FV-1", record)
+        assert read_record(path, "FV-1") == (record, None)
+    assert [each.name for each in tmp_path.iterdir()] == ["valve.json"]
+
+
+def test_without_a_file_everything_begins(tmp_path: Path) -> None:
+    assert read_record(tmp_path / "none.json", "FV-1") == (HealthRecord(), None)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"valve": "FV-2"}, "valve: allowed is 'FV-1', got 'FV-2'"),
+        ({"version": 2}, "version: allowed is 1, got 2"),
+        ({"travel_m": -1.0}, "travel_m: must be a number from 0 up, got -1.0"),
+        ({"travel_m": "12"}, "travel_m: must be a number from 0 up, got '12'"),
+        ({"travel_m": True}, "travel_m: must be a number from 0 up, got True"),
+        ({"reversals": 3.5}, "reversals: must be a whole number from 0 up, got 3.5"),
+        ({"stiction_index": 1.5}, "stiction_index: must be a number from 0 up to 1, got 1.5"),
+        ({"baseline_pa": 0}, "baseline_pa: must be a number above 0, or null, got 0"),
+        ({"extra": 1}, "must hold version, valve"),
+    ],
+)
+def test_a_record_that_cannot_be_is_put_aside_and_told(tmp_path: Path, change: dict[str, object], said: str) -> None:
+    path = tmp_path / "valve.json"
+    write_record(path, "FV-1", KEPT)
+    spoilt = json.dumps(json.loads(path.read_text()) | change)
+    path.write_text(spoilt)
+    record, problem = read_record(path, "FV-1")
+    assert record == HealthRecord()
+    assert problem is not None
+    assert problem.startswith(said)
+    assert not path.exists()
+    assert (tmp_path / "valve.json.unreadable").read_text() == spoilt
+
+
+@pytest.mark.parametrize("text", [b"", b"{", b"\xff\x00", b"[1]", b'{"travel_m": NaN}', b"[" * 100_000])
+def test_garbage_is_put_aside_and_told_in_one_line(tmp_path: Path, text: bytes) -> None:
+    path = tmp_path / "valve.json"
+    path.write_bytes(text)
+    record, problem = read_record(path, "FV-1")
+    assert record == HealthRecord()
+    assert problem is not None
+    assert "\n" not in problem
+    assert (tmp_path / "valve.json.unreadable").read_bytes() == text
+
+
+def test_two_valves_whatever_their_names_have_a_file_each(tmp_path: Path) -> None:
+    names = ["a/b", "a-b", "a b", "..", "é"]
+    for name in names:
+        Kept.in_folder(tmp_path / "health", name)
+    assert len(list((tmp_path / "health").iterdir())) == len(names)
+
+
+def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="the health record cannot be kept there"):
+        Kept.in_folder(tmp_path / "file", "FV-1")
+
+
+def undecided() -> Decision:
+    raise AssertionError("keeping needs no decision")
+
+
+def test_the_keeper_tells_what_it_could_not_read_and_keeps_the_counts_at_the_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    Kept.in_folder(tmp_path, "FV-1")
+    (file,) = tmp_path.iterdir()
+    file.write_text("{")
+    kept = Kept.in_folder(tmp_path, "FV-1")
+    health = Health.idle(0.1)
+    keeper = HealthKeeper(health, undecided, "FV-1", kept)
+    with caplog.at_level(logging.WARNING):
+        keeper.start()
+        keeper.stop()
+    assert [record.getMessage() for record in caplog.records] == ["health record unreadable, counts start anew"]
+    restarted = Health(health.settings, KEPT)
+    assert restarted.record == KEPT
+    keeper = HealthKeeper(restarted, undecided, "FV-1", kept)
+    keeper.keep(HealthRecord(13.0, 341, 0.25, 17, 22e3))
+    assert Kept.in_folder(tmp_path, "FV-1").record.reversals == 341
+
+
+def test_a_disk_that_fails_is_told_once_and_control_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    kept = Kept(tmp_path / "gone" / "valve.json", HealthRecord(), None)
+    keeper = HealthKeeper(Health.idle(0.1), undecided, "FV-1", kept)
+    with caplog.at_level(logging.ERROR):
+        keeper.keep(KEPT)
+        keeper.keep(KEPT)
+    assert [record.getMessage() for record in caplog.records] == ["health record cannot be written"]

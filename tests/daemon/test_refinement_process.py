@@ -1,0 +1,93 @@
+"""The process beside the daemon: does its jobs, survives bad ones, and its death is no more than a refusal."""
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from positioner.daemon.refinement_process import ProcessRefiner, RefinementProcess
+from positioner.estimation.batch import RecordSettings
+from positioner.estimation.refiner import Job
+from tests.estimation.stem import NOISE, TRUTH, grid, run, swing
+
+
+def job() -> Job:
+    moved = run(swing, grid(1e-3, -0.1, 0.8)).noisy(np.random.default_rng(1))
+    return Job(moved.time_s, moved.position_m, moved.pressure_pa, RecordSettings(noise_std_m=NOISE, pressure_held=True))
+
+
+@pytest.fixture(scope="module")
+def process() -> Iterator[RefinementProcess]:
+    made = RefinementProcess()
+    yield made
+    made.stop()
+
+
+def test_a_job_is_done_elsewhere_exactly_as_here(process: RefinementProcess) -> None:
+    refiner = process.refiner(patient=True)
+    assert refiner.submit(job())
+    assert refiner.pending
+    assert not refiner.submit(job()), "one at a time"
+    result, here = refiner.collect(), job().done()
+    assert result is not None
+    assert result.estimates == here.estimates
+    assert result.estimates.b.value == pytest.approx(TRUTH["b"], rel=0.01)
+    assert refiner.collect() is None, "a result is given once"
+
+
+def test_it_is_started_before_there_is_a_job_and_ends_at_once() -> None:
+    made = RefinementProcess()
+    until = time.monotonic() + 20
+    while made._process is None and time.monotonic() < until:
+        time.sleep(0.005)
+    assert made._process is not None
+    assert made._process.poll() is None
+    begin = time.monotonic()
+    made.stop()
+    assert made._process.poll() is not None
+    assert time.monotonic() - begin < 2.0
+
+
+def test_asking_does_not_wait(process: RefinementProcess) -> None:
+    refiner = process.refiner()
+    assert refiner.submit(job())
+    begin = time.perf_counter()
+    refiner.collect()
+    assert time.perf_counter() - begin < 0.02
+    assert until_collected(refiner)
+
+
+def test_a_job_that_makes_no_sense_fails_alone(process: RefinementProcess) -> None:
+    refiner = process.refiner(patient=True)
+    bad = job()
+    assert refiner.submit(Job(bad.time_s, bad.position_m[:-1], bad.pressure_pa, bad.settings))
+    assert refiner.collect() is None
+    assert not refiner.pending
+    assert refiner.submit(job())
+    assert refiner.collect() is not None
+
+
+def test_a_process_that_died_refuses() -> None:
+    process = RefinementProcess()
+    refiner = process.refiner(patient=True)
+    assert refiner.submit(job())
+    assert refiner.collect() is not None
+    assert process._process is not None
+    os.kill(process._process.pid, signal.SIGKILL)
+    process._process.wait()
+    refiner.submit(job())
+    assert refiner.collect() is None
+    assert not refiner.submit(job())
+    process.stop()
+
+
+def until_collected(refiner: ProcessRefiner) -> bool:
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        if refiner.collect() is not None:
+            return True
+        time.sleep(0.005)
+    return False

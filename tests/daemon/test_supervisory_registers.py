@@ -1,0 +1,233 @@
+"""The supervisory registers on a virtual valve: what is read, what is taken, what is refused."""
+
+import logging
+import math
+
+import pytest
+
+from config.codes import Fault
+from config.daemon_file import DaemonFile
+from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
+from config.slave_file import SlaveFile
+from config.valve_file import shipped_valve
+from drivers.boundary import Capabilities, NoConnection, Reading
+from fieldbus.modbus.server import ExceptionCode, RegisterError, RegisterServer
+from positioner.control.requests import Requests
+from positioner.daemon.cycle import Cycle
+from positioner.daemon.supervisory_registers import SupervisoryRegisters
+from positioner.virtual.virtual_cycle import virtual_cycle
+from sim.slave.modbus_slave import device_of
+
+STROKE_M = 0.1016
+LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
+
+
+class Panel:
+    """Registers of a daemon on a virtual valve, by name."""
+
+    def __init__(self) -> None:
+        daemon = DaemonFile.model_validate(
+            {"valve": {"stroke_m": STROKE_M}, "law": LAW, "pressure": {"minimum_pa": 0.0, "maximum_pa": 200e3}}
+        )
+        slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})
+        self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
+        self.registers = SupervisoryRegisters(self.cycle, STROKE_M, 0.0, 200e3)
+
+    def get(self, name: str) -> float:
+        register = BY_NAME[name]
+        return register.format.decode(self.registers.read("holding", register.address, register.format.words))
+
+    def set(self, name: str, value: float) -> None:
+        register = BY_NAME[name]
+        self.registers.write(register.address, register.format.encode(value), "test")
+
+    def run(self, cycles: int = 1) -> None:
+        for _ in range(cycles):
+            self.cycle.once()
+
+
+@pytest.fixture
+def panel() -> Panel:
+    return Panel()
+
+
+def refused(panel: Panel, name: str, value: float) -> ExceptionCode:
+    before = panel.cycle.requests
+    with pytest.raises(RegisterError) as caught:
+        panel.set(name, value)
+    assert panel.cycle.requests == before, "nothing changed"
+    return caught.value.code
+
+
+def test_every_register_can_be_read_alone_and_all_at_once(panel: Panel) -> None:
+    everything = panel.registers.read("input", 0, SIZE)
+    for register in BY_NAME.values():
+        alone = panel.registers.read("holding", register.address, register.format.words)
+        assert list(everything[register.address : register.end]) == list(alone)
+
+
+def test_the_test_constants_tell_the_word_order(panel: Panel) -> None:
+    assert panel.get("word_test") == WORD_TEST
+    assert panel.get("long_test") == LONG_TEST
+    assert panel.get("float_test") == FLOAT_TEST
+    assert panel.registers.read("holding", BY_NAME["long_test"].address, 2) == [0x1234, 0x5678]
+
+
+def test_it_starts_so_that_nothing_moves(panel: Panel) -> None:
+    quiet = {"mode": 0, "eta_1": 1, "eta_2": 1, "eta_3": 1, "state": 0, "fault": 0}
+    assert {name: panel.get(name) for name in quiet} == quiet
+
+
+def test_before_any_write_the_reference_reads_as_the_stem(panel: Panel) -> None:
+    panel.run()
+    assert panel.get("reference") == pytest.approx(panel.get("position"))
+    assert panel.get("position") == pytest.approx(0.02 / STROKE_M)
+
+
+def test_a_written_reference_reads_back_in_both_scales_and_moves_the_valve_in_automatic(panel: Panel) -> None:
+    panel.set("mode", 2)
+    panel.set("reference", 0.5)
+    assert panel.get("reference") == 0.5
+    assert panel.get("reference_scaled") == 5000
+    panel.run(500)
+    assert panel.get("state") == 1
+    assert panel.get("position") == pytest.approx(0.5, abs=0.005)
+    assert panel.get("delta_r") == pytest.approx(0.5 - 0.02 / STROKE_M, abs=1e-6)
+    assert panel.get("command") == pytest.approx(814e3 * 0.5 * STROKE_M + 22e3)
+
+
+def test_the_scaled_reference_is_the_same_reference(panel: Panel) -> None:
+    panel.set("reference_scaled", 2500)
+    assert panel.get("reference") == pytest.approx(0.25)
+
+
+def test_one_request_may_give_all_commands(panel: Panel) -> None:
+    values = {
+        "reference": 0.5, "reference_scaled": 5000, "mode": 2, "eta_1": 1, "eta_2": 1, "eta_3": 0, "acknowledge": 0,
+        "heartbeat": 7, "manual_pressure": 50e3, "alpha": 40e3, "beta": 10e3, "omega": 2.0,
+    }  # fmt: skip
+    words = [word for name, value in values.items() for word in BY_NAME[name].format.encode(value)]
+    panel.registers.write(0, words, "test")
+    panel.run()
+    read = {name: panel.get(name) for name in values}
+    assert read == values
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("reference", 1.5),
+        ("reference", -0.1),
+        ("reference", math.nan),
+        ("reference", math.inf),
+        ("reference_scaled", 10001),
+        ("mode", 3),
+        ("eta_1", 2),
+        ("acknowledge", 2),
+        ("omega", 0.0),
+        ("alpha", -1.0),
+        ("manual_pressure", 200.1e3),
+    ],
+)
+def test_a_value_outside_its_range_is_an_illegal_value(panel: Panel, name: str, value: float) -> None:
+    assert refused(panel, name, value) is ExceptionCode.ILLEGAL_VALUE
+
+
+@pytest.mark.parametrize("name", ["state", "position", "a_e", "cycles", "word_test"])
+def test_what_is_measured_cannot_be_written(panel: Panel, name: str) -> None:
+    assert refused(panel, name, 0) is ExceptionCode.ILLEGAL_ADDRESS
+
+
+@pytest.mark.parametrize(("address", "words"), [(0, [0]), (1, [0]), (1, [0, 0]), (15, [0]), (17, [0]), (600, [0])])
+def test_a_part_of_a_value_or_nothing_at_all_is_an_illegal_address(
+    panel: Panel, address: int, words: list[int]
+) -> None:
+    before = panel.cycle.requests
+    with pytest.raises(RegisterError) as caught:
+        panel.registers.write(address, words, "test")
+    assert caught.value.code is ExceptionCode.ILLEGAL_ADDRESS
+    assert panel.cycle.requests == before
+
+
+def test_one_bad_value_spoils_its_whole_request(panel: Panel) -> None:
+    before = panel.cycle.requests
+    with pytest.raises(RegisterError):
+        panel.registers.write(0, [*BY_NAME["reference"].format.encode(0.5), 20000], "test")
+    assert panel.cycle.requests == before
+
+
+def test_references_that_disagree_in_one_request_are_refused(panel: Panel) -> None:
+    with pytest.raises(RegisterError) as caught:
+        panel.registers.write(0, [*BY_NAME["reference"].format.encode(0.5), 4000], "test")
+    assert caught.value.code is ExceptionCode.ILLEGAL_VALUE
+
+
+def test_reading_beyond_the_map_is_an_illegal_address(panel: Panel) -> None:
+    with pytest.raises(RegisterError) as caught:
+        panel.registers.read("holding", SIZE - 1, 2)
+    assert caught.value.code is ExceptionCode.ILLEGAL_ADDRESS
+
+
+def test_a_bad_write_is_one_line_in_the_log(panel: Panel, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO), pytest.raises(RegisterError):
+        panel.set("reference", 1.5)
+    (record,) = caplog.records
+    assert record.message == "write refused"
+    assert record.__dict__["fields"]["reason"] == "reference: allowed is 0 to 1 p.u., got 1.5"
+    assert record.__dict__["fields"]["peer"] == "test"
+
+
+class Unplugged:
+    """What the driver finds where the valve was: nothing."""
+
+    capabilities = Capabilities(one_transaction=True, device_time=True, sample_counter=True)
+
+    def open(self) -> float:
+        raise NoConnection("unplugged")
+
+    def read(self) -> Reading:
+        raise NoConnection("unplugged")
+
+    def write(self, command_pa: float) -> None:
+        raise NoConnection("unplugged")
+
+    def exchange(self, command_pa: float) -> Reading:
+        raise NoConnection("unplugged")
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_latched_fault_keeps_the_mode_until_acknowledged(panel: Panel, monkeypatch: pytest.MonkeyPatch) -> None:
+    panel.set("mode", 2)
+    panel.run()
+    with monkeypatch.context() as cable:
+        cable.setattr(panel.cycle.link, "_driver", Unplugged())
+        panel.run(3)
+        assert (panel.get("fault"), panel.get("mode"), panel.get("quality")) == (Fault.NO_REPLY, 0, 2)
+        assert panel.get("lost_replies") == 3
+    panel.run(2)
+    assert refused(panel, "mode", 2) is ExceptionCode.DEVICE_BUSY
+    panel.set("mode", 0)
+    panel.set("acknowledge", 1)
+    panel.run()
+    assert panel.get("fault") == Fault.NONE
+    panel.set("mode", 2)
+    panel.run()
+    assert panel.get("mode") == 2
+
+
+def test_the_cycle_waits_for_no_request(panel: Panel) -> None:
+    """Even one that is being answered, with the server's lock held, for as long as it likes."""
+    server = RegisterServer(panel.registers, "127.0.0.1", 0, 1)
+    with server.lock:
+        panel.run(10)
+        assert panel.cycle.snapshot.sample.time_s == pytest.approx(0.011)
+
+
+def test_estimates_are_served_with_their_reasons(panel: Panel) -> None:
+    assert math.isnan(panel.get("a_e"))
+    assert panel.get("a_valid") == 0
+    assert panel.get("a_reason") == 1
+    assert panel.get("b_over_c_applied") == -814e3
+    assert panel.get("identifications") == 0

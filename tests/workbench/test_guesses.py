@@ -1,0 +1,36 @@
+"""Places that the record itself suggests for a search to begin, which no search from elsewhere would find."""
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from sim.composition import Composition
+from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
+from workbench.data.record import ready
+from workbench.fit.guesses import quanta_seen_m, values_seen
+from workbench.model.parameters import free_parameters
+
+VALVE = drawn_valve(np.random.default_rng(0))
+STOPS = {"lower_m": 0.012, "travel_m": 0.06, "stiffness_n_per_m": 1e8, "damping_ns_per_m": 1e4}
+
+
+def recorded(**effect: float | str) -> Recording:
+    name = str(effect.pop("name"))
+    return record_of(with_effect(VALVE, name, **{key: float(value) for key, value in effect.items()}), 0)
+
+
+@pytest.mark.parametrize("quantum_m", [1.4e-4, 2e-4, 5e-4])
+def test_a_quantum_of_a_few_noises_is_among_the_likely_ones(quantum_m: float) -> None:
+    likely_m = quanta_seen_m(ready(recorded(name="quantisation", quantum_m=quantum_m)))
+    assert min(abs(each / quantum_m - 1.0) for each in likely_m) < 2e-3
+
+
+def test_stops_are_sought_where_the_positions_end() -> None:
+    composition = Composition.from_file(with_effect(VALVE, "end_stop", **STOPS))
+    added = free_parameters(composition, ["end_stop.lower_m", "end_stop.travel_m"])
+    seen = values_seen(added, ready(recorded(name="end_stop", **STOPS)))
+    lowest, swept = np.array(seen).T
+    upper = lowest + swept
+    assert np.min(np.abs(upper - 0.072)) < 4.0 * NOISE_M
+    assert np.any(upper > 0.075), "the upper stop alone out of reach"
+    assert np.any(lowest < lowest.max() - 2e-3), "the lower stop alone out of reach"

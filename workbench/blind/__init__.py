@@ -1,0 +1,1 @@
+"""Recordings with an effect that nobody knows: `hiding` draws them, `sealing` keeps the answer, `trial` runs."""

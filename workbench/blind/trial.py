@@ -1,0 +1,135 @@
+"""A trial of a known valve: it answers a command, after a lead-in that is not recorded.
+
+The lead-in is what precedes the last passage of the command, so that the first passage begins as its repetition does.
+
+    dirty     pressure noise between command and valve, an autoregression of 300 Pa and 0.2 s; static friction drawn
+              anew at each stop, 4 % standard deviation, never below Coulomb friction; a 12-bit transmitter
+
+`missed_m` is what a valve without something misses of such a trial at its best, spring and friction refitted by scipy
+to the clean answer from the true values: no code is shared with `workbench.fit.fitting`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from config.recording import Column, Recording
+from config.slave_file import Sensor
+from config.valve_file import ValveFile
+from sim.composition import COULOMB, SPRING, STATIC, VISCOUS, Composition
+from sim.karnopp import Vector, read
+from sim.open_loop import STEP_S, at_rest, follow
+from sim.transmitter import Transmitter
+from workbench.blind.input_signal import lead_in
+
+NOISE_M = 5e-5
+LEAD_IN_S = 5.0
+PRESSURE_NOISE_PA, CORRELATION_S = 300.0, 0.2
+BREAK_AWAY_JITTER = 0.04
+LEVELS = 2**12
+SOILED_EVERY_S = 2e-3
+COARSE_S = 1e-3
+"""Step of the refit."""
+SCALES = ((100.0, 1e-3), (30.0, 3e-4), (5.0, 1e-4))
+"""Of the soft-L1 loss, in standard deviations of the noise, and of the differences, as the cost is a staircase."""
+MOST_STATIC = 1.6
+"""log(F_s / F_c) at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A command, Pa, held for a period, s, from each of its n samples to the next."""
+
+    command_pa: Column
+    period_s: float
+
+    def answer_m(self, composition: Composition, theta: Vector, step_s: float = STEP_S) -> Column:
+        """Return what a clean valve indicates at the samples, m."""
+        vector = theta.copy()
+        state = self._before(composition, vector)
+        follow(composition, vector, state, self.lead_in_pa, self.period_s, step_s)
+        return follow(composition, vector, state, self.command_pa[:-1], self.period_s, step_s).indicated_m
+
+    def soiled_m(self, composition: Composition, generator: np.random.Generator) -> Column:
+        """Return what a dirty valve indicates at the samples, m, before the transmitter."""
+        parts = max(1, round(self.period_s / SOILED_EVERY_S))
+        h = self.period_s / parts
+        commands = np.repeat(np.concatenate([self.lead_in_pa, self.command_pa[:-1]]), parts)
+        commands += _pressure_noise(generator, commands.size, h)
+        theta = composition.theta.copy()
+        state = self._before(composition, theta)
+        indicated_m, moved = [read(state).indicated], True
+        for command in commands:
+            rests = read(state).v == 0.0
+            if moved and rests:
+                varied = 1.0 + BREAK_AWAY_JITTER * generator.standard_normal()
+                theta[STATIC] = max(theta[COULOMB], composition.theta[STATIC] * varied)
+            moved = not rests
+            indicated_m.append(follow(composition, theta, state, command, h, STEP_S).indicated_m[-1])
+        return np.array(indicated_m[self.lead_in_pa.size * parts :: parts])
+
+    def recording(self, indicated_m: Column, sensor: Sensor) -> Recording:
+        """Return the recording that a transmitter makes of it."""
+        transmitter = Transmitter(sensor)
+        columns = {
+            "time_s": np.arange(self.command_pa.size) * self.period_s,
+            "command_pa": self.command_pa,
+            "position_m": np.array([transmitter.measure(each) for each in indicated_m.tolist()]),
+        }
+        return Recording(columns, {"source": "positioner hide"})
+
+    @property
+    def lead_in_pa(self) -> Column:
+        """The commands before the recorded ones."""
+        return lead_in(self.command_pa, round(LEAD_IN_S / self.period_s))
+
+    def _before(self, composition: Composition, theta: Vector) -> Vector:
+        """Return the state before the lead-in: at rest in the middle of the stroke, in balance with the spring."""
+        valve = composition.valve
+        middle_m = 0.5 * valve.stroke_m
+        balanced_pa = valve.spring_n_per_m * middle_m / valve.diaphragm_area_m2
+        return at_rest(composition, theta, -self.lead_in_pa.size * self.period_s, middle_m, balanced_pa)
+
+
+def _pressure_noise(generator: np.random.Generator, count: int, period_s: float) -> Column:
+    kept = float(np.exp(-period_s / CORRELATION_S))
+    noise = PRESSURE_NOISE_PA * generator.standard_normal(count)
+    for i in range(1, count):
+        noise[i] = kept * noise[i - 1] + np.sqrt(1.0 - kept**2) * noise[i]
+    return noise
+
+
+def missed_m(trials: Sequence[Trial], truth: ValveFile, without: ValveFile) -> list[float]:
+    """Return the rms distance, m, of a valve refitted to the first trial from the true valve, trial by trial."""
+    true = Composition.from_file(truth)
+    known = Composition.from_file(without)
+    answers = [trial.answer_m(true, true.theta) for trial in trials]
+    first = trials[0]
+
+    def error(z: Vector) -> Column:
+        return (first.answer_m(known, _theta(known, z), COARSE_S) - answers[0]) / NOISE_M
+
+    start = known.theta
+    z = np.log([start[SPRING], start[VISCOUS], start[COULOMB], start[STATIC] / start[COULOMB]])
+    lower, upper = z - 1.0, z + 1.0
+    lower[-1], upper[-1] = 0.0, MOST_STATIC
+    z = np.clip(z, lower + 1e-6, upper - 1e-6)
+    for scale, difference in SCALES:
+        found = least_squares(
+            error, z, bounds=(lower, upper), loss="soft_l1", f_scale=scale, diff_step=[difference], max_nfev=8
+        )
+        z = np.clip(found.x, lower + 1e-6, upper - 1e-6)
+    theta = _theta(known, z)
+    return [
+        float(np.sqrt(np.mean((trial.answer_m(known, theta) - answer) ** 2)))
+        for trial, answer in zip(trials, answers, strict=True)
+    ]
+
+
+def _theta(composition: Composition, z: Vector) -> Vector:
+    theta = composition.theta.copy()
+    spring, viscous, coulomb, ratio = np.exp(z).tolist()
+    theta[[SPRING, VISCOUS, COULOMB, STATIC]] = spring, viscous, coulomb, coulomb * ratio
+    return theta

@@ -1,0 +1,271 @@
+"""Compare: the model in free run against the measured position, and where it fails.
+
+The model is adequate if its rms error is at most 1.5 times the floor (sensor noise, or repeatability where the
+command repeats itself), the residual does not depend on the input, and no slip is missed or invented.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.recording import Column, Recording
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
+from workbench.compare.measures import fit_percent, judged_rows, rms, robust
+from workbench.compare.phases import PHASES, SlipEvents, matched, phases
+from workbench.compare.residuals import (
+    Correlation,
+    Profile,
+    Spectrum,
+    autocorrelation,
+    cross_correlation,
+    profile,
+    spectrum,
+)
+from workbench.compare.sentences import Findings, sentences
+from workbench.data.motion import Slip, slips, velocity_m_per_s
+from workbench.data.record import Record, ready, require_units
+from workbench.model.free_run import FreeRun, Run
+
+ADEQUATE = 1.5
+NUMERICAL = 1e-6
+"""Part of the stroke below which an error is none, whatever the noise."""
+CLEAR = 1.3
+"""Times its 99 % band that a correlation with the input must reach at some lag to count as dependence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """Error in one phase; `mean_m` along the opening direction, `share` of the squared error."""
+
+    name: str
+    count: int
+    rms_m: float
+    mean_m: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class PressureSide:
+    """The error split where pressure is measured: the model's pressure path, and the rest run from the measurement."""
+
+    pressure_rms_pa: float
+    stem_rms_m: float
+    stem_fit_percent: float
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Everything a report draws; arrays of n rows as the recording, NaN where it is not judged."""
+
+    adequate: bool
+    sentences: tuple[str, ...]
+    notes: tuple[str, ...]
+    fit_percent: float
+    rms_m: float
+    robust_m: float
+    """Median of the rms over blocks of 1 s: no single missed slip carries it."""
+    noise_m: float
+    repeatability_m: float | None
+    floor_m: float
+    phases: tuple[Phase, ...]
+    slips: SlipEvents
+    pressure_side: PressureSide | None
+    time_s: Column
+    command_pa: Column
+    measured_m: Column
+    simulated_m: Column
+    residual_m: Column
+    phase: NDArray[np.int64]
+    """Index into `phases`."""
+    over_time: Profile
+    over_position: Profile
+    over_velocity: Profile
+    over_direction: Profile
+    """Last direction of motion, -1 closing, +1 opening."""
+    over_pressure: Profile
+    autocorrelation: Correlation
+    input_correlation: Correlation
+    spectrum: Spectrum
+    friction: FrictionBalance
+
+
+def compare(recording: Recording, valve: ValveFile) -> Comparison:
+    """Hold a valve against a recording.
+
+    Raises:
+        InputError: an unknown effect, other units than SI, or a recording that cannot be simulated.
+    """
+    record = ready(recording)
+    require_units(record, valve.valve)
+    composition = Composition.from_file(valve)
+    run = FreeRun(composition, record).run(composition.theta)
+    rows = judged_rows(record, run.indicated_m)
+    residual_m = np.where(rows, run.indicated_m - record.position_m, np.nan)
+    stretches = [_stretch(valve, record, run, first, end) for first, end in record.segments]
+    phase, direction = _spread(record, stretches)
+    events = _joined([each.events for each in stretches])
+    velocity = np.concatenate([each.velocity_m_per_s for each in stretches])
+    even, period_s = _evenly(record, residual_m)
+    autocorrelated = autocorrelation(even[1], period_s)
+    with_input = cross_correlation(even[0], even[1], period_s)
+    error_m = rms(residual_m[rows])
+    found = Findings(
+        time_s=record.time_s[rows] - record.time_s[0],
+        residual_m=residual_m[rows],
+        position_m=record.position_m[rows],
+        phase=phase[rows],
+        direction=direction[rows],
+        floor_m=record.floor_m,
+        rms_m=error_m,
+        events=events,
+        measured_slips=tuple(slip for each in stretches for slip in each.measured),
+        depends_on_input=bool(np.max(np.abs(with_input.value)) > CLEAR * with_input.band),
+        close=error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
+    )
+    simulated_rows = np.concatenate([np.arange(first, end) for first, end in record.segments])
+    judged = rows[simulated_rows]
+    return Comparison(
+        adequate=found.adequate,
+        sentences=sentences(found),
+        notes=record.notes,
+        fit_percent=fit_percent(record, run.indicated_m),
+        rms_m=error_m,
+        robust_m=robust(record.time_s[rows], residual_m[rows]),
+        noise_m=record.noise_m,
+        repeatability_m=record.repeatability_m,
+        floor_m=record.floor_m,
+        phases=_phases(residual_m[rows], phase[rows]),
+        slips=events,
+        pressure_side=_pressure_side(composition, record, run),
+        time_s=record.time_s,
+        command_pa=record.command_pa,
+        measured_m=np.where(rows, record.position_m, np.nan),
+        simulated_m=run.indicated_m,
+        residual_m=residual_m,
+        phase=phase,
+        over_time=profile(record.time_s[rows], residual_m[rows]),
+        over_position=profile(record.position_m[rows], residual_m[rows]),
+        over_velocity=profile(velocity[judged], residual_m[simulated_rows][judged]),
+        over_direction=profile(direction[rows][direction[rows] != 0], residual_m[rows][direction[rows] != 0], 2),
+        over_pressure=profile(_pressure(record, run)[rows], residual_m[rows]),
+        autocorrelation=autocorrelated,
+        input_correlation=with_input,
+        spectrum=spectrum(even[1], period_s),
+        friction=balance(
+            _all([each.measured_forces for each in stretches]), _all([each.model_forces for each in stretches])
+        ),
+    )
+
+
+def as_json(value: Any) -> Any:
+    """Return a result as what JSON can say: arrays as lists, what is not a number as null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {each.name: as_json(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, np.ndarray):
+        return [as_json(each) for each in value.tolist()]
+    if isinstance(value, tuple | list):
+        return [as_json(each) for each in value]
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """What is found in one segment."""
+
+    measured: tuple[Slip, ...]
+    events: SlipEvents
+    phase: NDArray[np.int64]
+    direction: Column
+    velocity_m_per_s: Column
+    measured_forces: Forces
+    model_forces: Forces
+
+
+def _stretch(valve: ValveFile, record: Record, run: Run, first: int, end: int) -> _Stretch:
+    time_s = record.time_s[first:end]
+    rows = np.arange(end - first)
+    seen = record.judged[first:end]
+    # Only for finding motion: across a bad sample the stem is taken to go straight.
+    measured_m = np.interp(rows, rows[seen], record.position_m[first:end][seen])
+    simulated_m = run.indicated_m[first:end]
+    measured, simulated = slips(measured_m, record.noise_m), slips(simulated_m, record.noise_m)
+    pressure_pa = _pressure(record, run)[first:end]
+    load_n = np.zeros(rows.size) if record.load_n is None else record.load_n[first:end]
+    direction = np.zeros(rows.size)
+    for slip in measured:
+        direction[slip.first :] = slip.direction
+    both = [
+        forces(valve.valve, time_s, position_m, pressure_pa, load_n, record.noise_m)
+        for position_m in (measured_m, simulated_m)
+    ]
+    return _Stretch(
+        measured,
+        matched(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.noise_m),
+        phases(measured_m, record.noise_m, measured, valve),
+        direction,
+        velocity_m_per_s(time_s, measured_m),
+        both[0],
+        both[1],
+    )
+
+
+def _pressure(record: Record, run: Run) -> Column:
+    return run.pressure_pa if record.pressure_pa is None else record.pressure_pa
+
+
+def _spread(record: Record, stretches: Sequence[_Stretch]) -> tuple[NDArray[np.int64], Column]:
+    phase, direction = np.zeros(len(record), np.int64), np.zeros(len(record))
+    for (first, end), each in zip(record.segments, stretches, strict=True):
+        phase[first:end], direction[first:end] = each.phase, each.direction
+    return phase, direction
+
+
+def _joined(events: Sequence[SlipEvents]) -> SlipEvents:
+    return SlipEvents(
+        tuple(pair for each in events for pair in each.matched),
+        tuple(t for each in events for t in each.missed_s),
+        tuple(t for each in events for t in each.invented_s),
+    )
+
+
+def _all(parts: Sequence[Forces]) -> Forces:
+    return Forces(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Forces)))
+
+
+def _evenly(record: Record, residual_m: Column) -> tuple[tuple[Column, Column], float]:
+    """Return command and residual of the longest segment on an even grid of the median period, and the period."""
+    first, end = max(record.segments, key=lambda each: each[1] - each[0])
+    time_s, error_m = record.time_s[first:end], residual_m[first:end]
+    finite = np.isfinite(error_m)
+    period_s = float(np.median(np.diff(time_s)))
+    grid = time_s[0] + period_s * np.arange(int((time_s[-1] - time_s[0]) / period_s + 1e-6) + 1)
+    held = np.clip(np.searchsorted(time_s, grid + 1e-6 * period_s, side="right") - 1, 0, time_s.size - 1)
+    return (record.command_pa[first:end][held], np.interp(grid, time_s[finite], error_m[finite])), period_s
+
+
+def _phases(residual_m: Column, phase: NDArray[np.int64]) -> tuple[Phase, ...]:
+    total = float(np.sum(residual_m**2)) or 1.0
+    parts = [residual_m[phase == i] for i in range(len(PHASES))]
+    return tuple(
+        Phase(name, part.size, rms(part), float(part.mean()) if part.size else np.nan, float(np.sum(part**2)) / total)
+        for name, part in zip(PHASES, parts, strict=True)
+    )
+
+
+def _pressure_side(composition: Composition, record: Record, run: Run) -> PressureSide | None:
+    if record.pressure_pa is None:
+        return None
+    stem_m = FreeRun(composition, record, from_pressure=True).position_m(composition.theta)
+    rows = judged_rows(record, stem_m)
+    return PressureSide(
+        rms((run.pressure_pa - record.pressure_pa)[rows]),
+        rms(stem_m[rows] - record.position_m[rows]),
+        fit_percent(record, stem_m),
+    )

@@ -1,0 +1,38 @@
+"""Figures of an error: fit percentage, rms, and a robust one that a single missed slip does not carry.
+
+fit = 100 (1 - ||y - x|| / ||y - mean y||)         as MATLAB's `compare`: x simulated, y measured position
+robust = median over 1 s blocks of the block's rms
+"""
+
+import numpy as np
+
+from config.recording import Column
+from workbench.data.record import Record
+
+BLOCK_S = 1.0
+
+
+def judged_rows(record: Record, simulated_m: Column) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+    """Return which rows count: judged and simulated."""
+    return record.judged & np.isfinite(simulated_m)
+
+
+def fit_percent(record: Record, simulated_m: Column) -> float:
+    """Return the fit in per cent."""
+    rows = judged_rows(record, simulated_m)
+    measured_m = record.position_m[rows]
+    around = float(np.linalg.norm(measured_m - measured_m.mean()))
+    error = float(np.linalg.norm(simulated_m[rows] - measured_m))
+    return 100.0 * (1.0 - error / around) if around else -np.inf
+
+
+def rms(values: Column) -> float:
+    """Return the root of the mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
+
+
+def robust(time_s: Column, values: Column) -> float:
+    """Return the median of the rms over blocks of 1 s."""
+    block = np.floor((time_s - time_s[0]) / BLOCK_S).astype(np.int64)
+    _, member = np.unique(block, return_inverse=True)
+    return float(np.median(np.sqrt(np.bincount(member, values**2) / np.bincount(member))))

@@ -1,0 +1,221 @@
+"""Where the model fails, in plain sentences, the gravest first.
+
+A finding is said when it is both certain (3.5 standard errors, over slips, or over blocks of 1 s but no
+more of them than slips: between slips an error stands) and matters (a mean
+error above the floor, or a time above two periods).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.recording import Column
+from workbench.compare.measures import BLOCK_S
+from workbench.compare.phases import PHASES, Matched, SlipEvents
+from workbench.data.motion import Slip
+
+CERTAIN = 3.5
+FEWEST = 3
+TOLD = 8
+"""Notes told one by one."""
+SHARE = 0.5
+"""Part of the squared error from which a phase is named."""
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What the sentences are made from; arrays over the judged samples."""
+
+    time_s: Column
+    residual_m: Column
+    position_m: Column
+    phase: NDArray[np.int64]
+    direction: Column
+    floor_m: float
+    rms_m: float
+    events: SlipEvents
+    measured_slips: tuple[Slip, ...]
+    depends_on_input: bool
+    close: bool
+    """The error is at most 1.5 times the floor."""
+
+    @property
+    def adequate(self) -> bool:
+        """Close to the floor, without structure, and the recording has motion to judge by."""
+        unmatched = self.events.missed_s or self.events.invented_s
+        return bool(self.measured_slips) and self.close and not self.depends_on_input and not unmatched
+
+
+def sentences(found: Findings) -> tuple[str, ...]:
+    """Return the sentences."""
+    if not found.measured_slips:
+        invented = len(found.events.invented_s)
+        tail = f", the model makes {_count(invented)}" if invented else ""
+        return (f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion",)
+    said = []
+    if len({each.direction for each in found.measured_slips}) == 1:
+        way = "opens" if found.measured_slips[0].direction > 0 else "closes"
+        said.append(f"the stem only {way} in this recording: the other direction is not judged")
+    if found.adequate:
+        return (*said, f"the model holds: error {_mm(found.rms_m)}, floor {_mm(found.floor_m)}, no structure left")
+    graded = [*_along_motion(found), *_late(found), *_offset(found), *_trends(found)]
+    said += [text for _, text in sorted(graded, key=lambda each: -each[0])]
+    return (*said, *_slips(found), *_share(found), *_rest(found, bool(graded)))
+
+
+def shortened(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return what is said of a recording, many times told only begun: a bad line may lose samples by the thousand."""
+    if len(notes) <= TOLD + 1:
+        return tuple(notes)
+    return (*notes[:TOLD], f"and {len(notes) - TOLD} more of the kind")
+
+
+def _along_motion(found: Findings) -> Iterator[tuple[float, str]]:
+    """Too far or too short at the end of slips, after reversals and otherwise."""
+    for when, reversal in (("after every reversal", True), ("where it goes on in one direction", False)):
+        pairs = [each for each in found.events.matched if each.reversal == reversal]
+        yield from _by_direction(
+            pairs, [each.farther_m for each in pairs], found.floor_m, when, ("too far", "too short"), _mm
+        )
+
+
+def _late(found: Findings) -> Iterator[tuple[float, str]]:
+    """Slips that come too late or too early; graded as if it stood wrong by a median slip for that long."""
+    pairs = found.events.matched
+    period_s = float(np.median(np.diff(found.time_s))) if found.time_s.size > 1 else 0.0
+    graded = _by_direction(
+        pairs, [each.late_s for each in pairs], 2.0 * period_s, "its slips come", ("too late", "too early"), _seconds
+    )
+    for _, text in graded:
+        yield 0.5 * found.rms_m, text
+
+
+def _by_direction(
+    pairs: Sequence[Matched],
+    values: Sequence[float],
+    matters: float,
+    when: str,
+    words: tuple[str, str],
+    unit: Callable[[float], str],
+) -> Iterator[tuple[float, str]]:
+    """Say a mean over slips that is certain in both directions, alike or not, or in one only."""
+    means = {}
+    for direction in (1, -1):
+        part = np.array([value for pair, value in zip(pairs, values, strict=True) if pair.direction == direction])
+        if part.size >= FEWEST:
+            mean, error = float(np.median(part)), float(np.std(part, ddof=1)) / part.size**0.5
+            if _certain(mean, error, matters):
+                means[direction] = mean
+    if not means:
+        pooled = np.array(values)
+        if pooled.size >= FEWEST and len({each.direction for each in pairs}) == 2:
+            mean, error = float(np.median(pooled)), float(np.std(pooled, ddof=1)) / pooled.size**0.5
+            if _certain(mean, error, matters):
+                yield abs(mean), f"{when}, {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
+        return
+    told = {way: f"{unit(abs(mean))} {words[0] if mean > 0 else words[1]}" for way, mean in means.items()}
+    grade = max(abs(mean) for mean in means.values())
+    if len(means) == 1:
+        ((way, text),) = told.items()
+        yield grade, f"{when}, {text}, only when {'opening' if way > 0 else 'closing'}"
+    elif means[1] * means[-1] > 0.0 and 0.5 < means[1] / means[-1] < 2.0:
+        both = 0.5 * (means[1] + means[-1])
+        yield grade, f"{when}, {unit(abs(both))} {words[0] if both > 0 else words[1]}, both directions"
+    else:
+        yield grade, f"{when}, {told[1]} when opening and {told[-1]} when closing"
+
+
+def _offset(found: Findings) -> Iterator[tuple[float, str]]:
+    mean, error = _block_mean(found, np.ones(found.time_s.size, np.bool_))
+    if _certain(mean, error, found.floor_m) and abs(mean) > 0.5 * found.rms_m:
+        yield abs(mean), f"it stands {_mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
+
+
+def _trends(found: Findings) -> Iterator[tuple[float, str]]:
+    """Errors that grow over the stroke or with time."""
+    for over, what, unit in (
+        (found.position_m, "over the stroke", _mm),
+        (found.time_s, "with time", _seconds),
+    ):
+        if np.ptp(over) == 0.0:
+            continue
+        blocks = _blocks(found.time_s)
+        count = np.bincount(blocks)
+        x, y = np.bincount(blocks, over) / count, np.bincount(blocks, found.residual_m) / count
+        independent = min(x.size, len(found.measured_slips))
+        if independent < 8 or np.ptp(x) == 0.0:
+            continue
+        slope, intercept = np.polyfit(x, y, 1)
+        spread = float(np.std(y - slope * x - intercept)) / (float(np.std(x)) * (independent - 2) ** 0.5)
+        low, high = float(np.min(x)), float(np.max(x))
+        change = float(slope) * (high - low)
+        if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.floor_m, found.rms_m):
+            at_low, at_high = slope * low + intercept, slope * high + intercept
+            yield (
+                0.5 * abs(change),
+                f"its error changes {what}: {_signed(at_low)} at {unit(low)}, {_signed(at_high)} at {unit(high)}",
+            )
+
+
+def _slips(found: Findings) -> Iterator[str]:
+    missed, invented = len(found.events.missed_s), len(found.events.invented_s)
+    said = [f"misses {missed} of {len(found.measured_slips)} slips"] if missed else []
+    if invented:
+        said.append(f"invents {invented}" if missed else f"invents {_count(invented)} that the stem does not make")
+    if said:
+        yield f"it {' and '.join(said)}"
+
+
+def _share(found: Findings) -> Iterator[str]:
+    squares = np.bincount(found.phase, found.residual_m**2, len(PHASES))
+    worst = int(squares.argmax())
+    share = float(squares[worst] / squares.sum()) if squares.sum() else 0.0
+    if share > SHARE:
+        part = found.residual_m[found.phase == worst]
+        where = "near the stops" if PHASES[worst] == "near stops" else f"in phase {PHASES[worst]!r}"
+        yield f"{100 * share:.0f} % of the squared error is {where}, {_mm(float(np.sqrt(np.mean(part**2))))} rms"
+
+
+def _rest(found: Findings, named: bool) -> Iterator[str]:
+    times = found.rms_m / found.floor_m if found.floor_m else np.inf
+    if not found.close:
+        yield f"the error, {_mm(found.rms_m)} rms, is {times:.1f} times the floor of {_mm(found.floor_m)}"
+    if found.depends_on_input and not named:
+        yield "what is left depends on the command"
+
+
+def _blocks(time_s: Column) -> NDArray[np.int64]:
+    _, member = np.unique(np.floor((time_s - time_s[0]) / BLOCK_S), return_inverse=True)
+    return np.asarray(member, dtype=np.int64)
+
+
+def _block_mean(found: Findings, rows: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the mean residual and its standard error over blocks of 1 s."""
+    blocks = _blocks(found.time_s[rows])
+    means = np.bincount(blocks, found.residual_m[rows]) / np.bincount(blocks)
+    independent = min(means.size, len(found.measured_slips))
+    if independent < FEWEST:
+        return float(means.mean()), np.inf
+    return float(means.mean()), float(np.std(means, ddof=1)) / independent**0.5
+
+
+def _certain(mean: float, error: float, matters: float) -> bool:
+    return abs(mean) > CERTAIN * error and abs(mean) > matters
+
+
+def _count(slips: int) -> str:
+    return f"{slips} slip{'s' if slips > 1 else ''}"
+
+
+def _mm(value_m: float) -> str:
+    return f"{1e3 * value_m:.2g} mm"
+
+
+def _signed(value_m: float) -> str:
+    return f"{1e3 * value_m:+.2g} mm"
+
+
+def _seconds(value_s: float) -> str:
+    return f"{value_s:.2g} s"

@@ -1,0 +1,92 @@
+"""What is fitted on and what is held out: another recording, or the end of the one there is.
+
+The held-out end is simulated in one free run with what lies before it, so that its start needs no guess; only its rows
+count. Several recordings become one: where the clock is set back, the workbench simulates anew.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.errors import InputError
+from config.recording import Column, Recording
+from workbench.data.record import Mask, Record, ready, require_fittable
+
+HELD_OUT = 1.0 / 3.0
+"""Part of the recording that is held out where no other is given."""
+FEWEST = 40
+"""Samples on either side."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A recording that is simulated, and which of its rows count."""
+
+    recording: Recording
+    record: Record
+    counted: Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """What a candidate is fitted on, and what it is judged on: the other recording, or the end of the whole one."""
+
+    train: Part
+    judged: Part
+    floor_m: float
+    """The error that no model undercuts: the valve's repeatability where a command repeats, else the sensor's noise."""
+
+    @property
+    def moved_m(self) -> float:
+        """The standard deviation of the position that is fitted, m."""
+        return float(np.std(self.train.record.position_m[self.train.counted]))
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a command repeats itself, so that the floor is the valve's own."""
+        return any(each.record.repeatability_m is not None for each in (self.train, self.judged))
+
+
+def split(recordings: Sequence[Recording], test: Recording | None = None) -> Split:
+    """Set apart what is held out.
+
+    Raises:
+        InputError: no recording, too few samples, or more than can be fitted.
+    """
+    whole = joined(recordings)
+    require_fittable(whole)
+    end = len(whole) if test else round(len(whole) * (1.0 - HELD_OUT))
+    train = _part(_head(whole, end), 0)
+    judged = _part(test, 0) if test else _part(whole, end)
+    for part, what in ((train, "to fit"), (judged, "held out")):
+        if part.counted.sum() < FEWEST:
+            raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {FEWEST} are needed")
+    return Split(train, judged, max(train.record.floor_m, judged.record.floor_m))
+
+
+def _part(recording: Recording, first: int) -> Part:
+    record = ready(recording)
+    return Part(recording, record, record.judged & (np.arange(len(recording)) >= first))
+
+
+def residual_m(part: Part, simulated_m: Column) -> Column:
+    """Return simulated less measured position, NaN where it does not count."""
+    return np.where(part.counted, simulated_m - part.record.position_m, np.nan)
+
+
+def joined(recordings: Sequence[Recording]) -> Recording:
+    """Return the recordings one after another, with the columns that all of them have.
+
+    Raises:
+        InputError: there is none.
+    """
+    if not recordings:
+        raise InputError("recording", "none is given")
+    shared = [name for name in recordings[0].columns if all(name in each.columns for each in recordings)]
+    columns = {name: np.concatenate([each.columns[name] for each in recordings]) for name in shared}
+    return Recording(columns, recordings[0].metadata)
+
+
+def _head(recording: Recording, rows: int) -> Recording:
+    return Recording({name: column[:rows] for name, column in recording.columns.items()}, recording.metadata)

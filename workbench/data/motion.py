@@ -1,0 +1,71 @@
+"""Where the stem moves: velocity over a few samples, and the slips, the same for a measurement and a simulation.
+
+    v_i = (x_(i+w) - x_(i-w)) / (t_(i+w) - t_(i-w)),  w = 2;   moving where |x_(i+w) - x_(i-w)| > 5 sqrt 2 sigma
+
+A slip is a run of moving samples of one direction that covers more than 6 sigma.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from config.recording import Column
+
+REACH = 2
+NOTICED = 5.0 * 2**0.5
+COVERED = 6.0
+PARABOLA = 9
+"""Samples of a local parabola, from which accelerations come."""
+
+Directions = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """Rows first to last; from and to in m; direction +1 opening, -1 closing."""
+
+    first: int
+    last: int
+    from_m: float
+    to_m: float
+    direction: int
+
+    @property
+    def travel_m(self) -> float:
+        """How far it goes, positive."""
+        return abs(self.to_m - self.from_m)
+
+
+def velocity_m_per_s(time_s: Column, position_m: Column) -> Column:
+    """Return the velocity at each sample; NaN next to what is not a number, 0 at the ends."""
+    velocity = np.zeros(position_m.size)
+    w = REACH
+    velocity[w:-w] = (position_m[2 * w :] - position_m[: -2 * w]) / (time_s[2 * w :] - time_s[: -2 * w])
+    return velocity
+
+
+def directions(position_m: Column, noise_m: float) -> Directions:
+    """Return +1 where the stem moves up, -1 down, 0 where it cannot be told from rest."""
+    across = np.zeros(position_m.size)
+    across[REACH:-REACH] = position_m[2 * REACH :] - position_m[: -2 * REACH]
+    across[~np.isfinite(across)] = 0.0
+    return np.where(np.abs(across) > NOTICED * noise_m, np.sign(across), 0.0).astype(np.int64)
+
+
+def slips(position_m: Column, noise_m: float) -> tuple[Slip, ...]:
+    """Return the slips of an unbroken stretch, in order."""
+    way = directions(position_m, noise_m)
+    edges = np.flatnonzero(np.diff(way)) + 1
+    firsts = np.concatenate([[0], edges])
+    lasts = np.concatenate([edges, [way.size]]) - 1
+    found = []
+    for first, last in zip(firsts.tolist(), lasts.tolist(), strict=True):
+        direction = int(way[first])
+        if direction == 0:
+            continue
+        from_m = float(position_m[max(0, first - REACH)])
+        to_m = float(position_m[min(way.size - 1, last + REACH)])
+        if direction * (to_m - from_m) > COVERED * noise_m:
+            found.append(Slip(first, last, from_m, to_m, direction))
+    return tuple(found)

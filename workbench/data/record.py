@@ -1,0 +1,307 @@
+"""A recording made ready for simulation: cut where it is broken, its bad samples marked, all of it told.
+
+The clock set back, a gap, or rows that the daemon's recorder missed begin a new segment, simulated from rest on its
+own. Samples that the daemon lost are a longer period: it wrote no command in the meantime. A position that is not a
+number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. Nothing
+else is touched, and `notes` has a sentence for each of these, samples counted from 1.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from config.errors import InputError
+from config.recording import CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
+from config.valve_file import ValveParameters
+from workbench.data.noise import noise_std_m, quantum_m, repeatability_m
+
+GAP = 10.0
+"""A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
+UNEVEN = 0.05
+"""Sampling is uneven if its periods spread by more than this part of their median."""
+SHORTEST = 4
+"""Samples of a segment worth simulating."""
+FEW_STEPS = 10
+"""So often a clock may be set back, in however short a recording: several may have been joined."""
+LIKELY_SPIKE = 8.0
+"""Standard deviations of the noise that a spike stands off at least."""
+MOST_SAMPLES = 500_000
+LONGEST_S = 7200.0
+"""A fit simulates a recording thousands of times: with more samples, or for longer, it would take hours."""
+UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """n samples ready for simulation; `segments` are half-open ranges of rows, the others are not simulated."""
+
+    time_s: Column
+    command_pa: Column
+    position_m: Column
+    pressure_pa: Column | None
+    load_n: Column | None
+    judged: Mask
+    """Whether a sample's position counts in the error."""
+    segments: tuple[tuple[int, int], ...]
+    notes: tuple[str, ...]
+    noise_m: float
+    """Standard deviation of the sensor's noise, rounding included."""
+    repeatability_m: float | None
+    """How well the valve repeats itself, None where the command does not."""
+
+    @property
+    def floor_m(self) -> float:
+        """The error that no model undercuts."""
+        return max(self.noise_m, self.repeatability_m or 0.0)
+
+    @property
+    def period_s(self) -> float:
+        """Median period within the segments."""
+        return float(np.median(np.concatenate([np.diff(self.time_s[a:b]) for a, b in self.segments])))
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+def ready(recording: Recording) -> Record:
+    """Make a recording ready.
+
+    Raises:
+        InputError: a column is missing or of another length, the time is in disorder, no command or no position is a
+            number, or no stretch is long enough.
+    """
+    columns = recording.columns
+    _require_columns(columns)
+    notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key == "torn" or key.startswith("not ")]
+    command_pa = _held(recording.command_pa, notes)
+    position_m = recording.position_m
+    judged = _judged(position_m, notes)
+    segments = tuple(_segments(columns, notes))
+    if not segments:
+        raise InputError("recording", f"no stretch of at least {SHORTEST} samples without a gap or a step of the clock")
+    noise_m = noise_std_m(position_m[judged])
+    quantum = quantum_m(position_m[judged])
+    if quantum:
+        notes.append(f"position_m is rounded to {quantum:.3g} m")
+    _tell_sampling(columns["time_s"], segments, notes)
+    return Record(
+        columns["time_s"],
+        command_pa,
+        position_m,
+        _whole(columns.get("pressure_pa"), "pressure_pa", notes),
+        _whole(columns.get("load_n"), "load_n", notes),
+        judged,
+        segments,
+        tuple(notes),
+        noise_m,
+        _repeatability(columns["time_s"], command_pa, np.where(judged, position_m, np.nan), segments),
+    )
+
+
+def require_fittable(recording: Recording) -> None:
+    """Refuse what would take hours to fit.
+
+    Raises:
+        InputError: too many samples, or too long a time; says how much is allowed.
+    """
+    _require_columns(recording.columns)
+    count, steps = len(recording), np.diff(recording.time_s)
+    most = f"allowed are {MOST_SAMPLES} samples and {LONGEST_S:g} s: cut out the stretch that matters"
+    if count > MOST_SAMPLES:
+        raise InputError("recording", f"{count} samples would take hours to fit; {most}")
+    duration_s = float(np.sum(steps, where=(steps > 0.0) & (steps <= _longest_step_s(steps))))
+    if duration_s > LONGEST_S:
+        raise InputError("recording", f"{duration_s:.6g} s would take hours to fit; {most}")
+
+
+def require_units(record: Record, valve: ValveParameters) -> None:
+    """Recognise a position in per cent, mm or shares of the stroke, and a pressure in bar, psi, kPa or mbar.
+
+    Raises:
+        InputError: the numbers are those of another unit; says which and how to import it.
+    """
+    position_m = record.position_m[record.judged]
+    reached = float(np.max(np.abs(position_m)))
+    if reached > 20.0 * valve.stroke_m:
+        unit = "mm" if valve.stroke_m < 0.06 < reached < 1.5e3 * valve.stroke_m < 90 else "per cent (%) or mm"
+        raise InputError(
+            "recording",
+            f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m: it looks like {unit}; "
+            "import it, --column position_m=NAME:%",
+        )
+    if reached > 3.0 * valve.stroke_m and 0.3 < reached < 1.5:
+        raise InputError(
+            "recording",
+            f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m: it looks like a share of the "
+            "stroke, 0 to 1; give it in m",
+        )
+    _require_command_unit(record, valve, position_m)
+    _require_pressure_unit(record)
+
+
+def _require_command_unit(record: Record, valve: ValveParameters, position_m: Column) -> None:
+    needed_pa = (valve.spring_n_per_m * float(np.ptp(position_m)) + 2.0 * valve.coulomb_n) / valve.diaphragm_area_m2
+    span_pa = float(np.ptp(record.command_pa))
+    if span_pa == 0.0 or span_pa > 0.03 * needed_pa:
+        return
+    unit = min(UNITS_PA, key=lambda each: abs(np.log(span_pa * UNITS_PA[each] / needed_pa)))
+    if 0.2 < span_pa * UNITS_PA[unit] / needed_pa < 5.0:
+        raise InputError(
+            "recording",
+            f"command_pa spans {span_pa:.4g} where the motion takes some {needed_pa:.3g} Pa: it looks like "
+            f"{'kPa or per cent (%)' if unit == 'kPa' else unit}; import it, --column command_pa=NAME:{unit}",
+        )
+
+
+def _require_pressure_unit(record: Record) -> None:
+    """Hold the measured pressure against the command: both are the same quantity, but for a lag."""
+    if record.pressure_pa is None:
+        return
+    command_pa, measured = float(np.max(np.abs(record.command_pa))), float(np.max(np.abs(record.pressure_pa)))
+    for unit, factor in UNITS_PA.items():
+        if 0.0 < measured < 0.03 * command_pa and 0.3 < measured * factor / command_pa < 3.0:
+            raise InputError(
+                "recording",
+                f"pressure_pa reaches {measured:.4g} where command_pa reaches {command_pa:.4g} Pa: it looks like "
+                f"{unit}; import it, --column pressure_pa=NAME:{unit}",
+            )
+
+
+def _require_columns(columns: Mapping[str, Column]) -> None:
+    there = ", ".join(columns) or "none"
+    for name in REQUIRED:
+        if name not in columns:
+            imposed = "pressure_pa" in columns and "load_n" in columns
+            hint = "; where a rig imposes the position: workbench.diagnose_forces" if imposed else ""
+            raise InputError("recording", f"column {name} is missing; there are: {there}{hint}")
+    count = len(columns["time_s"])
+    if not count:
+        raise InputError("recording", "holds no samples")
+    for name, column in columns.items():
+        if len(column) != count:
+            raise InputError("recording", f"{name} holds {len(column)} values, time_s {count}: one a sample is needed")
+    if not np.isfinite(columns["time_s"]).all():
+        raise InputError("recording", "time_s: not every sample is a number")
+    set_back = int(np.sum(np.diff(columns["time_s"]) <= 0.0))
+    if set_back > max(FEW_STEPS, CLOCK_STEPS_TOLERATED * count):
+        raise InputError("recording", f"time_s must increase: it does not at {set_back} of {count} samples")
+
+
+def _held(command_pa: Column, notes: list[str]) -> Column:
+    finite = np.isfinite(command_pa)
+    if not finite.any():
+        raise InputError("recording", "command_pa: no sample is a number")
+    if finite.all():
+        return command_pa
+    notes.append(f"command_pa is not a number in {_samples(~finite)}: the command before is held")
+    last = np.maximum.accumulate(np.where(finite, np.arange(finite.size), 0))
+    last[: finite.argmax()] = finite.argmax()
+    return command_pa[last]
+
+
+def _judged(position_m: Column, notes: list[str]) -> Mask:
+    finite = np.isfinite(position_m)
+    if not finite.any():
+        raise InputError("recording", "position_m: no sample is a number")
+    if not finite.all():
+        notes.append(f"position_m is not a number in {_samples(~finite)}: left out of the error")
+    spikes = _spikes(position_m)
+    if spikes.any():
+        notes.append(f"position_m has a spike in {_samples(spikes)}: left out of the error")
+    return finite & ~spikes
+
+
+def _spikes(position_m: Column) -> Mask:
+    """Mark single samples that stand far off both neighbours, which agree with each other."""
+    before, here, after = position_m[:-2], position_m[1:-1], position_m[2:]
+    spikes = np.zeros(position_m.size, dtype=np.bool_)
+    if here.size:
+        middle_half = np.nanquantile(position_m, 0.99) - np.nanquantile(position_m, 0.01)
+        off = np.minimum(np.abs(here - before), np.abs(here - after))
+        least_m = max(0.1 * middle_half, LIKELY_SPIKE * noise_std_m(position_m))
+        spikes[1:-1] = (off > least_m) & (off > 20.0 * np.abs(after - before)) & (off > 0.0)
+        if middle_half == 0.0:
+            spikes[:] = False
+    return spikes
+
+
+def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple[int, int]]:
+    time_s = columns["time_s"]
+    steps = np.diff(time_s)
+    longest_s = _longest_step_s(steps)
+    breaks: dict[int, str] = {}
+    for row in np.flatnonzero(steps <= 0).tolist():
+        breaks[row + 1] = f"the clock is set back by {-steps[row]:.6g} s"
+    for row in np.flatnonzero(steps > longest_s).tolist():
+        breaks[row + 1] = f"a gap of {steps[row]:.6g} s"
+    for row, rise in _rises(columns.get("unrecorded")).items():
+        told = f"unrecorded rises by {rise:g}"
+        breaks[row] = f"{breaks[row]}, {told}" if row in breaks else told
+    lost = _rises(columns.get("lost_samples"))
+    if lost:
+        notes.append(
+            f"lost_samples rises by {sum(lost.values()):g} in {len(lost)} places, the first before sample "
+            f"{min(lost) + 1}: the command before is held"
+        )
+    for row in sorted(breaks):
+        notes.append(f"before sample {row + 1} {breaks[row]}: simulated anew from there")
+    edges = [0, *sorted(breaks), time_s.size]
+    for first, end in pairwise(edges):
+        if end - first >= SHORTEST:
+            yield first, end
+        else:
+            notes.append(f"samples {first + 1} to {end} stand alone: not simulated")
+
+
+def _rises(counted: Column | None) -> dict[int, float]:
+    """Return the rows at which a counter has risen, and by how much."""
+    if counted is None:
+        return {}
+    rises = np.diff(counted)
+    return {row + 1: float(rises[row]) for row in np.flatnonzero(rises > 0.0).tolist()}
+
+
+def _longest_step_s(steps: Column) -> float:
+    """Return the longest step of time that is no gap."""
+    forward = steps[steps > 0.0]
+    return GAP * float(np.quantile(forward, 0.95)) if forward.size else np.inf
+
+
+def _tell_sampling(time_s: Column, segments: tuple[tuple[int, int], ...], notes: list[str]) -> None:
+    steps = np.concatenate([np.diff(time_s[first:end]) for first, end in segments])
+    median_s = float(np.median(steps))
+    if np.quantile(steps, 0.99) - np.quantile(steps, 0.01) > UNEVEN * median_s:
+        notes.append(f"sampling is uneven: {steps.min():.4g} to {steps.max():.4g} s, median {median_s:.4g} s")
+
+
+def _whole(column: Column | None, name: str, notes: list[str]) -> Column | None:
+    """Interpolate what is not a number; a column without any number is none."""
+    if column is None or not np.isfinite(column).any():
+        return None
+    finite = np.isfinite(column)
+    if finite.all():
+        return column
+    notes.append(f"{name} is not a number in {_samples(~finite)}: interpolated")
+    rows = np.arange(column.size)
+    return np.interp(rows, rows[finite], column[finite])
+
+
+def _repeatability(
+    time_s: Column, command_pa: Column, position_m: Column, segments: tuple[tuple[int, int], ...]
+) -> float | None:
+    first, end = max(segments, key=lambda each: each[1] - each[0])
+    steps = np.diff(time_s[first:end])
+    if np.ptp(steps) > UNEVEN * float(np.median(steps)):
+        return None
+    return repeatability_m(command_pa[first:end], position_m[first:end])
+
+
+def _samples(mask: Mask) -> str:
+    """Say which samples: their number and the first."""
+    first = int(mask.argmax()) + 1
+    count = int(mask.sum())
+    return f"sample {first}" if count == 1 else f"{count} samples, the first {first}"

@@ -1,0 +1,397 @@
+"""Fit: the parameters with which one free run through the whole recording comes closest.
+
+`simulation_error` has the cost and its search, `starts` where searches begin, `parameters` the coordinates,
+`uncertainty` what the recording says about the result.
+
+Several searches are made, and how far their results agree is told. The result does not depend on the number of
+workers, which are threads: the simulation holds no interpreter lock.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from os import cpu_count
+from typing import Any, TypeVar
+
+import numpy as np
+
+from config.errors import InputError
+from config.loading import validated
+from config.recording import Column, Recording
+from config.valve_file import EffectTable, ValveFile, ValveParameters
+from sim.composition import BASE, STATIC, Composition
+from sim.effect import Effect, find_effect
+from sim.karnopp import Vector
+from workbench.compare.measures import fit_percent
+from workbench.data.motion import slips
+from workbench.data.record import Record, ready, require_fittable, require_units
+from workbench.fit.objective import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
+from workbench.fit.starts import base_starts, effect_starts, forces_regressed
+from workbench.fit.uncertainty import Uncertainty, uncertainty
+from workbench.model.free_run import FreeRun
+from workbench.model.parameters import DEFAULT, free_parameters
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much a search takes upon itself."""
+
+    starts: int
+    """Searches begun, at the wide level."""
+    carried: int
+    """The best of these are carried on through the other levels,"""
+    polled: int
+    """and of those at most so many, two at a time, are polled,"""
+    agreeing: int
+    """until so many have come to the same."""
+
+
+OF_BASE, OF_EFFECT = Effort(16, 8, 6, 3), Effort(18, 4, 3, 2)
+ELSEWHERE = 0.01
+"""Of a log-parameter: searches that end nearer to each other have found the same place."""
+AGREE = 1.01
+"""Searches agree if their costs are within this factor of the best."""
+FLAT = 0.5
+"""Rise of the cost that is nothing: within it static friction is put in the middle."""
+AT_BOUND = 1e-3
+WANTS_OUT = 2.0
+"""Slope of the cost at the bound times the deviation, in rises of 95 %: the least lies four deviations beyond it."""
+LEAST_SLIPS = 3
+
+Progress = Callable[[float], None]
+T = TypeVar("T")
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A parameter with its standard deviation and 95 % interval, in its own unit."""
+
+    value: float
+    std: float
+    lower: float
+    upper: float
+    at_bound: bool
+    """It lies at the end of its physical range."""
+    physical: bool
+    """False if the recording wants it beyond that end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """What one search came to."""
+
+    cost: float
+    rms_m: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted valve, in the habits of scikit-learn: predict, score, and the attributes."""
+
+    valve: ValveFile
+    parameters: Mapping[str, Fitted]
+    rms_m: float
+    floor_m: float
+    """The error that no model undercuts: noise, or repeatability where the command repeats itself."""
+    cost: float
+    """Soft-L1 cost of scale 5, in units of the noise; half the number of samples for white residuals."""
+    count: int
+    """Judged samples."""
+    starts: tuple[Search, ...]
+    """The searches, best first."""
+    agreement: int
+    """How many of the searches that were carried to the end came within 1 % of the best cost."""
+    condition: float
+    undetermined: tuple[str, ...]
+    notes: tuple[str, ...]
+    from_pressure: bool
+    seeds: tuple[Vector, ...] = field(repr=False)
+    """Parameter vectors at which an effect is added: the best search's, another's that ended elsewhere, the origins."""
+
+    @property
+    def trusted(self) -> bool:
+        """Whether more than one search came to the same error."""
+        return self.agreement > 1
+
+    def predict(self, recording: Recording) -> Column:
+        """Return the indicated position of a free run, m; NaN in rows that are not simulated."""
+        return self._run(ready(recording))
+
+    def score(self, recording: Recording) -> float:
+        """Return 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than the mean."""
+        record = ready(recording)
+        return fit_percent(record, self._run(record)) / 100.0
+
+    def _run(self, record: Record) -> Column:
+        composition = Composition.from_file(self.valve)
+        return FreeRun(composition, record, from_pressure=self.from_pressure).position_m(composition.theta)
+
+
+def fit(
+    recording: Recording,
+    valve: ValveFile,
+    *,
+    effects: Sequence[str] = (),
+    free: Sequence[str] | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    from_pressure: bool = False,
+    base: Fit | None = None,
+    profile: bool = True,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit a valve to a recording.
+
+    Args:
+        recording: what was measured.
+        valve: where to begin; its area, mass, Stribeck velocity and stroke are kept unless named in `free`.
+        effects: names of effects to be added to those of the valve file.
+        free: parameters to be fitted, an effect's as `effect.parameter`; by default spring, viscous, Coulomb and static
+            friction and all that the effects have.
+        seed: of the draws.
+        workers: threads, by default one a core.
+        from_pressure: simulate from the measured pressure instead of the command, without the pressure path.
+        base: the fit without `effects`, if it is there already.
+        profile: follow the cost for the intervals; without, they are those of the derivatives, at half the time.
+        progress: told the fraction done.
+
+    Raises:
+        InputError: the recording holds too little, other units than SI, or an unknown effect or parameter.
+    """
+    require_fittable(recording)
+    record = ready(recording)
+    require_units(record, valve.valve)
+    _require_motion(record)
+    if not effects:
+        composition = Composition.from_file(valve)
+        error = _error(composition, record, free, from_pressure)
+        origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
+        begins = base_starts(error, origins, seed, OF_BASE.starts)
+        found = _searched(composition, error, begins, OF_BASE, profile, workers, progress)
+        return replace(found, seeds=(*found.seeds, *origins))
+    ground = base or fit(recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free))
+    composition = _extended(ground.valve, effects)
+    error = _error(composition, record, free, from_pressure)
+    names = {find_effect(name, "effects").name for name in effects}
+    added = [each for each in error.parameters if each.name.partition(".")[0] in names]
+    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in ground.seeds]
+    begins = effect_starts(error, added, seeds, OF_EFFECT.starts)
+    return _searched(composition, error, begins, OF_EFFECT, profile, workers, progress)
+
+
+def profiled(found: Fit, recording: Recording) -> Fit:
+    """Return a fit with the intervals that following its cost gives."""
+    composition = Composition.from_file(found.valve)
+    error = _error(composition, ready(recording), tuple(found.parameters), found.from_pressure)
+    z = error.coordinates(composition.theta)
+    judged = uncertainty(error, z)
+    parameters = {each.name: _fitted(error, z, judged, i) for i, each in enumerate(error.parameters)}
+    return replace(found, parameters=parameters, condition=judged.condition, undetermined=judged.undetermined)
+
+
+def _error(
+    composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool
+) -> SimulationError:
+    run = FreeRun(composition, record, from_pressure=from_pressure)
+    reached = [
+        f"{each.name}.{key}"
+        for each in composition.effects
+        if not (from_pressure and "pressure" in each.functions)
+        for key, declared in each.parameters.items()
+        if not declared.given
+    ]
+    parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free)
+    return SimulationError(run, composition, parameters, composition.theta)
+
+
+def _of_base(free: Sequence[str] | None) -> Sequence[str] | None:
+    return None if free is None else [name for name in free if name in BASE]
+
+
+def _require_motion(record: Record) -> None:
+    found = [
+        each
+        for first, end in record.segments
+        for each in slips(np.where(record.judged, record.position_m, np.nan)[first:end], record.noise_m)
+    ]
+    if len(found) < LEAST_SLIPS:
+        raise InputError(
+            "recording", f"the stem moves {len(found)} times, at least {LEAST_SLIPS} are needed to fit anything"
+        )
+    if len({each.direction for each in found}) < 2:
+        way = "opens" if found[0].direction > 0 else "closes"
+        raise InputError(
+            "recording", f"the stem only {way}: friction and spring cannot be told apart without both ways"
+        )
+
+
+def _extended(valve: ValveFile, effects: Sequence[str]) -> Composition:
+    """Compose the valve with effects added, each somewhere in its range."""
+    there = [each.name for each in valve.effect]
+    for name in effects:
+        if name in there:
+            raise InputError("valve file", f"effect {name} is there already")
+    tables = [_switched_off(find_effect(name, "effects"), name, valve.valve) for name in effects]
+    return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
+
+
+def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTable:
+    """Return an effect's table as it vanishes, drawing data as declared."""
+    return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
+
+
+def _searched(
+    composition: Composition,
+    error: SimulationError,
+    begins: list[Vector],
+    effort: Effort,
+    profile: bool,
+    workers: int | None,
+    progress: Progress | None,
+) -> Fit:
+    """Search from every start, poll the best, and judge what was found."""
+    tell = progress or (lambda _: None)
+    wide = partial(error.rough.descended_at, WIDE)
+
+    middle = partial(error.rough.descended_at, MIDDLE)
+    narrow = partial(error.descended_at, NARROW)
+
+    begun = _each(wide, begins, workers, lambda done: tell(0.3 * done))
+    carried = _each(middle, error.screened(begun, effort.carried), workers, lambda done: tell(0.3 + 0.1 * done))
+    carried = _polled(error.rough, carried, STRIDES, MIDDLE.scale, workers, lambda done: tell(0.4 + 0.1 * done))
+    # The first start as it is stays in the race: descent at a wide scale may lose it.
+    down = _each(narrow, [*carried, begins[0]], workers, lambda done: tell(0.5 + 0.2 * done))
+    down.sort(key=error.cost)
+    ends: list[Vector] = []
+    while len(ends) < effort.polled and _agreeing(error, ends) < effort.agreeing:
+        pair = down[len(ends) : min(len(ends) + 2, effort.polled)]
+        ends += _polled(error, pair, POLLS, FINAL, workers, lambda done: tell(0.7 + 0.2 * done))
+        ends.sort(key=error.cost)
+    if _agreeing(error, ends) < effort.agreeing:
+        ends = sorted([*ends, error.polled(narrow(ends[0]))], key=error.cost)
+    best = _centred(error, error.descended_at(LAST, ends[0]))
+    judged = uncertainty(error, best, ends, profile=profile)
+    tell(1.0)
+    valve = _fitted_file(composition, error.theta(best))
+    return Fit(
+        valve,
+        {each.name: _fitted(error, best, judged, i) for i, each in enumerate(error.parameters)},
+        error.rms_m(best),
+        error.run.record.floor_m,
+        error.cost(best),
+        error.count,
+        tuple(_search(error, z) for z in ends),
+        _agreeing(error, ends),
+        judged.condition,
+        judged.undetermined,
+        error.run.record.notes,
+        error.run.from_pressure,
+        tuple(error.theta(z) for z in (best, *_elsewhere(ends))),
+    )
+
+
+def _polled(
+    error: SimulationError,
+    searches: Sequence[Vector],
+    steps: Sequence[float],
+    scale: float,
+    workers: int | None,
+    tell: Progress,
+) -> list[Vector]:
+    """Poll the searches; of those that fit equally well the first for all."""
+    fresh = [i for i, z in enumerate(searches) if not any(error.alike(z, other, scale) for other in searches[:i])]
+    polled = _each(lambda i: error.polled(searches[i], steps, scale), fresh, workers, tell)
+    at = dict(zip(fresh, polled, strict=True))
+    return [at.get(i, z) for i, z in enumerate(searches)]
+
+
+def _elsewhere(ends: Sequence[Vector]) -> list[Vector]:
+    """Return the best search that came to another place than the best of all, if there is one."""
+    away = [z for z in ends if np.max(np.abs(z - ends[0])) > ELSEWHERE]
+    return away[:1]
+
+
+def _agreeing(error: SimulationError, ends: Sequence[Vector]) -> int:
+    """Count the searches that came as low as the best."""
+    costs = [error.cost(z) for z in ends]
+    return sum(cost <= AGREE * min(costs) for cost in costs)
+
+
+def _centred(error: SimulationError, z: Vector) -> Vector:
+    """Put static friction in the middle of the interval that gives the same slips."""
+    at = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
+    if not at:
+        return z
+    limit = error.cost(z) + FLAT
+    ends = []
+    for way in (-1.0, 1.0):
+        reach = 1e-5
+        while reach < 0.2 and error.cost(_moved(error, z, at[0], 2.0 * way * reach)) < limit:
+            reach *= 2.0
+        ends.append(way * reach)
+    middle = _moved(error, z, at[0], 0.5 * sum(ends))
+    return middle if error.cost(middle) < limit else z
+
+
+def _moved(error: SimulationError, z: Vector, i: int, way: float) -> Vector:
+    there = z.copy()
+    there[i] = np.clip(z[i] + way, error.lower[i], error.upper[i])
+    return there
+
+
+def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> Fitted:
+    parameter = error.parameters[i]
+
+    def value(coordinate: float) -> float:
+        there = z.copy()
+        there[i] = coordinate
+        return float(error.theta(there)[parameter.index])
+
+    low, high = error.lower[i], error.upper[i]
+    near = AT_BOUND * (high - low)
+    at_bound = bool(z[i] < low + near or z[i] > high - near)
+    inward = 10.0 * near if z[i] < low + near else -10.0 * near
+    wants_out = at_bound and _wants_out(error, z, judged, i, inward)
+    slope = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
+    return Fitted(
+        value(z[i]),
+        abs(slope) * float(judged.std[i]),
+        value(max(low, float(judged.lower[i]))),
+        value(min(high, float(judged.upper[i]))),
+        at_bound,
+        not wants_out,
+    )
+
+
+def _wants_out(error: SimulationError, z: Vector, judged: Uncertainty, i: int, inward: float) -> bool:
+    """Whether the cost rises so steeply into the range that its least must lie beyond the end."""
+    steepness = (error.cost(_moved(error, z, i, inward)) - error.cost(z)) / abs(inward)
+    return steepness > 0.0 and steepness * float(judged.std[i]) > WANTS_OUT * judged.rise
+
+
+def _search(error: SimulationError, z: Vector) -> Search:
+    theta = error.theta(z)
+    return Search(error.cost(z), error.rms_m(z), {each.name: float(theta[each.index]) for each in error.parameters})
+
+
+def _fitted_file(composition: Composition, theta: Vector) -> ValveFile:
+    values: dict[str, Any] = dict(zip(composition.names, theta.tolist(), strict=True))
+    base = composition.valve.model_dump() | {name: values[name] for name in BASE}
+    tables = [
+        {"name": each.written} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
+        for each in composition.effects
+    ]
+    return validated(ValveFile, {"valve": base, "effect": tables}, composition.source)
+
+
+def _each(function: Callable[[T], S], arguments: Sequence[T], workers: int | None, tell: Progress) -> list[S]:
+    """Apply a function to each argument on the workers; results in the order of the arguments."""
+    results = []
+    with ThreadPoolExecutor(workers or cpu_count()) as pool:
+        for result in pool.map(function, arguments):
+            results.append(result)
+            tell(len(results) / len(arguments))
+    return results

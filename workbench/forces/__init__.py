@@ -1,0 +1,1 @@
+"""Where a rig imposes the position there is nothing to simulate: forces are balanced, and the rest diagnosed."""

@@ -1,0 +1,173 @@
+"""The model on its own through a whole record: it sees the command, never the measured position after the start.
+
+Each segment begins with the stem at rest where it is first measured; one that begins in motion begins with that
+velocity. The place is the median of the first still samples, corrected by what the sensor's effects make of it, so that
+the model indicates it. What was commanded before is not known. A pressure path that remembers it, a lag or a limited
+rate, begins with the pressure nearest to the first command of those that balance the forces:
+
+    at rest      |A p - k_s x| <= F_s
+    in motion    A p = k_s x + F_v v + F_c sign v
+
+Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
+of the measurements at its ends. A measured load acts as the pressure load / A besides.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.errors import InputError
+from config.recording import Column
+from config.valve_file import EffectTable, ValveFile
+from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS, Composition
+from sim.karnopp import SLIP, Vector, read, write
+from sim.open_loop import at_rest, follow
+from workbench.data.record import Record
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """How finely a run is integrated.
+
+    Steps are as long as a sample where the effects bear that, else so many times the longest they bear. The tolerance
+    is that of `sim.karnopp`.
+    """
+
+    steps: float
+    tolerance: float
+
+
+FINE = Accuracy(1.0, 3e-4)
+"""Within 0.5 um rms of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
+ROUGH = Accuracy(2.0, 1e-3)
+"""Within 50 um, in half the time."""
+STILL = 4.0
+"""Standard deviations of the noise within which the stem stands still."""
+LONGEST_START = 50
+"""Samples of the start that are averaged at most."""
+SHORT = 4
+"""Samples within which a stem that leaves its place is in motion from the start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The simulation, a row a sample of the record; NaN outside its segments. Stem and indicated position apart."""
+
+    indicated_m: Column
+    stem_m: Column
+    velocity_m_per_s: Column
+    pressure_pa: Column
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a segment begins: position, m, and velocity, m/s."""
+
+    position_m: float
+    velocity_m_per_s: float
+
+
+class FreeRun:
+    """A composition made ready to run through a record, for one parameter vector after another.
+
+    Raises:
+        InputError: simulated from pressure without a measured one; a load together with an effect that needs the
+            pressure itself.
+    """
+
+    def __init__(
+        self, composition: Composition, record: Record, *, from_pressure: bool = False, accuracy: Accuracy = FINE
+    ) -> None:
+        self.record = record
+        self._accuracy = accuracy
+        self.from_pressure = from_pressure
+        everything = (composition, list(range(len(composition.names))))
+        self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
+        self._drive_pa = _measured(record) if from_pressure else record.command_pa
+        if record.load_n is not None:
+            _require_bare_pressure(self._composition)
+        self._starts = [start(record, first, end) for first, end in record.segments]
+
+    def run(self, theta: Vector) -> Run:
+        """Simulate; theta as `composition.names`."""
+        vector = np.array(theta[self._kept])
+        load_n = self.record.load_n
+        drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
+        rows = np.full((4, len(self.record)), np.nan)
+        accuracy = self._accuracy
+        for (first, end), begin in zip(self.record.segments, self._starts, strict=True):
+            state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
+            periods = np.diff(self.record.time_s[first:end])
+            held_pa = drive_pa[first : end - 1]
+            step_s = min(float(periods.max()), accuracy.steps * self._composition.step_s)
+            path = follow(self._composition, vector, state, held_pa, periods, step_s, accuracy.tolerance)
+            rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
+        return Run(*rows)
+
+    def position_m(self, theta: Vector) -> Column:
+        """Return the indicated position, a value a sample."""
+        return self.run(theta).indicated_m
+
+    def _begin(self, theta: Vector, begin: Start, time_s: float, pressure_pa: float) -> Vector:
+        stem_m = begin.position_m
+        for _ in range(3):
+            held_pa = balanced_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
+            state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
+            stem_m += begin.position_m - read(state).indicated
+        if begin.velocity_m_per_s:
+            direction = float(np.sign(begin.velocity_m_per_s))
+            write(state, read(state)._replace(v=begin.velocity_m_per_s, mode=SLIP, sigma=direction))
+        return state
+
+
+def balanced_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
+    """Return the pressure nearest to a command with which the forces are in balance."""
+    middle_n = theta[SPRING] * position_m + theta[VISCOUS] * velocity_m_per_s
+    if velocity_m_per_s:
+        return float((middle_n + theta[COULOMB] * np.sign(velocity_m_per_s)) / theta[AREA])
+    least_pa, most_pa = ((middle_n + sign * theta[STATIC]) / theta[AREA] for sign in (-1.0, 1.0))
+    return float(min(max(command_pa, least_pa), most_pa))
+
+
+def start(record: Record, first: int, end: int) -> Start:
+    """Return where a segment begins, from its first judged samples."""
+    rows = first + np.flatnonzero(record.judged[first:end])
+    if not rows.size:
+        raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
+    position_m = record.position_m[rows[:LONGEST_START]]
+    time_s = record.time_s[rows[:LONGEST_START]]
+    band_m = STILL * record.noise_m
+    moving = np.abs(position_m - position_m[0]) > 2.0 * band_m
+    still = int(moving.argmax()) if moving.any() else position_m.size
+    if still >= SHORT or position_m.size < SHORT:
+        return Start(float(np.median(position_m[: max(1, still - 1)])), 0.0)
+    slope, place = np.polyfit(time_s[:SHORT] - time_s[0], position_m[:SHORT], 1)
+    return Start(float(place), float(slope))
+
+
+def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:
+    """Return the composition without its pressure path, and where its parameters stand in the whole vector."""
+    kept = [each for each in composition.effects if "pressure" not in each.functions]
+    values = dict(zip(composition.names, composition.theta.tolist(), strict=True))
+    tables = tuple(
+        EffectTable.model_validate({"name": each.name} | {key: values[f"{each.name}.{key}"] for key in each.parameters})
+        for each in kept
+    )
+    bare = Composition.of(ValveFile(valve=composition.valve, effect=tables), kept, composition.source)
+    return bare, [composition.names.index(name) for name in bare.names]
+
+
+def _measured(record: Record) -> Column:
+    if record.pressure_pa is None:
+        raise InputError("recording", "has no measured pressure_pa to simulate from")
+    following = np.append(record.pressure_pa[1:], record.pressure_pa[-1])
+    return np.asarray(0.5 * (record.pressure_pa + following))
+
+
+def _require_bare_pressure(composition: Composition) -> None:
+    for effect in composition.effects:
+        if "pressure" in effect.functions or any("p" in arguments for arguments in effect.functions.values()):
+            raise InputError(
+                composition.source,
+                f"effect {effect.name} needs the actuator pressure itself, which a record with load_n does not give",
+            )

@@ -1,0 +1,325 @@
+"""The report of a comparison: whether the model holds, and where it fails."""
+
+from pathlib import Path
+
+import numpy as np
+
+from workbench.compare.comparison import ADEQUATE, Comparison, Phase
+from workbench.compare.sentences import shortened
+from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
+from workbench.report.overlay import Simulated, overlay, phase_shades
+from workbench.report.page import (
+    Row,
+    Subject,
+    bullets,
+    figures_of_merit,
+    folded,
+    glossary,
+    heading,
+    pair,
+    plot,
+    section,
+    table,
+    text,
+    verdict,
+    write,
+)
+from workbench.report.plot_series import MOST, stretch
+from workbench.report.units import Shown, length, of_stroke, times
+
+MEANINGS = {
+    "stuck": "the stem rests",
+    "slipping up": "the stem moves in the opening direction",
+    "slipping down": "the stem moves in the closing direction",
+    "reversal": "from the first slip of a new direction to the start of the next slip",
+    "near stops": "within 2 % of the stroke of a stop",
+}
+WORDS = {
+    "Free run": "The model is given the command and where the stem stood at the start, and nothing else: "
+    "what it shows after that is its own.",
+    "Error": "Simulated less measured position. Positive: the model stands too far open.",
+    "rms": "Root of the mean square: the usual size of the error, in which large errors weigh more.",
+    "Floor": "The error that no model can undercut: the noise of the position sensor or, where the command repeats "
+    "itself in the recording, how well the valve repeats itself, whichever is more.",
+    "Fit": "100 % less the error's size in per cent of the measured motion's. 100 % is perfect; "
+    "below 0 % a straight line would do better.",
+    "Slip": "A stuck stem that breaks away and moves until it is stuck again.",
+}
+LISTED = 12
+"""Times of slips that are spelt out."""
+
+
+def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> None:
+    """Write the report.
+
+    Args:
+        comparison: what `compare` returned.
+        path: the HTML file.
+        subject: the valve and the recording that were compared.
+
+    Raises:
+        InputError: plotly is not installed, or the file cannot be written.
+    """
+    name = subject.valve.valve.name
+    stroke_m = subject.valve.valve.stroke_m
+    write(
+        path,
+        f"Valve {name}: model against measurement",
+        [
+            heading(f"Valve “{name}”: model against measurement", subject, facts(comparison)),
+            _verdict(comparison),
+            _key_figures(comparison, stroke_m),
+            _overlay(comparison),
+            _phases(comparison, stroke_m),
+            _friction(comparison),
+            _slips(comparison),
+            _statistics(comparison),
+            recording(subject, comparison.notes, _pressure(comparison)),
+            section("words", "Words used here", glossary(WORDS)),
+        ],
+    )
+
+
+def facts(comparison: Comparison) -> str:
+    """Say how long a recording is and how finely sampled."""
+    time_s = comparison.time_s
+    steps = np.diff(time_s)
+    forward = steps[steps > 0.0]
+    return (
+        f"{time_s.size} samples, {float(np.sum(forward)):.6g} s, one every {1e3 * float(np.median(forward)):.4g} ms"
+        if forward.size
+        else f"{time_s.size} samples"
+    )
+
+
+def _verdict(each: Comparison) -> str:
+    if each.adequate:
+        return verdict("good", "The model holds.", bullets(each.sentences))
+    if not each.over_direction.count.sum():
+        return verdict("open", "This recording cannot judge the model.", bullets(each.sentences))
+    return verdict("bad", "The model does not hold. Where it fails:", bullets(each.sentences))
+
+
+def _key_figures(each: Comparison, stroke_m: float) -> str:
+    missed, invented = len(each.slips.missed_s), len(each.slips.invented_s)
+    return figures_of_merit(
+        [
+            ("Error, rms, mm", length(each.rms_m), of_stroke(each.rms_m, stroke_m)),
+            ("Floor, mm", length(each.floor_m), "sensor noise" if _is_noise(each) else "repeatability of the valve"),
+            ("Error in floors", Shown(times(each.rms_m, each.floor_m)), f"a model that holds: at most {ADEQUATE:g} ×"),
+            ("Fit", Shown(f"{each.fit_percent:.1f} %"), "100 % is perfect"),
+            ("Slips matched", Shown(f"{len(each.slips.matched)}"), f"{missed} missed, {invented} invented"),
+        ]
+    )
+
+
+def _is_noise(each: Comparison) -> bool:
+    return each.repeatability_m is None or each.repeatability_m <= each.noise_m
+
+
+def _overlay(each: Comparison) -> str:
+    judged = np.isfinite(each.residual_m)
+    figure = overlay(
+        each.time_s,
+        each.command_pa,
+        each.measured_m,
+        [Simulated("model", MODEL, each.simulated_m)],
+        phase_shades(each.phase, judged),
+        each.slips,
+    )
+    return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
+
+
+def overlaid(figure: Figure, ground: str, samples: int) -> str:
+    """Return the section of an overlay; `ground` says what the shades behind it mean."""
+    return section(
+        "overlay",
+        "Measured and simulated position",
+        plot(
+            "plot-overlay",
+            figure,
+            640,
+            "Above the stem position, in the middle the error (simulated less measured), below the command. "
+            f"{ground} Drag across a plot to look closer, all three follow; double-click to return.{thinned(samples)}",
+        ),
+    )
+
+
+def thinned(count: int) -> str:
+    """Say how a long series is drawn; empty for a short one."""
+    if count <= MOST:
+        return ""
+    return f" Of every {stretch(count)} samples the least and the greatest are drawn; the figures are of all {count}."
+
+
+def _phases(each: Comparison, stroke_m: float) -> str:
+    return section(
+        "phases",
+        "Where it fails",
+        text(
+            "The error by what the stem is doing. The mean says which way the model is off, "
+            f"the last column how much of the whole (squared) error lies there. Marked: above {ADEQUATE:g} floors."
+        ),
+        table(
+            "table-phases",
+            [
+                "What the stem does",
+                "Samples",
+                "Error, rms, mm",
+                "In floors",
+                "Of stroke",
+                "Mean error, mm",
+                "Of whole error",
+            ],
+            [_phase(part, each.floor_m, stroke_m) for part in each.phases if part.count],
+        ),
+        text(
+            "The same error over the position, the velocity, the last direction and the pressure; bars: ± 1 std. error."
+        ),
+        pair(
+            _profile("position", each, "over the stem's position, mm", 1e3),
+            _profile("velocity", each, "over the stem's velocity, mm/s (opening +)", 1e3),
+            _profile("direction", each, "over the last direction of motion", 1.0),
+            _profile("pressure", each, "over the actuator pressure, kPa", 1e-3),
+        ),
+    )
+
+
+def _phase(part: Phase, floor_m: float, stroke_m: float) -> Row:
+    return Row(
+        [
+            part.name,
+            f"{part.count}",
+            length(part.rms_m),
+            times(part.rms_m, floor_m),
+            f"{100 * part.rms_m / stroke_m:.2g} %",
+            length(part.mean_m, sign=True),
+            f"{100 * part.share:.1f} %",
+        ],
+        MEANINGS[part.name],
+        "over" if part.rms_m > ADEQUATE * floor_m else "",
+    )
+
+
+def _profile(over: str, each: Comparison, title: str, factor: float) -> str:
+    figure = profiles(
+        [("error", MODEL, getattr(each, f"over_{over}"))], (title, factor), ("mean error, mm", 1e3, "mm", "m")
+    )
+    if over == "direction":
+        figure["layout"]["xaxis"] |= {"tickvals": [-1, 1], "ticktext": ["closing", "opening"], "range": [-1.6, 1.6]}
+    return plot(f"plot-over-{over}", figure, 270, f"Mean error {title}.")
+
+
+def _friction(each: Comparison) -> str:
+    both = (("measured", MEASURED), ("model", MODEL))
+    force = ("friction, N", 1.0, "N", "N")
+
+    def drawn(way: str) -> Figure:
+        pair_ = getattr(each.friction, way)
+        parts = [(name, colour, part) for (name, colour), part in zip(both, pair_, strict=True)]
+        millimetres = "velocity, mm/s (opening +)" if way == "over_velocity" else "position, mm"
+        return profiles(parts, (millimetres, 1e3), force)
+
+    return section(
+        "friction",
+        "Friction, as the balance of forces leaves it over",
+        text(
+            "Pressure times diaphragm area, less spring, less inertia: what remains while the stem moves is friction, "
+            "and any force that the model lacks. Drawn from the measurement and, in the same way, from the model. "
+            "Where the two part, something is missing that depends on that velocity or that position."
+        ),
+        plot("plot-friction-velocity", drawn("over_velocity"), 330, "Friction over velocity."),
+        pair(
+            plot("plot-friction-opening", drawn("opening_over_position"), 300, "Over position, while opening."),
+            plot("plot-friction-closing", drawn("closing_over_position"), 300, "Over position, while closing."),
+        ),
+    )
+
+
+def _slips(each: Comparison) -> str:
+    slips = each.slips
+    rows = []
+    for name, wanted in (("opening", 1), ("closing", -1)):
+        for reversal, when in ((True, "after a reversal"), (False, "going on")):
+            found = [pair_ for pair_ in slips.matched if pair_.direction == wanted and pair_.reversal == reversal]
+            if found:
+                late_s = float(np.median([pair_.late_s for pair_ in found]))
+                farther_m = float(np.median([pair_.farther_m for pair_ in found]))
+                rows.append(Row([f"{name}, {when}", f"{len(found)}", f"{late_s:+.3f}", length(farther_m, sign=True)]))
+    return section(
+        "slips",
+        "Slips: matched, missed, invented",
+        text(
+            f"Matched: {len(slips.matched)}. Missed, the stem slipped and the model did not: {len(slips.missed_s)}"
+            f"{_at(slips.missed_s)}. Invented, the model slipped and the stem did not: {len(slips.invented_s)}"
+            f"{_at(slips.invented_s)}."
+        ),
+        table("table-slips", ["Matched slips", "Number", "Model later by, s", "Model farther by, mm"], rows)
+        if rows
+        else "",
+        text("Medians; a minus: earlier, or not far enough.") if rows else "",
+    )
+
+
+def _at(times_s: tuple[float, ...]) -> str:
+    if not times_s:
+        return ""
+    shown = ", ".join(f"{each:.2f}" for each in times_s[:LISTED])
+    rest = len(times_s) - LISTED
+    return f" (at {shown} s{f' and {rest} more' if rest > 0 else ''})"
+
+
+def _statistics(each: Comparison) -> str:
+    return folded(
+        "statistics",
+        "For specialists: correlations and spectrum of the error",
+        text(
+            "An error that hangs together with the command says that the model answers the command wrongly; inside the "
+            "grey band (99 %) nothing is proved. An error that hangs together with itself only need not be the model's."
+        ),
+        pair(
+            plot(
+                "plot-input-correlation",
+                correlation(each.input_correlation, "correlation"),
+                280,
+                f"Error with the command: {each.input_correlation.outside} of {each.input_correlation.lag.size} shifts "
+                "outside the band. To the right of 0 the command comes first.",
+            ),
+            plot(
+                "plot-autocorrelation",
+                correlation(each.autocorrelation, "correlation"),
+                280,
+                f"Error with itself: {each.autocorrelation.outside} of {each.autocorrelation.lag.size - 1} shifts "
+                "outside the band of white noise.",
+            ),
+        ),
+        plot("plot-spectrum", spectrum(each.spectrum), 280, "Spectrum of the error."),
+        plot(
+            "plot-over-time",
+            profiles([("error", MODEL, each.over_time)], ("time, s", 1.0), ("mean error, mm", 1e3, "mm", "m")),
+            250,
+            "Mean error over time: a slope is drift.",
+        ),
+        text(f"Robust error, median of the rms over blocks of 1 s: {length(each.robust_m).text} mm."),
+    )
+
+
+def _pressure(each: Comparison) -> list[str]:
+    side = each.pressure_side
+    if side is None:
+        return [
+            "The recording has no measured actuator pressure: whether an error arises before the actuator (converter, "
+            "tubing) or at the stem can only be told from its shape"
+        ]
+    return [
+        f"The actuator pressure is measured; the model's is off by {1e-3 * side.pressure_rms_pa:.3g} kPa rms. Run from "
+        f"the measured pressure instead of the command, the error is {length(side.stem_rms_m).text} mm rms, "
+        f"fit {side.stem_fit_percent:.1f} %: that much arises at the stem"
+    ]
+
+
+def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> str:
+    """Return what is known of the recording itself."""
+    said = [f"{key}: {value}" for key, value in subject.metadata.items()]
+    whole = [] if notes else ["Nothing in it had to be left out or cut"]
+    return section("recording", "About the recording", bullets([*shortened(notes), *whole, *more, *said]))

@@ -1,0 +1,347 @@
+"""The report of a diagnosis: what is missing, how the error fell, what is not told apart, what to measure next."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from config.recording import Recording
+from sim.effect import find_effect
+from workbench.compare.comparison import Comparison, compare
+from workbench.fit.fitting import Fitted
+from workbench.report import ranking
+from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
+from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
+from workbench.report.effects_table import Race, added_effects, headline, not_told_apart, outcome, tried_effects
+from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
+from workbench.report.page import (
+    Row,
+    Subject,
+    bullets,
+    figures_of_merit,
+    folded,
+    glossary,
+    heading,
+    plot,
+    section,
+    table,
+    text,
+    verdict,
+    write,
+)
+from workbench.report.plot_series import drawn, rounded
+from workbench.report.ranking import Tried
+from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
+from workbench.select.diagnosis import Candidate, Diagnosis, Model, Step
+from workbench.select.equivalence import untold
+from workbench.select.evidence import LEAST_BIC
+from workbench.select.experiment import Experiment
+
+DIAGNOSIS_WORDS = {
+    "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "
+    "play in the linkage, a sensor's fault.",
+    "Fitted, held out": "The model's parameters are fitted to one part of the data. The other part is held out: "
+    "the model has not seen it, so that an error which falls there is no trick of the fit.",
+    "Evidence": "How much better an effect explains the fitted part than the model without it, less a price for "
+    f"each parameter it brings (gain of the robust Bayesian information criterion). Above {LEAST_BIC:g} it counts.",
+    "95 % interval": "Where the parameter lies, as far as this recording says.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What the report takes from a diagnosis beyond its models: the recording judged, and which of it was held out."""
+
+    judged: Recording
+    held_out: Mask
+    floor_m: float
+    base: Comparison
+    best: Comparison
+
+
+def _seen(diagnosis: Diagnosis) -> _Seen:
+    part = diagnosis.split.judged
+    base, best = (compare(part.recording, each.fit.valve) for each in (diagnosis.base, diagnosis.best))
+    return _Seen(part.recording, part.counted, diagnosis.split.floor_m, base, best)
+
+
+def report_diagnosis(
+    diagnosis: Diagnosis, path: Path, subject: Subject, experiment_file: str = "experiment.csv"
+) -> None:
+    """Write the report.
+
+    Args:
+        diagnosis: what `diagnose` returned.
+        path: the HTML file.
+        subject: the valve as it was given, and the recordings.
+        experiment_file: where the experiment's input was or would be written, for the reader.
+
+    Raises:
+        InputError: plotly is not installed, or the file cannot be written.
+    """
+    seen = _seen(diagnosis)
+    name = subject.valve.valve.name
+    write(
+        path,
+        f"Valve {name}: which effect is missing",
+        [
+            heading(f"Valve “{name}”: which effect is missing", subject, _facts(diagnosis, seen)),
+            _verdict(diagnosis, seen),
+            _key_figures(diagnosis, seen),
+            _fall(diagnosis, seen),
+            _overlay(seen),
+            _where(seen),
+            _ranking(diagnosis, seen),
+            _added(diagnosis),
+            not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "see the next section"),
+            _next(diagnosis, experiment_file),
+            _untold(diagnosis),
+            _preview(diagnosis),
+            recording(subject, diagnosis.split.train.record.notes, []),
+            section("words", "Words used here", glossary(DIAGNOSIS_WORDS | WORDS)),
+        ],
+    )
+
+
+def _facts(diagnosis: Diagnosis, seen: _Seen) -> str:
+    held_out, fitted = int(seen.held_out.sum()), int(diagnosis.split.train.counted.sum())
+    if held_out < len(seen.judged):
+        return f"{facts(seen.base)}; {fitted} fitted, {held_out} held out"
+    return f"fitted {fitted} samples; held out {facts(seen.base)}"
+
+
+def _verdict(diagnosis: Diagnosis, seen: _Seen) -> str:
+    return verdict(
+        *headline(diagnosis.verdict, diagnosis.missing),
+        text(diagnosis.sentence, "Where the model failed before:"),
+        bullets(seen.base.sentences),
+    )
+
+
+def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
+    before, after = diagnosis.base.errors, diagnosis.best.errors
+    stroke_m = diagnosis.base.fit.valve.valve.stroke_m
+    added = ", ".join(find_effect(name, "effects").name.replace("_", " ") for name in diagnosis.missing)
+    return figures_of_merit(
+        [
+            (
+                "Held-out error before, rms, mm",
+                length(before.test_rmse_m),
+                f"{of_stroke(before.test_rmse_m, stroke_m)}, base parameters refitted",
+            ),
+            ("and after, mm", length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
+            ("Floor, mm", length(seen.floor_m), "no model does better"),
+            ("Added", Shown(added or "nothing"), f"of {len(_names(diagnosis))} effects tried"),
+        ]
+    )
+
+
+def _names(diagnosis: Diagnosis) -> frozenset[str]:
+    return frozenset(each.name for each in diagnosis.candidates)
+
+
+def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
+    stages: list[tuple[str, Model, Candidate | None]] = [("as it was, refitted", diagnosis.base, None)]
+    stages += [
+        (f"+ {step.added.name}", step.added.model, step.added)
+        for step in diagnosis.steps
+        if step.added and step.added.model
+    ]
+    errors = [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages]
+    figure = ranking.fall(errors, seen.floor_m, LENGTH)
+    rows = [
+        Row(
+            [
+                name,
+                length(model.errors.train_rmse_m),
+                length(model.errors.test_rmse_m),
+                times(model.errors.test_rmse_m, seen.floor_m),
+                length(model.errors.test_block_m),
+                "–" if candidate is None or candidate.gain is None else f"{candidate.gain.bic:.4g}",
+            ],
+            "" if model.explained else "something is left to explain",
+            "good" if model.explained else "",
+        )
+        for name, model, candidate in stages
+    ]
+    head = ["Model", "Error, fitted, mm", "Held out, mm", "In floors", "Median second, held out, mm", "Evidence"]
+    return section(
+        "fall",
+        "How the error fell",
+        plot(
+            "plot-fall",
+            figure,
+            300,
+            f"Error, rms, of each model. The held-out data it had not seen before. Dashed: the floor, "
+            f"{length(seen.floor_m).text} mm.",
+        ),
+        table("table-fall", head, rows),
+        text(
+            "The median second is the error in a typical second: one slip missed by a hair weighs nothing in it, and "
+            "much in the rms."
+        ),
+    )
+
+
+def _overlay(seen: _Seen) -> str:
+    base, best = seen.base, seen.best
+    models = [Simulated("before", MODEL, base.simulated_m)]
+    if base is not best and not np.array_equal(base.simulated_m, best.simulated_m, equal_nan=True):
+        models.append(Simulated("after", EXTENDED, best.simulated_m))
+    whole = bool(seen.held_out.all())
+    figure = overlay(
+        base.time_s,
+        base.command_pa,
+        base.measured_m,
+        models,
+        [] if whole else [Shade("held out", HELD_OUT, seen.held_out)],
+    )
+    told = "All of it was held out." if whole else "On the green ground: what was held out."
+    return overlaid(figure, told, base.time_s.size)
+
+
+def _where(seen: _Seen) -> str:
+    rows = [
+        Row(
+            [before.name, length(before.rms_m), length(after.rms_m), times(after.rms_m, seen.floor_m)],
+            MEANINGS[before.name],
+        )
+        for before, after in zip(seen.base.phases, seen.best.phases, strict=True)
+        if before.count
+    ]
+    slips = [
+        f"slips {when}: {len(each.slips.matched)} matched, {len(each.slips.missed_s)} missed, "
+        f"{len(each.slips.invented_s)} invented"
+        for when, each in (("before", seen.base), ("after", seen.best))
+    ]
+    return section(
+        "where",
+        "Where it failed, and what is left",
+        table("table-phases", ["What the stem does", "Error before, mm", "After, mm", "After, in floors"], rows),
+        bullets([*slips, *(f"after: {each}" for each in seen.best.sentences)]),
+    )
+
+
+def _ranking(diagnosis: Diagnosis, seen: _Seen) -> str:
+    races = [Race(step.before.effects, step.before.errors.test_rmse_m, _tried(step)) for step in diagnosis.steps]
+    return tried_effects(races, seen.floor_m, LENGTH, "second by second")
+
+
+def _tried(step: Step) -> list[Tried]:
+    added, alike = step.added.name if step.added else "", [each.name for each in step.alike]
+    return [
+        Tried(
+            each.name,
+            each.model.errors.test_rmse_m if each.model else None,
+            each.model.errors.train_rmse_m if each.model else None,
+            each.gain.standard_errors if each.gain else None,
+            each.gain.bic if each.gain else None,
+            outcome(each.name, added, alike, refused=not each.accepted),
+            each.why_not,
+        )
+        for each in step.candidates
+    ]
+
+
+def _added(diagnosis: Diagnosis) -> str:
+    names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
+    rows = [
+        _parameter(name, diagnosis.base.fit.parameters.get(name), diagnosis.best.fit.parameters.get(name))
+        for name in names
+    ]
+    head = ["Parameter", "Before", "After", "95 % interval", "Unit"]
+    return added_effects(diagnosis.missing, table("table-parameters", head, rows, (0,)))
+
+
+def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
+    words, factor, unit = parameter(name)
+
+    def shown(each: Fitted | None) -> Shown:
+        return Shown("–") if each is None else Shown(f"{factor * each.value:.4g}", f"{name} = {each.value:.6g}")
+
+    interval = "–" if after is None else f"{factor * after.lower:.4g} to {factor * after.upper:.4g}"
+    remark = "at the end of its physical range" if after and after.at_bound else ""
+    return Row([words, shown(before), shown(after), interval, unit], remark)
+
+
+def _next(diagnosis: Diagnosis, experiment_file: str) -> str:
+    chosen = diagnosis.experiment
+    if chosen is None:
+        return section("next", "What to measure next", bullets(_advice(diagnosis)))
+    return section(
+        "next",
+        "What to measure next",
+        text(
+            f"Play this command to the valve: {chosen.name}. It was chosen from a menu by what it tells apart after "
+            f"every rival has been refitted: the wrong one is then left with an error of {chosen.separation:.3g} times "
+            "the sensor's noise. It stays within the pressures of the recording and begins at rest.",
+        ),
+        plot("plot-experiment", _command(chosen), 260, f"The command of the experiment, in {experiment_file}."),
+        text("Then diagnose again with both recordings."),
+    )
+
+
+def _advice(diagnosis: Diagnosis) -> list[str]:
+    advice = []
+    if diagnosis.verdict == "adequate":
+        advice.append("nothing is needed; record again when the valve has aged or been serviced")
+    if diagnosis.verdict == "missing":
+        advice.append("put the extended valve file into use, and compare it with a recording of another day")
+    if diagnosis.verdict == "one_of":
+        advice.append("no input tells these apart; measure what lies between them, such as the actuator pressure")
+    if diagnosis.verdict in ("unexplained", "untrusted"):
+        advice.append(
+            "record again with slow ramps, steps of several heights and restarts in the same direction after holds"
+        )
+        advice.append("write the missing effect as a file of your own, where the section above says what is left")
+    if diagnosis.split.train.record.pressure_pa is None and diagnosis.verdict != "adequate":
+        advice.append(
+            "record the actuator pressure too: it parts what happens before the actuator from what happens at the stem"
+        )
+    if diagnosis.split.train.record.repeatability_m is None:
+        advice.append(
+            "let the command repeat a stretch of at least some seconds: how well the valve repeats is the floor"
+        )
+    return advice
+
+
+def _command(chosen: Experiment) -> dict[str, object]:
+    series = drawn(chosen.time_s, chosen.command_pa)
+    trace = line(
+        rounded(series.time_s, 4),
+        rounded(1e-3 * series.value, 3),
+        "command",
+        QUIET,
+        "%{y:.2f} kPa (%{customdata:.6~g} Pa)<br>at %{x:.3f} s",
+        customdata=rounded(series.value, 0),
+    )
+    return {"data": [trace], "layout": layout(xaxis=axis("time, s"), yaxis=axis("command, kPa"), showlegend=False)}
+
+
+def _untold(diagnosis: Diagnosis) -> str:
+    best = diagnosis.best.fit
+    said = [
+        f"not determined by this recording: {', '.join(parameter(name)[0] for name in each.split(', '))}"
+        for each in best.undetermined
+    ]
+    said += [
+        f"at the end of its physical range: {parameter(key)[0]}" for key, f in best.parameters.items() if f.at_bound
+    ]
+    said += [each.sentence for each in untold(diagnosis.split, best.valve)]
+    if not best.trusted:
+        said.append("searches from different starts end at different errors: a better fit may exist")
+    said.append(
+        "only ratios of forces can be read from pressure and position: the diaphragm area is taken from the valve file"
+    )
+    said.append("an effect that does not show under this recording's inputs may still be there")
+    return section("untold", "What the recording does not tell", bullets(said))
+
+
+def _preview(diagnosis: Diagnosis) -> str:
+    rows = [Row([each.name, f"{100 * each.score:.3g} %"]) for each in diagnosis.preview]
+    return folded(
+        "preview",
+        "For specialists: the first guess, before any effect was fitted",
+        text("Share of the error that a weak effect of each kind would explain: a guess, right in about two of three."),
+        table("table-preview", ["Effect", "Share"], rows),
+    )

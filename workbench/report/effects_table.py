@@ -1,0 +1,151 @@
+"""What a report says of effects: the verdict, the race they ran, what each added one is, which were not told apart."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from sim.effect import Effect, find_effect
+from workbench.report import ranking
+from workbench.report.page import Row, plot, preformatted, section, subheading, table, text
+from workbench.report.ranking import Tried
+from workbench.report.units import Quantity
+from workbench.select.equivalence import classes, told_apart
+from workbench.select.evidence import LEAST_BIC, LEAST_GAIN, LEAST_STANDARD_ERRORS
+
+VERDICTS = {
+    "adequate": ("good", "Nothing is missing that this recording could show."),
+    "missing": ("good", "The missing effect is found."),
+    "one_of": ("open", "It is one of several effects; this recording does not tell which."),
+    "unexplained": ("bad", "Something is missing that the library of effects does not have."),
+    "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
+}
+KINDS = {"added": "good", "as good": "set"}
+"""How a row is marked by what came of its effect."""
+
+
+@dataclass(frozen=True, slots=True)
+class Race:
+    """A forward step: what was there, its held-out error, SI, and all that was tried beside it."""
+
+    beside: tuple[str, ...]
+    before: float
+    tried: Sequence[Tried]
+
+
+def headline(verdict: str, missing: Sequence[str]) -> tuple[str, str]:
+    """Return how a verdict is marked, and its first words."""
+    if verdict == "missing" and len(missing) > 1:
+        return "good", "The missing effects are found."
+    return VERDICTS[verdict]
+
+
+def outcome(name: str, added: str, alike: Collection[str], *, refused: bool) -> str:
+    """Return what came of an effect."""
+    if name == added:
+        return "added"
+    if name in alike:
+        return "as good"
+    return "refused" if refused else "accepted"
+
+
+def tried_effects(races: Sequence[Race], floor: float | None, of: Quantity, parts: str) -> str:
+    """Return the section of all races; `parts` says of what the error must fall, part by part."""
+    shown = [
+        text(
+            "Each effect of the library was added in turn and the whole model refitted with it, all with equal effort. "
+            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, {parts}, falls "
+            f"by more than {100 * LEAST_GAIN:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
+            "and its parameters are physically possible."
+        )
+    ]
+    dashed = "dashed the floor, " if floor is not None else ""
+    for number, race in enumerate(races, start=1):
+        rows = sorted(race.tried, key=lambda each: each.order)
+        shown += [
+            subheading(f"Step {number}: beside {', '.join(race.beside)}" if race.beside else f"Step {number}"),
+            plot(
+                f"plot-ranking-{number}",
+                ranking.ranking(rows, race.before, floor, of),
+                110 + 26 * len(rows),
+                f"Held-out error, rms, with each effect added; {dashed}dotted the error without any of them. "
+                "The scale is logarithmic.",
+            ),
+            table(
+                f"table-ranking-{number}",
+                [
+                    "Effect",
+                    "Outcome",
+                    f"Held-out error, {of.unit}",
+                    f"Fitted, {of.unit}",
+                    "Fall, in its uncertainties",
+                    "Evidence",
+                ],
+                [_ranked(each, of) for each in rows],
+                (0, 1),
+            ),
+        ]
+    return section("ranking", "The effects that were tried", *shown)
+
+
+def _ranked(each: Tried, of: Quantity) -> Row:
+    return Row(
+        [
+            each.name,
+            f"{each.outcome}: {each.why}" if each.why else each.outcome,
+            of.shown(each.test),
+            of.shown(each.train),
+            "–" if each.fall_errors is None else f"{each.fall_errors:.3g}",
+            "–" if each.evidence is None else f"{each.evidence:.4g}",
+        ],
+        _effect(each.name).text.rstrip("."),
+        KINDS.get(each.outcome, ""),
+    )
+
+
+def added_effects(names: Sequence[str], *parameters: str) -> str:
+    """Return the section of what was added, with its equations; `parameters` is HTML that follows."""
+    parts = []
+    for effect in map(_effect, names):
+        parts += [subheading(effect.name), text(effect.text, f"In a record: {effect.looks}" if effect.looks else "")]
+        parts.append(preformatted(effect.equation))
+    if not parts:
+        parts = [text("No effect was added; the parameters below are those of the valve itself, refitted.")]
+    return section("added", "What was added", *parts, *parameters)
+
+
+def not_told_apart(
+    sets: Sequence[Sequence[str]], tried: Collection[str], missing: Sequence[str], otherwise: str
+) -> str:
+    """Return the section of what could not be told apart; `otherwise` where the effects' files say nothing of it."""
+    title = "What could not be told apart"
+    if not sets:
+        nothing = "Nothing: no other effect comes within reach of the one that was added."
+        return section("alike", title, text(nothing if missing else NO_QUESTION))
+    library = {name: _effect(name) for name in tried}
+    rows = [
+        _two(name, other, library, otherwise)
+        for names in sets
+        for i, name in enumerate(names)
+        for other in names[i + 1 :]
+    ]
+    return section(
+        "alike",
+        title,
+        text(
+            f"These explain the recording equally well: {'; '.join(' or '.join(names) for names in sets)}. "
+            "That is as far as it can tell. One of each set was added to go on with; it is not proved."
+        ),
+        table("table-alike", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
+    )
+
+
+NO_QUESTION = "The question does not arise: no effect was accepted."
+
+
+def _two(name: str, other: str, library: Mapping[str, Effect], otherwise: str) -> Row:
+    same = len(classes((name, other), library)) == 1
+    none = "none of pressure and position: their equations are the same" if same else otherwise
+    return Row([name, other, told_apart(name, other, library) or none])
+
+
+def _effect(name: str) -> Effect:
+    return find_effect(name, "effects")

@@ -1,0 +1,83 @@
+"""A diagnosis as JSON: what `positioner diagnose --json` writes.
+
+`test_typical_rmse_m` is the median of the held-out blocks' errors. `held_out_gain` is the rule's: no block counts for
+more than a factor of 2 in it, so it never exceeds 0.5.
+"""
+
+from math import isfinite
+from typing import Any
+
+from workbench.fit.fitting import Fit
+from workbench.select.diagnosis import Candidate, Diagnosis, Model
+from workbench.select.equivalence import untold
+
+
+def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the diagnosis in plain types; SI units, in the names."""
+    return {
+        "verdict": diagnosis.verdict,
+        "sentence": diagnosis.sentence,
+        "missing": list(diagnosis.missing),
+        "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
+        "suspected": list(diagnosis.suspected),
+        "base": _model(diagnosis.base),
+        "best": _model(diagnosis.best),
+        "floor_m": diagnosis.split.floor_m,
+        "preview": [{"name": each.name, "score": each.score} for each in diagnosis.preview],
+        "untold": [
+            {"name": each.name, "like": list(each.like), "most_m": each.most_m, "shown_by": each.shown_by}
+            for each in untold(diagnosis.split, diagnosis.best.fit.valve)
+        ],
+        "candidates": [_candidate(each) for each in diagnosis.candidates],
+    }
+
+
+def _model(model: Model) -> dict[str, Any]:
+    return {
+        "effects": list(model.effects),
+        **_errors(model),
+        "at_floor": model.at_floor,
+        "structure_r2": model.errors.structure,
+        "parameters": parameters_json(model.fit),
+    }
+
+
+def _errors(model: Model) -> dict[str, float]:
+    return {
+        "train_rmse_m": model.errors.train_rmse_m,
+        "test_rmse_m": model.errors.test_rmse_m,
+        "test_typical_rmse_m": model.errors.test_block_m,
+    }
+
+
+def parameters_json(fit: Fit) -> dict[str, dict[str, float | bool | None]]:
+    """Return what was fitted; a bound that the recording leaves open is null."""
+    return {
+        name: {key: _finite(getattr(each, key)) for key in ("value", "std", "lower", "upper")}
+        | {"physical": each.physical}
+        for name, each in fit.parameters.items()
+    }
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity."""
+    return value if isfinite(value) else None
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    """An effect that could not be fitted has neither errors nor parameters."""
+    model, found = candidate.model, candidate.gain
+    return {
+        "step": candidate.step,
+        "name": candidate.name,
+        "train_rmse_m": model and model.errors.train_rmse_m,
+        "test_rmse_m": model and model.errors.test_rmse_m,
+        "test_typical_rmse_m": model and model.errors.test_block_m,
+        "evidence": found and found.bic,
+        "held_out_gain": found and found.held_out,
+        "held_out_standard_errors": found and found.standard_errors,
+        "parameters": parameters_json(model.fit) if model else {},
+        "physical": candidate.physical,
+        "accepted": candidate.accepted,
+        "why_not": candidate.why_not,
+    }

@@ -1,0 +1,152 @@
+"""What no record of pressure and position tells apart: classes that follow from the equations, never ranked inside.
+
+    A p = k_s x + F_0 + ...,  y = x + b         F_0 = -k_s b: preload and sensor offset are one
+    A p = k_s x + ...,        y = g x           k_s / g, F_v / g, m / g: a gain of the sensor is another spring
+    |y - x| <= b/2                              between reversals F_c + k_s b / 2, F_s - k_s b / 2
+
+The first two stand in the effects' files, as a confounding with an empty text. The third is the record's. Where a
+motion begins with a reversal, the play is taken up first, and from there on
+
+    m y'' = A p - k_s (y + b/2) - F_v y' - F_c      opening: y = x - b/2, a Coulomb friction of F_c + k_s b/2
+    A p - k_s y at break-away: F_s - k_s b/2        the stem broke away from x = y - b/2, where it came to rest closing
+
+so that a bare valve does the same but for the moment in which the play is taken up. Where the stem goes on in the
+same direction after a rest, the play is taken up already and break-away is at F_s, which tells, unless the command
+jumps past both. Hence `untold` asks the record itself: it is simulated with growing plays and friction changed so.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.recording import Column
+from config.valve_file import EffectTable, ValveFile, ValveParameters
+from sim.composition import BASE, Composition
+from sim.effect import Effect
+from workbench.data.held_out import Part, Split
+from workbench.data.motion import slips
+from workbench.model.free_run import FreeRun
+
+PLAY = "backlash"
+
+
+UNSEEN = 0.3
+"""Of the floor: a change of the simulation below it does not show."""
+WIDTHS = 16
+LEAST_PLAY = 4.0
+"""Floors; a play that narrow is not worth saying."""
+TAKEN_UP = 2
+"""Slips after which the play has been taken up from either side, wherever the linkage stood at the start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Untold:
+    """An effect that the recordings do not show up to a strength, and the parameters that stand in for it."""
+
+    name: str
+    like: tuple[str, ...]
+    most_m: float
+    shown_by: str
+
+    @property
+    def sentence(self) -> str:
+        """Say so."""
+        return (
+            f"{self.name} of up to {1e3 * self.most_m:.2g} mm or more would not show: with other values of "
+            f"{' and '.join(self.like)} the recordings look the same; {self.shown_by} would tell"
+        )
+
+
+def untold(split: Split, valve: ValveFile) -> tuple[Untold, ...]:
+    """Return what may be there unseen beside the effects of a fitted valve: a play that friction stands in for."""
+    if any(each.name == PLAY for each in valve.effect):
+        return ()
+    widest_m = 2.0 * valve.valve.coulomb_n / valve.valve.spring_n_per_m
+    least_m = LEAST_PLAY * split.floor_m
+    if not least_m < widest_m:
+        return ()
+    most_m = 0.0
+    for width_m in np.geomspace(least_m, 0.99 * widest_m, WIDTHS).tolist():
+        twin = with_play(valve, width_m)
+        if any(_apart_m(each, valve, twin) > UNSEEN * split.floor_m for each in (split.train, split.judged)):
+            break
+        most_m = width_m
+    like = ("coulomb_n", "static_n")
+    return (Untold(PLAY, like, most_m, "slow restarts in the same direction after a hold"),) if most_m else ()
+
+
+def with_play(file: ValveFile, width_m: float) -> ValveFile:
+    """Return the valve with play that answers as this one does between reversals."""
+    valve = file.valve
+    shift_n = 0.5 * valve.spring_n_per_m * width_m
+    changed = valve.model_copy(update={"coulomb_n": valve.coulomb_n - shift_n, "static_n": valve.static_n + shift_n})
+    play = EffectTable.model_validate({"name": PLAY, "width_m": width_m})
+    return ValveFile(valve=changed, effect=(play, *file.effect))
+
+
+def imitation(file: ValveFile) -> ValveParameters | None:
+    """Return the bare valve that answers as one with play does while it only reverses; None without one."""
+    width_m = next((each.parameters["width_m"] for each in file.effect if each.name == PLAY), 0.0)
+    valve = file.valve
+    shift_n = 0.5 * valve.spring_n_per_m * width_m
+    if not 0.0 < 2.0 * shift_n <= valve.static_n - valve.coulomb_n:
+        return None
+    return valve.model_copy(update={"coulomb_n": valve.coulomb_n + shift_n, "static_n": valve.static_n - shift_n})
+
+
+def _apart_m(part: Part, one: ValveFile, other: ValveFile) -> float:
+    """Return the rms distance of two valves' answers, once every play is taken up; infinite in a record too short."""
+    record = part.record
+    begun = np.zeros(len(record), np.bool_)
+    for first, end in record.segments:
+        found = slips(np.where(record.judged, record.position_m, np.nan)[first:end], record.noise_m)
+        if len(found) > TAKEN_UP:
+            begun[first + found[TAKEN_UP].first : end] = True
+    rows = part.counted & begun
+    if not rows.any():
+        return np.inf
+    apart = _answer_m(part, one)[rows] - _answer_m(part, other)[rows]
+    return float(np.sqrt(np.nanmean(apart**2)))
+
+
+def _answer_m(part: Part, file: ValveFile) -> Column:
+    composition = Composition.from_file(file)
+    return FreeRun(composition, part.record).position_m(composition.theta)
+
+
+def algebraic_class(name: str, library: Mapping[str, Effect]) -> frozenset[str]:
+    """Return the effects and parameters of the bare valve that a record cannot tell from an effect; itself included."""
+    members, grown = frozenset[str](), frozenset({name})
+    while grown != members:
+        members = grown
+        grown = members.union(*(_same(each, library) for each in members))
+    return members
+
+
+def bare_parameter(name: str, library: Mapping[str, Effect]) -> str | None:
+    """Return the parameter of the bare valve that already does what an effect does, None if there is none."""
+    return next((each for each in sorted(algebraic_class(name, library)) if each in BASE), None)
+
+
+def classes(names: Iterable[str], library: Mapping[str, Effect]) -> list[frozenset[str]]:
+    """Return the names gathered into their algebraic classes, in the order of first mention."""
+    names = list(names)
+    gathered: list[frozenset[str]] = []
+    for name in names:
+        if not any(name in each for each in gathered):
+            gathered.append(algebraic_class(name, library) & frozenset(names))
+    return gathered
+
+
+def told_apart(name: str, other: str, library: Mapping[str, Effect]) -> str:
+    """Return what record tells two effects apart, as their files say it; empty if they do not."""
+    return library[name].confounded.get(other, "") or library[other].confounded.get(name, "")
+
+
+def _same(name: str, library: Mapping[str, Effect]) -> frozenset[str]:
+    if name not in library:
+        return frozenset(each for each, effect in library.items() if effect.confounded.get(name) == "")
+    return frozenset(other for other, text in library[name].confounded.items() if not text) | frozenset(
+        each for each, effect in library.items() if effect.confounded.get(name) == ""
+    )

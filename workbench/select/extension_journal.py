@@ -1,0 +1,89 @@
+"""The journal of a valve file: which effect was added when, why, and how far the error fell at each step.
+
+It lies beside the valve file as NAME.journal.json; extending the file again goes on with it.
+"""
+
+from pathlib import Path
+from typing import Self
+
+from config.errors import InputError
+from config.loading import Schema, validated
+from workbench.select.extension import Extension
+
+
+class Step(Schema):
+    """One extension. Errors are rms, m: of the valve as given, refitted without the effects, and with them."""
+
+    effects: tuple[str, ...]
+    why: str
+    given_train_rmse_m: float
+    given_test_rmse_m: float
+    refitted_train_rmse_m: float
+    refitted_test_rmse_m: float
+    extended_train_rmse_m: float
+    extended_test_rmse_m: float
+    floor_m: float
+    parameters: dict[str, float]
+    """All that was fitted."""
+
+    @classmethod
+    def of(cls, extension: Extension) -> Self:
+        """Return the step that an extension is."""
+        found, before, after = extension.gain, extension.refitted_errors, extension.extended_errors
+        return cls(
+            effects=extension.effects,
+            why=f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
+            f"{1e3 * before.test_block_m:.4g} to {1e3 * after.test_block_m:.4g} mm, "
+            f"over all seconds by {found.standard_errors:.3g} standard errors",
+            given_train_rmse_m=extension.given_train_rmse_m,
+            given_test_rmse_m=extension.given_test_rmse_m,
+            refitted_train_rmse_m=before.train_rmse_m,
+            refitted_test_rmse_m=before.test_rmse_m,
+            extended_train_rmse_m=after.train_rmse_m,
+            extended_test_rmse_m=after.test_rmse_m,
+            floor_m=extension.split.floor_m,
+            parameters={name: each.value for name, each in extension.extended.parameters.items()},
+        )
+
+
+class Journal(Schema):
+    """The steps in order."""
+
+    steps: tuple[Step, ...] = ()
+
+    @classmethod
+    def beside(cls, valve: Path) -> Self:
+        """Read the journal of a valve file; empty if it has none.
+
+        Raises:
+            InputError: it is not a journal.
+        """
+        path = journal_path(valve)
+        if not path.is_file():
+            return cls()
+        try:
+            return cls.model_validate_json(path.read_bytes())
+        except ValueError:
+            raise InputError(str(path), "is not a journal; remove it to begin another") from None
+
+    def followed_by(self, extension: Extension) -> Self:
+        """Return the journal with one more step."""
+        return validated(type(self), {"steps": (*self.steps, Step.of(extension))}, "journal")
+
+    def write_beside(self, valve: Path) -> None:
+        """Write the journal of a valve file."""
+        journal_path(valve).write_text(self.model_dump_json(indent=2) + "\n", encoding="utf-8")
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One line a step."""
+        return tuple(
+            f"step {i}: {', '.join(each.effects)} added; held-out error {1e3 * each.refitted_test_rmse_m:.4g} to "
+            f"{1e3 * each.extended_test_rmse_m:.4g} mm rms; {each.why}"
+            for i, each in enumerate(self.steps, start=1)
+        )
+
+
+def journal_path(valve: Path) -> Path:
+    """Return where the journal of a valve file lies."""
+    return valve.with_suffix(".journal.json")

@@ -1,0 +1,78 @@
+"""The tangent preview: a first ranking of the effects in a second, before any of them is fitted. Not a verdict.
+
+    r residual of the bare fit, J its derivatives by the fitted parameters, t the change that a weak effect makes
+    score = (r' P t)^2 / (r' P r  t' P t),    P projects J out;  the best of the effect's weakest starts
+
+The right effect stands first in some two thirds of the cases, in the first three in nine of ten.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from config.valve_file import EffectTable, ValveFile
+from sim.composition import Composition
+from sim.effect import Effect
+from workbench.data.held_out import Split
+from workbench.data.record import Record
+from workbench.fit.fitting import Fit
+from workbench.fit.objective import FINAL, NARROW, SimulationError, root_weights
+from workbench.model.free_run import FreeRun
+from workbench.model.parameters import free_parameters
+
+TRIED = 2
+"""Weakest strengths tried: one either way, where an effect has two signs."""
+
+Series = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """An effect and the share of the residual's energy, 0 to 1, that its tangent explains."""
+
+    name: str
+    score: float
+
+
+def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Suspect, ...]:
+    """Rank the effects by their tangents on the fitted part, best first."""
+    record = split.train.record
+    composition = Composition.from_file(base.valve)
+    run = FreeRun(composition, record, from_pressure=base.from_pressure)
+    parameters = free_parameters(composition, tuple(base.parameters))
+    error = SimulationError(run, composition, parameters, composition.theta)
+    z = error.coordinates(composition.theta)
+    residual = error.residuals(z)
+    weights = root_weights(residual, FINAL)
+    basis, _ = np.linalg.qr(weights[:, None] * error.jacobian(z, residual, NARROW.difference))
+    bare = run.position_m(composition.theta)
+    rows = record.judged & np.isfinite(bare)
+
+    def score(tangent_m: Series) -> float:
+        r, t = (_without(basis, weights * each) for each in (residual, tangent_m[rows]))
+        energy = float(r @ r) * float(t @ t)
+        return float(r @ t) ** 2 / energy if energy > 0.0 else 0.0
+
+    found = [
+        Suspect(name, max(score(each) for each in _tangents(base, effect, name, record, bare)))
+        for name, effect in library.items()
+    ]
+    return tuple(sorted(found, key=lambda each: -each.score))
+
+
+def _without(basis: Series, series: Series) -> Series:
+    return np.asarray(series - basis @ (basis.T @ series))
+
+
+def _tangents(base: Fit, effect: Effect, name: str, record: Record, bare: Series) -> list[Series]:
+    """Return the change of the indicated position by the effect at each of its weakest strengths."""
+    valve = base.valve
+    tangents = []
+    for values in effect.strengths(valve.valve)[:TRIED]:
+        table = EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, values, strict=True))})
+        extended = Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, table)))
+        run = FreeRun(extended, record, from_pressure=base.from_pressure)
+        tangents.append(np.nan_to_num(run.position_m(extended.theta) - bare))
+    return tangents
