@@ -25,7 +25,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from drivers.in_memory import MemoryDriver
 from positioner.control.controller import Controller, Decision
-from positioner.control.pulse import Pulse, unknown
+from positioner.control.pulse import Pulse, unidentified_response
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
@@ -214,7 +214,7 @@ def shortest_lines() -> Iterator[str]:
     """Yield what the shortest pulse does, by the true parameters: no law with this loop can make a smaller move."""
     omega = (SEED.spring_n_per_m / SEED.mass_kg) ** 0.5
     zeta = SEED.viscous_ns_per_m / (2 * SEED.mass_kg * omega)
-    known = replace(unknown(0.0), theta=(log(omega), log(zeta), 0.0, 0.0))
+    known = replace(unidentified_response(0.0), theta=(log(omega), log(zeta), 0.0, 0.0))
     push_m = (SEED.static_n - SEED.coulomb_n) / SEED.spring_n_per_m
     middle_m = -SEED.coulomb_n / SEED.spring_n_per_m
     yield "shortest pulse, % of stroke: push of one period just above F_s, and 10 % of F_s - F_c more; then braked"

@@ -23,9 +23,9 @@ The end d(z_p, z_h, T) depends on theta = (ln omega, ln zeta, beta_up, beta_down
 that direction: the stem obeys z + beta. Each pulse that moved it is a measurement of d, and theta follows by an
 extended Kalman filter: a braked end tells of omega and zeta, a slide of beta. For S = J P J' + R,
 
-    theta' = theta + P J' (d_seen - d) / S,     P' = P - P J' J P / S + Q
+    theta' = theta + P J' (d_measured - d) / S,     P' = P - P J' J P / S + Q
 
-R the variance of d_seen with what the model leaves out, Q what may change from one pulse to the next.
+R the variance of d_measured with what the model leaves out, Q what may change from one pulse to the next.
 """
 
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ MODEL_SHARE = 0.05
 LONGEST_STEP_LOG = 0.7
 DIFFERENCE = 1e-3
 REFINEMENTS = 12
-HAIR, ALMOST_ONE = 1e-3, 1 - 1e-12
+NEAR_CRITICAL, ALMOST_ONE = 1e-3, 1 - 1e-12
 LOG_OMEGA, LOG_ZETA = (0.0, 9.0), (-3.0, 3.0)
 """No stem lies beyond."""
 LONGEST_SEARCH = 8.0
@@ -61,7 +61,7 @@ class Pulse(NamedTuple):
     lag_s: float = 0.0
 
 
-class End(NamedTuple):
+class PulseEnd(NamedTuple):
     """Where a pulse ends, m, and after what time it has come so near that the rest does not matter, s."""
 
     travel_m: float
@@ -69,13 +69,13 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class PulseResponse:
     """The stem's response to pulses as known by now: theta and its covariance; see the head of this module."""
 
     theta: Theta
     covariance: Covariance
 
-    def end(self, pulse: Pulse, near_m: float) -> End:
+    def end(self, pulse: Pulse, near_m: float) -> PulseEnd:
         """Return where the stem comes to rest, and when it is nearer to it than near_m, m."""
         return _end(self.theta, pulse, near_m)
 
@@ -85,7 +85,7 @@ class Response:
         slow = omega * (zeta - sqrt(zeta * zeta - 1) if zeta > 1 else zeta)
         return log(max(1.0, way_m / near_m)) / slow
 
-    def aimed(self, travel_m: float, push: Pulse, deepest_m: float) -> Pulse:
+    def reaching(self, travel_m: float, push: Pulse, deepest_m: float) -> Pulse:
         """Return a push with the hold that takes the stem a distance, m, or the shortest: not below deepest_m, m."""
 
         def with_hold(hold_m: float) -> Pulse:
@@ -114,7 +114,7 @@ class Response:
         slope = _slope(self.theta, pulse, travel_m)
         return sqrt(max(0.0, _quadratic(self.covariance, slope)) + (MODEL_SHARE * travel_m) ** 2 * _braked(slope))
 
-    def learnt(self, pulse: Pulse, seen_m: float, variance_m2: float, walk_m: float) -> "Response":
+    def updated(self, pulse: Pulse, measured_m: float, variance_m2: float, walk_m: float) -> "PulseResponse":
         """Return what is known after a pulse that moved the stem by seen_m, known with variance_m2.
 
         walk_m is how far the balance may change from pulse to pulse.
@@ -124,12 +124,12 @@ class Response:
         gain = [sum(row[j] * slope[j] for j in range(4)) for row in self.covariance]
         spread = sum(gain[i] * slope[i] for i in range(4)) + variance_m2
         spread += (MODEL_SHARE * travel_m) ** 2 * _braked(slope)
-        surprise = (seen_m - travel_m) / spread
-        step = [each * surprise for each in gain]
+        innovation = (measured_m - travel_m) / spread
+        step = [each * innovation for each in gain]
         # Far from the truth the slopes mislead: no step is longer than one that could be meant.
-        surprise_m = abs(seen_m - travel_m)
+        innovation_m = abs(measured_m - travel_m)
         logs, biases = max(abs(step[0]), abs(step[1])), max(abs(step[2]), abs(step[3]))
-        shrink = min(1.0, LONGEST_STEP_LOG / max(logs, 1e-9), surprise_m / max(biases, 1e-12))
+        shrink = min(1.0, LONGEST_STEP_LOG / max(logs, 1e-9), innovation_m / max(biases, 1e-12))
         w, z, up, down = self.theta
         walk = (WALK_LOG**2, WALK_LOG**2, walk_m**2, walk_m**2)
         covariance = tuple(
@@ -142,9 +142,9 @@ class Response:
             up + shrink * step[2],
             down + shrink * step[3],
         )
-        return Response(theta, covariance)
+        return PulseResponse(theta, covariance)
 
-    def rebalanced(self, std_m: float) -> "Response":
+    def with_new_balance(self, std_m: float) -> "PulseResponse":
         """Return what is known when the balance was identified anew, with a standard deviation in m.
 
         beta stays: what it holds of the difference between the directions the new balance has as well.
@@ -154,7 +154,7 @@ class Response:
         covariance = tuple(_row(*(row[j] + (added[i] if i == j else 0.0) for j in range(4))) for i, row in rows)
         return replace(self, covariance=covariance)
 
-    def with_poles(self, a: float, b: float, log_std: float) -> "Response":
+    def with_poles(self, a: float, b: float, log_std: float) -> "PulseResponse":
         """Return what is known when a, 1/s, and b, 1/s^2, were identified, both with a relative standard deviation."""
         omega = sqrt(-b)
         p = self.covariance
@@ -167,23 +167,25 @@ class Response:
         return self.theta[2 if direction > 0 else 3]
 
 
-def unknown(std_m: float) -> Response:
+def unidentified_response(std_m: float) -> PulseResponse:
     """Return what is known of a valve that has never been pushed; the balance is known to std_m, m."""
     theta = (log(UNKNOWN_OMEGA_RAD_PER_S), log(UNKNOWN_ZETA), 0.0, 0.0)
     w, z = UNKNOWN_LOG_STD
     nothing = _row(0.0, 0.0, 0.0, 0.0)
-    return Response(theta, (_row(w * w, 0.0, 0.0, 0.0), _row(0.0, z * z, 0.0, 0.0), nothing, nothing)).rebalanced(std_m)
+    return PulseResponse(
+        theta, (_row(w * w, 0.0, 0.0, 0.0), _row(0.0, z * z, 0.0, 0.0), nothing, nothing)
+    ).with_new_balance(std_m)
 
 
-def _end(theta: Theta, pulse: Pulse, near_m: float) -> End:
+def _end(theta: Theta, pulse: Pulse, near_m: float) -> PulseEnd:
     omega, p = exp(theta[0]), exp(theta[0] + theta[1])
     bias_m = theta[2 if pulse.direction > 0 else 3]
     push_m, hold_m = pulse.push_m + bias_m, pulse.hold_m + bias_m
-    # The critical case has no formula of its own: a hair beside it, nobody can tell.
-    overdamped, q = p > omega, max(sqrt(abs(p * p - omega * omega)), HAIR * omega)
+    # The critical case has no formula of its own: just beside it the result is the same to rounding.
+    overdamped, q = p > omega, max(sqrt(abs(p * p - omega * omega)), NEAR_CRITICAL * omega)
     y, v = _after(omega, p, q, overdamped, -push_m, 0.0, pulse.duration_s)
     if push_m <= 0.0 or v <= 0.0:
-        return End(0.0, pulse.duration_s)
+        return PulseEnd(0.0, pulse.duration_s)
     y += push_m - hold_m
     if pulse.lag_s > 0.0:
         return _lagged_end(theta, pulse, hold_m, y, v, near_m)
@@ -191,19 +193,19 @@ def _end(theta: Theta, pulse: Pulse, near_m: float) -> End:
     if overdamped and not 0.0 < q * v < force:
         slow = p - q
         time_s = log(max(1.0, abs(y) / near_m)) / slow
-        return End(hold_m, pulse.duration_s + time_s)
+        return PulseEnd(hold_m, pulse.duration_s + time_s)
     time_s = (atanh(min(q * v / force, ALMOST_ONE)) if overdamped else atan2(q * v, force)) / q
     y, _ = _after(omega, p, q, overdamped, y, v, time_s)
-    return End(hold_m + y, pulse.duration_s + time_s)
+    return PulseEnd(hold_m + y, pulse.duration_s + time_s)
 
 
-def _lagged_end(theta: Theta, pulse: Pulse, hold_m: float, y: float, v: float, near_m: float) -> End:
+def _lagged_end(theta: Theta, pulse: Pulse, hold_m: float, y: float, v: float, near_m: float) -> PulseEnd:
     """Return the end from y and v at the end of the push, the pressure falling slowly."""
     omega, p, T = exp(theta[0]), exp(theta[0] + theta[1]), pulse.lag_s
-    overdamped, q = p > omega, max(sqrt(abs(p * p - omega * omega)), HAIR * omega)
+    overdamped, q = p > omega, max(sqrt(abs(p * p - omega * omega)), NEAR_CRITICAL * omega)
     divisor = omega * omega - 2 * p / T + 1 / (T * T)
-    if abs(divisor) < HAIR * omega * omega:  # a pole of the stem at 1/T: a hair beside it
-        divisor = HAIR * omega * omega
+    if abs(divisor) < NEAR_CRITICAL * omega * omega:  # a pole of the stem at 1/T: take it just beside
+        divisor = NEAR_CRITICAL * omega * omega
     driven = omega * omega / divisor * (pulse.push_m - pulse.hold_m)
 
     def at(time_s: float) -> tuple[float, float]:
@@ -216,12 +218,12 @@ def _lagged_end(theta: Theta, pulse: Pulse, hold_m: float, y: float, v: float, n
     early_s, late_s = 0.0, 0.25 / omega
     while at(late_s)[1] > 0.0:
         if late_s > LONGEST_SEARCH * (T + 1 / slow):
-            return End(hold_m, pulse.duration_s + last_s)
+            return PulseEnd(hold_m, pulse.duration_s + last_s)
         early_s, late_s = late_s, 1.3 * late_s
     for _ in range(REFINEMENTS):
         middle_s = 0.5 * (early_s + late_s)
         early_s, late_s = (middle_s, late_s) if at(middle_s)[1] > 0.0 else (early_s, middle_s)
-    return End(hold_m + at(early_s)[0], pulse.duration_s + late_s)
+    return PulseEnd(hold_m + at(early_s)[0], pulse.duration_s + late_s)
 
 
 def _after(

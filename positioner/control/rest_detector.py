@@ -22,7 +22,7 @@ POOLED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class RestEstimate:
     """What is known of the stem's rest; m, m^2."""
 
     resolution_m: float
@@ -60,14 +60,14 @@ class Rest:
         """Standard deviation of the mean."""
         return self.std_m / sqrt(self.count) if self.count else inf
 
-    def seen(self, position_m: float) -> "Rest":
+    def updated(self, position_m: float) -> "RestEstimate":
         """Return what is known after a sample."""
         zero_m = position_m if self.block_count == 0 else self.block_zero_m
         off_m = position_m - zero_m
         n = self.block_count + 1
         total, squares = self.block_sum + off_m, self.block_squares + off_m * off_m
         if n < self.length:
-            return Rest(
+            return RestEstimate(
                 self.resolution_m,
                 self.mean_m,
                 self.count,
@@ -82,20 +82,20 @@ class Rest:
         variance = max(0.0, (squares - n * mean_off_m * mean_off_m) / (n - 1))
         return self._with_block(zero_m + mean_off_m, variance, n)
 
-    def _with_block(self, block_m: float, block_variance: float, n: int) -> "Rest":
+    def _with_block(self, block_m: float, block_variance: float, n: int) -> "RestEstimate":
         if not self.count:
-            return Rest(self.resolution_m, block_m, n, self.variance_m2, self.blocks)
-        judged = max(self.variance_m2, block_variance if not self.blocks else 0.0)
-        allowed_m = AGREEMENT * sqrt(judged * (1 / n + 1 / self.count)) + 0.25 * self.resolution_m
+            return RestEstimate(self.resolution_m, block_m, n, self.variance_m2, self.blocks)
+        noise_m2 = max(self.variance_m2, block_variance if not self.blocks else 0.0)
+        allowed_m = AGREEMENT * sqrt(noise_m2 * (1 / n + 1 / self.count)) + 0.25 * self.resolution_m
         if abs(block_m - self.mean_m) > allowed_m:
-            return Rest(self.resolution_m, block_m, n, self.variance_m2, self.blocks)
+            return RestEstimate(self.resolution_m, block_m, n, self.variance_m2, self.blocks)
         weight = max(POOLED, 1 / (self.blocks + 1))
         variance = self.variance_m2 + weight * (block_variance - self.variance_m2)
         count = min(self.count + n, MOST_SAMPLES)
-        return Rest(
+        return RestEstimate(
             self.resolution_m, self.mean_m + (block_m - self.mean_m) * n / count, count, variance, self.blocks + 1
         )
 
-    def left(self) -> "Rest":
+    def restarted(self) -> "RestEstimate":
         """Return what is known of a stem that may have moved: the noise."""
-        return Rest(self.resolution_m, variance_m2=self.variance_m2, blocks=self.blocks)
+        return RestEstimate(self.resolution_m, variance_m2=self.variance_m2, blocks=self.blocks)

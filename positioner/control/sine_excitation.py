@@ -3,7 +3,7 @@
     u(t) = alpha + beta sin(omega (t - t_0))      (25), from t_0, the entry into S3
 
 alpha must exceed F_s/A, or the stem may not move; a constant input (beta = 0) leaves c unidentifiable (seed, 3.2).
-The whole swing must lie within the pressure limits: a clipped sine is refused, not repaired.
+The whole sine must lie within the pressure limits: a clipped sine is refused, not repaired.
 """
 
 import math
@@ -13,7 +13,7 @@ from config.codes import InhibitReason
 
 
 @dataclass(frozen=True, slots=True)
-class Swing:
+class SineExcitation:
     """An excitation as asked for: Pa, Pa, rad/s."""
 
     alpha_pa: float
@@ -25,7 +25,7 @@ class Swing:
         return self.alpha_pa + self.beta_pa * math.sin(self.omega_rad_per_s * elapsed_s)
 
     def problem(self, minimum_pa: float, maximum_pa: float, breakaway_pa: float | None) -> InhibitReason:
-        """Return why it may not be applied: pressure limits in Pa, F_s/A in Pa where that is known."""
+        """Return what inhibits it: pressure limits in Pa, F_s/A in Pa where that is known."""
         if self.beta_pa <= 0.0:
             return InhibitReason.AMPLITUDE_ZERO
         if breakaway_pa is not None and self.alpha_pa <= breakaway_pa:

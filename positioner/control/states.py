@@ -35,7 +35,7 @@ def state_in(situation: Situation) -> State:
     return State.S1_UP if situation.delta_r_m > 0.0 else State.S2_DOWN
 
 
-def why_not_the_law(situation: Situation) -> InhibitReason:
+def law_inhibit_reason(situation: Situation) -> InhibitReason:
     """Return why neither S1 nor S2 is in force; NOTHING when one is, or when S3 occupies their place."""
     if not situation.automatic:
         return InhibitReason.NOT_AUTOMATIC

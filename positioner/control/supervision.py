@@ -38,20 +38,20 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class SupervisionMemory:
     """What supervision remembers from cycle to cycle."""
 
     mode: Mode = Mode.HOLD
     fault: Fault = Fault.NONE
     bad_in_a_row: int = 0
     good_s: float = -math.inf
-    heard_s: float = -math.inf
+    heartbeat_s: float = -math.inf
     mode_writes: int = 0
     acknowledgements: int = 0
     heartbeats: int = 0
 
 
-UNFIT = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST)
+UNFIT_STATUS = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST)
 
 
 def usable(sample: Sample, limits: Limits) -> bool:
@@ -59,29 +59,31 @@ def usable(sample: Sample, limits: Limits) -> bool:
     return sample.quality is Quality.GOOD and limits.plausible(sample.position_m)
 
 
-def supervise(watch: Watch, sample: Sample, command_pa: float, requests: Requests, limits: Limits) -> Watch:
+def supervise(
+    memory: SupervisionMemory, sample: Sample, command_pa: float, requests: Requests, limits: Limits
+) -> SupervisionMemory:
     """Return what is known after this sample; `command_pa` is the last command given."""
     good = usable(sample, limits)
     bad = sample.quality is Quality.LOST or (sample.quality is Quality.GOOD and not good)
-    first = math.isinf(watch.good_s)
-    heard = first or requests.heartbeats != watch.heartbeats
-    bad_in_a_row = watch.bad_in_a_row + 1 if bad else 0
-    good_s = sample.now_s if good or first else watch.good_s
-    heard_s = sample.now_s if heard else watch.heard_s
+    first = math.isinf(memory.good_s)
+    alive = first or requests.heartbeats != memory.heartbeats
+    bad_in_a_row = memory.bad_in_a_row + 1 if bad else 0
+    good_s = sample.now_s if good or first else memory.good_s
+    heartbeat_s = sample.now_s if alive else memory.heartbeat_s
 
     cause = _cause(sample, command_pa, bad_in_a_row, sample.now_s - good_s, limits)
-    silent = watch.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heard_s
+    silent = memory.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heartbeat_s
     if cause is Fault.NONE and silent:
         cause = Fault.DCS_SILENT
-    acknowledged = requests.acknowledgements != watch.acknowledgements
-    latched = Fault.NONE if acknowledged else watch.fault
+    acknowledged = requests.acknowledgements != memory.acknowledgements
+    latched = Fault.NONE if acknowledged else memory.fault
     fault = cause if cause is not Fault.NONE else latched
-    return Watch(
-        mode=_mode(watch, requests, fault),
+    return SupervisionMemory(
+        mode=_mode(memory, requests, fault),
         fault=fault,
         bad_in_a_row=bad_in_a_row,
         good_s=good_s,
-        heard_s=heard_s,
+        heartbeat_s=heartbeat_s,
         mode_writes=requests.mode_writes,
         acknowledgements=requests.acknowledgements,
         heartbeats=requests.heartbeats,
@@ -93,12 +95,12 @@ def _cause(sample: Sample, command_pa: float, bad_in_a_row: int, age_s: float, l
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
         return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE
-    if sample.quality is not Quality.LOST and sample.status & UNFIT:
+    if sample.quality is not Quality.LOST and sample.status & UNFIT_STATUS:
         return Fault.DEVICE
     return Fault.STALE if age_s > limits.stale_after_s else Fault.NONE
 
 
-def _mode(watch: Watch, requests: Requests, fault: Fault) -> Mode:
+def _mode(memory: SupervisionMemory, requests: Requests, fault: Fault) -> Mode:
     if fault is not Fault.NONE:
         return Mode.HOLD
-    return requests.mode if requests.mode_writes != watch.mode_writes else watch.mode
+    return requests.mode if requests.mode_writes != memory.mode_writes else memory.mode

@@ -95,7 +95,7 @@ def run_in_turn(cycles: Sequence[Cycle], stop: Event) -> None:
 
 
 def _told(decision: Decision) -> tuple[object, ...]:
-    return decision.state, decision.mode, decision.fault, decision.why, decision.applied
+    return decision.state, decision.mode, decision.fault, decision.inhibit_reason, decision.applied
 
 
 def _tell(decision: Decision) -> None:
@@ -106,7 +106,7 @@ def _tell(decision: Decision) -> None:
         state=decision.state.name,
         mode=decision.mode.name,
         fault=decision.fault.name,
-        why=decision.why.name,
+        why=decision.inhibit_reason.name,
         command_pa=decision.command_pa,
         identifications=decision.applied.count,
         refusal=decision.applied.refused.name,

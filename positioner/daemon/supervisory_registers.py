@@ -229,7 +229,7 @@ def _status_getters(stroke_m: float) -> dict[str, Getter]:
         "state": lambda s, _: s.decision.state,
         "fault": lambda s, _: s.decision.fault,
         "quality": lambda s, _: s.sample.quality,
-        "why": lambda s, _: s.decision.why,
+        "why": lambda s, _: s.decision.inhibit_reason,
         "position": lambda s, _: s.sample.position_m / stroke_m,
         "position_scaled": lambda s, _: SCALE * s.sample.position_m / stroke_m,
         "device_status": lambda s, _: s.sample.status,

@@ -224,7 +224,7 @@ def test_a_valve_that_nothing_moves_is_named_and_left_alone() -> None:
     bench.step_to(0.061)
     decisions = bench.run(3.0)
     pushes = sum(after.command_pa > before.command_pa for before, after in pairwise(decisions))
-    assert decisions[-1].why is InhibitReason.STUCK
+    assert decisions[-1].inhibit_reason is InhibitReason.STUCK
     assert pushes < 30
     assert {each.command_pa for each in decisions[-2000:]} == {decisions[-1].command_pa}
     bench.step_to(0.062)
@@ -250,7 +250,7 @@ def test_an_error_within_the_dead_band_is_left_alone() -> None:
     bench.step_to(0.06 + 0.01 * STROKE_M)
     decisions = bench.run(0.5)
     assert {each.command_pa for each in decisions} == {before_pa}
-    assert decisions[-1].why is InhibitReason.NOTHING
+    assert decisions[-1].inhibit_reason is InhibitReason.NOTHING
 
 
 def test_a_push_beyond_the_pressure_limits_is_not_given() -> None:
@@ -259,7 +259,7 @@ def test_a_push_beyond_the_pressure_limits_is_not_given() -> None:
     before_pa = bench.run(0.2)[-1].command_pa
     bench.step_to(0.061)
     decisions = bench.run(0.2)
-    assert decisions[-1].why is InhibitReason.LAW_BEYOND_LIMITS
+    assert decisions[-1].inhibit_reason is InhibitReason.LAW_BEYOND_LIMITS
     assert {each.command_pa for each in decisions} == {before_pa}
 
 
@@ -312,7 +312,7 @@ def test_a_pressure_that_is_not_measured_is_taken_as_commanded() -> None:
     bench = Bench(stuck)
     bench.run(0.2)
     bench.step_to(0.061)
-    assert bench.run(3.0, pressure_pa=float("nan"))[-1].why is InhibitReason.STUCK
+    assert bench.run(3.0, pressure_pa=float("nan"))[-1].inhibit_reason is InhibitReason.STUCK
 
 
 @pytest.mark.parametrize("seed", range(3))

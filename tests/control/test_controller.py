@@ -76,7 +76,7 @@ def test_in_hold_no_request_but_a_mode_moves_it(bench: Bench, asked: dict[str, o
 
 def test_automatic_without_a_new_reference_holds() -> None:
     decision = automatic().step()
-    assert (decision.command_pa, decision.why) == (HELD_PA, InhibitReason.NO_MOVE_ASKED)
+    assert (decision.command_pa, decision.inhibit_reason) == (HELD_PA, InhibitReason.NO_MOVE_ASKED)
 
 
 def test_up_and_down_follow_the_law_and_delta_r_is_kept() -> None:
@@ -121,7 +121,11 @@ def test_the_law_waits_for_estimates() -> None:
     bench = automatic(law=None)
     bench.ask(reference_m=0.05)
     decision = bench.step()
-    assert (decision.state, decision.why, decision.command_pa) == (State.S0_START, InhibitReason.NO_ESTIMATES, HELD_PA)
+    assert (decision.state, decision.inhibit_reason, decision.command_pa) == (
+        State.S0_START,
+        InhibitReason.NO_ESTIMATES,
+        HELD_PA,
+    )
 
 
 def test_manual_applies_what_was_written_and_leaves_no_trace() -> None:
@@ -143,10 +147,10 @@ def test_commands_stay_within_the_pressure_limits() -> None:
     bench = automatic(pressure={"minimum_pa": 10e3, "maximum_pa": 90e3})
     bench.ask(reference_m=0.1)
     high = bench.step()
-    assert (high.command_pa, high.why) == (90e3, InhibitReason.LAW_BEYOND_LIMITS)
+    assert (high.command_pa, high.inhibit_reason) == (90e3, InhibitReason.LAW_BEYOND_LIMITS)
     bench.ask(reference_m=0.001)
     low = bench.step()
-    assert (low.command_pa, low.why) == (10e3, InhibitReason.LAW_BEYOND_LIMITS)
+    assert (low.command_pa, low.inhibit_reason) == (10e3, InhibitReason.LAW_BEYOND_LIMITS)
 
 
 def test_s3_excites_and_gives_back_the_law() -> None:
@@ -201,7 +205,7 @@ def test_an_excitation_that_may_not_be_is_refused_and_says_why(
     bench = automatic(**tables)
     bench.ask(eta=(0, 0, 0), **asked)
     decision = bench.step()
-    assert (decision.state, decision.why, decision.command_pa) == (State.S0_START, why, HELD_PA)
+    assert (decision.state, decision.inhibit_reason, decision.command_pa) == (State.S0_START, why, HELD_PA)
 
 
 def test_s3_ends_by_itself_and_does_not_begin_again_until_asked_again() -> None:
@@ -210,7 +214,7 @@ def test_s3_ends_by_itself_and_does_not_begin_again_until_asked_again() -> None:
     states = [bench.step().state for _ in range(40)]
     assert states[:20] == [State.S3_IDENTIFY] * 20
     assert states[22:] == [State.S0_START] * 18
-    assert bench.step().why is InhibitReason.EXCITATION_TOO_LONG
+    assert bench.step().inhibit_reason is InhibitReason.EXCITATION_TOO_LONG
     assert bench.step().command_pa == HELD_PA
     bench.ask(eta=QUIET)
     bench.step()

@@ -5,7 +5,7 @@ from math import exp, log
 
 import pytest
 
-from positioner.control.pulse import Pulse, Response, unknown
+from positioner.control.pulse import Pulse, PulseResponse, unidentified_response
 
 OMEGA, ZETA = 196.5, 1.146
 LIMIT_M = 27e-3
@@ -14,8 +14,8 @@ STEP_S = 2e-6
 NEAR_M = 1e-6
 
 
-def response(omega: float = OMEGA, zeta: float = ZETA, bias_m: float = 0.0) -> Response:
-    return replace(unknown(1e-4), theta=(log(omega), log(zeta), bias_m, bias_m))
+def response(omega: float = OMEGA, zeta: float = ZETA, bias_m: float = 0.0) -> PulseResponse:
+    return replace(unidentified_response(1e-4), theta=(log(omega), log(zeta), bias_m, bias_m))
 
 
 def integrated_m(pulse: Pulse, omega: float, zeta: float, bias_m: float = 0.0) -> float:
@@ -69,23 +69,23 @@ def test_the_end_comes_no_later_than_it_says() -> None:
 @pytest.mark.parametrize("lag_s", [0.0, 0.05])
 def test_a_pulse_is_aimed_at_a_distance(travel_m: float, lag_s: float) -> None:
     push = Pulse(PUSH_M, 0.0, 1e-3, 1, lag_s)
-    aimed = response(bias_m=3e-4).aimed(travel_m, push, -LIMIT_M)
-    found = response(bias_m=3e-4).end(aimed, NEAR_M).travel_m
+    reaching = response(bias_m=3e-4).reaching(travel_m, push, -LIMIT_M)
+    found = response(bias_m=3e-4).end(reaching, NEAR_M).travel_m
     shortest = response(bias_m=3e-4).end(push._replace(hold_m=-LIMIT_M), NEAR_M).travel_m
     assert found == pytest.approx(max(travel_m, shortest), rel=5e-3)
 
 
 def test_no_hold_is_deeper_than_asked() -> None:
     push = Pulse(PUSH_M, 0.0, 1e-3, 1)
-    assert response().aimed(1e-6, push, -LIMIT_M).hold_m == -LIMIT_M
+    assert response().reaching(1e-6, push, -LIMIT_M).hold_m == -LIMIT_M
 
 
 def test_outcomes_teach_the_response_from_nothing() -> None:
     """A valve of which nothing is known: after a dozen pulses of the true one both kinds are predicted."""
-    true, known = response(bias_m=2e-4), unknown(3e-4)
+    true, known = response(bias_m=2e-4), unidentified_response(3e-4)
     for travel_m in (3e-4, 8e-4, 2e-4, 3e-3, 4e-4, 1.5e-4, 5e-4, 6e-3, 3e-4, 2e-4, 1e-3, 4e-4):
-        pulse = known.aimed(travel_m, Pulse(PUSH_M, 0.0, 1e-3, 1), -LIMIT_M)
-        known = known.learnt(pulse, true.end(pulse, NEAR_M).travel_m, (3e-6) ** 2, 3e-5)
+        pulse = known.reaching(travel_m, Pulse(PUSH_M, 0.0, 1e-3, 1), -LIMIT_M)
+        known = known.updated(pulse, true.end(pulse, NEAR_M).travel_m, (3e-6) ** 2, 3e-5)
     assert known.bias_m(1) == pytest.approx(2e-4, abs=2e-5)
     assert known.bias_m(-1) == 0.0
     for hold_m in (-LIMIT_M, -1e-3, 2e-3):
@@ -95,22 +95,22 @@ def test_outcomes_teach_the_response_from_nothing() -> None:
 
 def test_a_surprise_beyond_reason_does_not_throw_the_response_off() -> None:
     """A braked pulse ends 5 mm farther than it could: no parameter leaps farther than that."""
-    known = response().learnt(Pulse(PUSH_M, -LIMIT_M, 1e-3, -1), 5e-3, (3e-6) ** 2, 3e-5)
+    known = response().updated(Pulse(PUSH_M, -LIMIT_M, 1e-3, -1), 5e-3, (3e-6) ** 2, 3e-5)
     assert abs(known.bias_m(-1)) < 5e-3
     assert abs(known.theta[0] - log(OMEGA)) < 0.71
 
 
 def test_what_was_learnt_lowers_the_doubt() -> None:
     pulse = Pulse(PUSH_M, 3e-3, 1e-3, 1)
-    first = unknown(3e-4)
-    later = first.learnt(pulse, first.end(pulse, NEAR_M).travel_m, (3e-6) ** 2, 3e-5)
+    first = unidentified_response(3e-4)
+    later = first.updated(pulse, first.end(pulse, NEAR_M).travel_m, (3e-6) ** 2, 3e-5)
     assert later.std_m(pulse) < 0.5 * first.std_m(pulse)
 
 
 def test_a_new_identification_keeps_the_difference_of_the_directions() -> None:
     """It brings its own doubt about the balance; the stem's poles and what differs between directions stay."""
     pulse = Pulse(PUSH_M, 3e-3, 1e-3, -1)
-    before = unknown(3e-4).learnt(pulse, 4e-3, (3e-6) ** 2, 3e-5)
-    after = before.rebalanced(2e-4)
+    before = unidentified_response(3e-4).updated(pulse, 4e-3, (3e-6) ** 2, 3e-5)
+    after = before.with_new_balance(2e-4)
     assert after.theta == before.theta
     assert after.std_m(pulse) ** 2 == pytest.approx(before.std_m(pulse) ** 2 + 2e-4**2, rel=1e-3)

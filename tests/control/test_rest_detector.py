@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from positioner.control.rest_detector import Rest
+from positioner.control.rest_detector import RestEstimate
 
 RESOLUTION_M = 2e-5
 AT_M = 0.06
 
 
-def after(samples: np.ndarray, rest: Rest | None = None) -> Rest:
-    rest = Rest(RESOLUTION_M) if rest is None else rest
+def after(samples: np.ndarray, rest: RestEstimate | None = None) -> RestEstimate:
+    rest = RestEstimate(RESOLUTION_M) if rest is None else rest
     for sample in samples.tolist():
-        rest = rest.seen(sample)
+        rest = rest.updated(sample)
     return rest
 
 
@@ -28,10 +28,10 @@ def test_the_noise_decides_how_long_it_takes() -> None:
     lengths = []
     for noise_m in (1e-5, 1e-4):
         rng = np.random.default_rng(1)
-        rest = after(AT_M + noise_m * rng.standard_normal(400)).left()
+        rest = after(AT_M + noise_m * rng.standard_normal(400)).restarted()
         n = 0
         while not rest.known:
-            rest, n = rest.seen(AT_M + noise_m * rng.standard_normal()), n + 1
+            rest, n = rest.updated(AT_M + noise_m * rng.standard_normal()), n + 1
         lengths.append(n)
     assert lengths[0] <= 8
     assert 20 <= lengths[1] <= 90
@@ -40,9 +40,9 @@ def test_the_noise_decides_how_long_it_takes() -> None:
 def test_a_moving_stem_is_not_at_rest() -> None:
     noise_m = 1e-5
     rng = np.random.default_rng(2)
-    rest = after(AT_M + noise_m * rng.standard_normal(400)).left()
+    rest = after(AT_M + noise_m * rng.standard_normal(400)).restarted()
     for sample in (AT_M + 2e-5 * np.arange(200) + noise_m * rng.standard_normal(200)).tolist():
-        rest = rest.seen(sample)
+        rest = rest.updated(sample)
         assert not rest.known
 
 
@@ -62,7 +62,7 @@ def test_ten_minutes_of_noise_never_look_like_a_step() -> None:
     rest = after(AT_M + noise_m * rng.standard_normal(400))
     worst = 0.0
     for sample in (AT_M + noise_m * rng.standard_normal(60_000)).tolist():
-        rest = rest.seen(sample)
+        rest = rest.updated(sample)
         if rest.known and not rest.block_count:
             worst = max(worst, abs(rest.mean_m - AT_M) / (rest.std_m / (2 * rest.length) ** 0.5))
     assert worst < 6.0

@@ -5,13 +5,13 @@ import math
 import pytest
 
 from config.codes import InhibitReason
-from positioner.control.sine_excitation import Swing
+from positioner.control.sine_excitation import SineExcitation
 
 
 def test_the_signal_is_that_of_25() -> None:
-    swing = Swing(44126.0, 13238.0, 1.0)
-    assert swing.pressure_pa(0.0) == 44126.0
-    assert swing.pressure_pa(math.pi / 2) == pytest.approx(44126.0 + 13238.0)
+    excitation = SineExcitation(44126.0, 13238.0, 1.0)
+    assert excitation.pressure_pa(0.0) == 44126.0
+    assert excitation.pressure_pa(math.pi / 2) == pytest.approx(44126.0 + 13238.0)
 
 
 @pytest.mark.parametrize(
@@ -28,4 +28,4 @@ def test_the_signal_is_that_of_25() -> None:
     ],
 )
 def test_refusals(alpha: float, beta: float, breakaway: float | None, why: InhibitReason) -> None:
-    assert Swing(alpha, beta, 1.0).problem(0.0, 420e3, breakaway) is why
+    assert SineExcitation(alpha, beta, 1.0).problem(0.0, 420e3, breakaway) is why

@@ -3,7 +3,7 @@
 import pytest
 
 from config.codes import InhibitReason, State
-from positioner.control.states import Situation, state_in, why_not_the_law
+from positioner.control.states import Situation, law_inhibit_reason, state_in
 
 S0, S1, S2, S3 = State
 
@@ -30,4 +30,4 @@ def test_state_and_its_reason(
 ) -> None:
     situation = Situation(automatic, exciting, ready, delta)
     assert state_in(situation) is state
-    assert why_not_the_law(situation) is why
+    assert law_inhibit_reason(situation) is why

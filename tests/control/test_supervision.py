@@ -9,7 +9,7 @@ from config.codes import Fault, Mode, Quality
 from config.device import DeviceStatus
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
-from positioner.control.supervision import Limits, Watch, supervise
+from positioner.control.supervision import Limits, SupervisionMemory, supervise
 
 LIMITS = Limits(
     stroke_m=0.1,
@@ -28,16 +28,18 @@ def good(now_s: float, position_m: float = 0.05) -> Sample:
     return Sample(now_s, now_s, position_m, 50e3)
 
 
-def watched(samples: list[Sample], requests: Requests, watch: Watch | None = None) -> list[Watch]:
+def watched(
+    samples: list[Sample], requests: Requests, memory: SupervisionMemory | None = None
+) -> list[SupervisionMemory]:
     """Return the watch after each sample."""
-    watches = [watch or Watch()]
+    watches = [memory or SupervisionMemory()]
     for sample in samples:
         watches.append(supervise(watches[-1], sample, 50e3, requests, LIMITS))
     return watches[1:]
 
 
-def faults(watches: list[Watch]) -> list[Fault]:
-    return [watch.fault for watch in watches]
+def faults(watches: list[SupervisionMemory]) -> list[Fault]:
+    return [memory.fault for memory in watches]
 
 
 AUTOMATIC = Requests(mode=Mode.AUTOMATIC, mode_writes=1)
@@ -96,10 +98,10 @@ def test_a_fault_stays_until_acknowledged_after_its_cause_is_gone() -> None:
 
 def test_a_mode_asked_for_during_a_fault_is_not_taken_up_later() -> None:
     unfit = replace(good(0.0), status=DeviceStatus.NOT_READY)
-    watch = watched([unfit], AUTOMATIC)[-1]
-    watch = watched([good(0.01)], replace(AUTOMATIC, mode_writes=2), watch)[-1]
-    watch = watched([good(0.02)], replace(AUTOMATIC, mode_writes=2, acknowledgements=1), watch)[-1]
-    assert (watch.fault, watch.mode) == (Fault.NONE, Mode.HOLD)
+    memory = watched([unfit], AUTOMATIC)[-1]
+    memory = watched([good(0.01)], replace(AUTOMATIC, mode_writes=2), memory)[-1]
+    memory = watched([good(0.02)], replace(AUTOMATIC, mode_writes=2, acknowledgements=1), memory)[-1]
+    assert (memory.fault, memory.mode) == (Fault.NONE, Mode.HOLD)
 
 
 def test_a_silent_dcs_is_a_fault_only_while_something_other_than_hold_is_on() -> None:

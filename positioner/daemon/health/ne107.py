@@ -67,8 +67,8 @@ def condition(decision: Decision, health: Health) -> Condition:
         Ne107Cause.EXCITED: decision.state is State.S3_IDENTIFY,
         Ne107Cause.NOT_IDENTIFIED: decision.mode is Mode.AUTOMATIC and decision.applied.ratios is None,
         Ne107Cause.DCS_SILENT: silent,
-        Ne107Cause.BEYOND_LIMITS: decision.why is InhibitReason.LAW_BEYOND_LIMITS,
-        Ne107Cause.STUCK: decision.why is InhibitReason.STUCK,
+        Ne107Cause.BEYOND_LIMITS: decision.inhibit_reason is InhibitReason.LAW_BEYOND_LIMITS,
+        Ne107Cause.STUCK: decision.inhibit_reason is InhibitReason.STUCK,
     }
     worn = set(_wear(health))
     return Condition(tuple(cause for cause in CLASS if cause in worn or holds.get(cause, False)))

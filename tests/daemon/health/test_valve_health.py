@@ -180,7 +180,7 @@ def test_friction_far_from_its_baseline_asks_for_maintenance(ratio: float, cause
     panel = Panel(LAW)
     panel.set("mode", Mode.AUTOMATIC)
     panel.run(0.01)
-    decision = replace(panel.cycle.snapshot.decision, why=InhibitReason.NO_MOVE_ASKED)
+    decision = replace(panel.cycle.snapshot.decision, inhibit_reason=InhibitReason.NO_MOVE_ASKED)
     assert condition(decision, with_friction(panel, ratio)).causes == causes
 
 
@@ -188,7 +188,7 @@ def test_the_worst_class_decides_and_every_cause_is_told() -> None:
     panel = Panel(LAW)
     health = with_friction(panel, 2.0)
     decision = replace(
-        panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, why=InhibitReason.NOT_AUTOMATIC
+        panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, inhibit_reason=InhibitReason.NOT_AUTOMATIC
     )
     now = condition(decision, health)
     assert (now.status, now.cause) == (Ne107Status.FAILURE, Ne107Cause.FAULT)
@@ -197,7 +197,7 @@ def test_the_worst_class_decides_and_every_cause_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "why", "status", "cause"),
+    ("fault", "inhibit_reason", "status", "cause"),
     [
         (Fault.DEVICE, InhibitReason.NOT_AUTOMATIC, Ne107Status.FAILURE, Ne107Cause.FAULT),
         (Fault.DCS_SILENT, InhibitReason.NOT_AUTOMATIC, Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.DCS_SILENT),
@@ -205,10 +205,12 @@ def test_the_worst_class_decides_and_every_cause_is_told() -> None:
         (Fault.NONE, InhibitReason.STUCK, Ne107Status.OUT_OF_SPECIFICATION, Ne107Cause.STUCK),
     ],
 )
-def test_the_class_of_each_fault(fault: Fault, why: InhibitReason, status: Ne107Status, cause: Ne107Cause) -> None:
+def test_the_class_of_each_fault(
+    fault: Fault, inhibit_reason: InhibitReason, status: Ne107Status, cause: Ne107Cause
+) -> None:
     panel = Panel(LAW)
     mode = Mode.HOLD if fault else Mode.AUTOMATIC
-    decision = replace(panel.cycle.snapshot.decision, mode=mode, fault=fault, why=why)
+    decision = replace(panel.cycle.snapshot.decision, mode=mode, fault=fault, inhibit_reason=inhibit_reason)
     now = condition(decision, Health.idle(STROKE_M))
     assert (now.status, now.cause) == (status, cause)
 
