@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test lint bench soak blind docs clean
+.PHONY: venv demo test suite lint bench soak blind docs clean
 
 venv: $(READY)
 
@@ -16,8 +16,11 @@ $(READY): pyproject.toml
 demo: $(READY)          ## a sticking valve identified and controlled over Modbus, in under a minute
 	$(BIN)/positioner demo --out demo-out
 
-test: $(READY) lint     ## lint, types, import contracts and the whole test suite
-	$(BIN)/pytest
+test: $(READY)          ## lint, types, import contracts and the whole test suite, at the same time
+	$(MAKE) --no-print-directory --jobs=2 suite lint
+
+suite: $(READY)
+	$(BIN)/pytest --numprocesses=auto --dist=loadgroup --no-loadscope-reorder
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -20,6 +20,8 @@ from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs, DcsError
 from tests.cli.test_daemon_process import LAW, until
 
+pytestmark = pytest.mark.real_time
+
 NODE = 5
 MOST_KILLS = 5
 DETECTED_WITHIN_S = 0.15

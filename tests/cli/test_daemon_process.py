@@ -22,6 +22,8 @@ from drivers import driver_for
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 
+pytestmark = pytest.mark.real_time
+
 WITHIN_S = 20.0
 LAW = "[law]\nb_over_c_pa_per_m = -814542.6\nk_over_c_pa = -22068.2\n"
 

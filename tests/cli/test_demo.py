@@ -14,6 +14,8 @@ from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from tests.cli.test_daemon_process import until
 
+pytestmark = pytest.mark.real_time
+
 
 def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True) -> Outcome:
     identified = [Identified("new", "b_over_c", -800e3 * ratio, 1.0, -800e3, "")]

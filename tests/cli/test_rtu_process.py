@@ -19,6 +19,8 @@ from positioner.dcs import Dcs
 from sim.slave.slave import slave_of
 from tests.cli.test_daemon_process import LAW, until
 
+pytestmark = pytest.mark.real_time
+
 
 @dataclass
 class Line:

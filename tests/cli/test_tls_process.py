@@ -24,6 +24,8 @@ from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 from tests.cli.test_daemon_process import LAW, until
 
+pytestmark = pytest.mark.real_time
+
 ROLES = ("observer", "operator", "engineer")
 
 

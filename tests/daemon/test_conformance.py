@@ -26,6 +26,8 @@ from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 
+pytestmark = pytest.mark.real_time
+
 UNIT = 3
 WITHIN_S = 20.0
 WORD_TEST = BY_NAME["word_test"].address

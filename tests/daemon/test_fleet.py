@@ -39,6 +39,8 @@ from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 
+pytestmark = pytest.mark.real_time
+
 WITHIN_S = 30.0
 VALVES = 8
 NAMES = [f"FV-{number}" for number in range(1, VALVES + 1)]

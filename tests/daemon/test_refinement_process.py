@@ -13,6 +13,8 @@ from positioner.estimation.batch import RecordSettings
 from positioner.estimation.refiner import Job
 from tests.estimation.stem import NOISE, TRUTH, grid, run, swing
 
+pytestmark = pytest.mark.real_time
+
 
 def job() -> Job:
     moved = run(swing, grid(1e-3, -0.1, 0.8)).noisy(np.random.default_rng(1))

@@ -29,6 +29,8 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace, RealTime
 from tests.certificates import folder, tls
 
+pytestmark = pytest.mark.real_time
+
 STROKE_M = 0.1016
 MOST_CYCLES = 3000
 LAW = {"b_over_c_pa_per_m": -814542.6, "k_over_c_pa": -22068.2}

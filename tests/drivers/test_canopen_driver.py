@@ -14,6 +14,8 @@ from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
 from tests.drivers.test_driver_contract import FILE, Bench, WireBench, WireContract
 
+pytestmark = pytest.mark.real_time
+
 NODE = 5
 
 

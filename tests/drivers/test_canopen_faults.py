@@ -27,6 +27,8 @@ from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Clock, Lockstep, RealTime
 from sim.slave.modbus_slave import device_of
 
+pytestmark = pytest.mark.real_time
+
 NODE, HELD_PA, PUSH_PA = 5, 17e3, 60e3
 FILE = SlaveFile.model_validate({"initial": {"position_m": 0.02, "pressure_pa": HELD_PA}})
 TPDO_1, HEARTBEAT, ANSWER = 0x180 + NODE, 0x700 + NODE, 0x580 + NODE

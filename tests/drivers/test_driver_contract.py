@@ -26,6 +26,8 @@ from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
 
+pytestmark = pytest.mark.real_time
+
 FILE = SlaveFile.model_validate(
     {
         "clock": {"mode": "lockstep", "period_s": 2e-3},

@@ -21,6 +21,8 @@ from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 
+pytestmark = pytest.mark.real_time
+
 REPLY_TIMEOUT_S = 0.2
 PUSH_PA = 80e3
 

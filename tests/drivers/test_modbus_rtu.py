@@ -32,6 +32,8 @@ from sim.slave.rtu_server import RtuServer
 from sim.slave.simulated_device import Device
 from tests.drivers.test_driver_contract import FILE, WireBench, WireContract
 
+pytestmark = pytest.mark.real_time
+
 BAUD: Baud = 115200
 REPLY_TIMEOUT_S = 0.2
 PUSH_PA = 80e3

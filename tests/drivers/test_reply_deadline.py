@@ -34,6 +34,8 @@ from sim.slave.modbus_slave import device_of
 from tests.certificates import tls
 from tests.drivers.test_modbus_rtu import ScriptedDevice
 
+pytestmark = pytest.mark.real_time
+
 TIMEOUT_S = 0.2
 READ_11 = struct.pack(">BHH", 3, 0, 11)
 REPLY = b"\3\x16" + bytes(22)

@@ -29,6 +29,8 @@ from sim.slave.simulated_device import Device
 from tests.certificates import folder, tls
 from tests.drivers import test_driver_contract as contract
 
+pytestmark = pytest.mark.real_time
+
 PUSH_PA = 80e3
 READ_ONE = bytes.fromhex("0001 0000 0006 01 03 0000 0001")
 

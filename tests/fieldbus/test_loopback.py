@@ -13,6 +13,8 @@ import pytest
 from fieldbus.canopen import loopback as can_bus
 from fieldbus.canopen.loopback import ENDS, HOST, WINDOW, LoopbackBus, free_channel
 
+pytestmark = pytest.mark.real_time
+
 BURST = 3000
 
 Join = Callable[..., LoopbackBus]

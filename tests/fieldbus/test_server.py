@@ -11,6 +11,8 @@ from pymodbus.client import ModbusTcpClient
 from config.errors import InputError
 from fieldbus.modbus.server import MOST_CLIENTS, ExceptionCode, RegisterError, RegisterServer, Table
 
+pytestmark = pytest.mark.real_time
+
 SIZE = 200
 
 

@@ -17,6 +17,8 @@ from sim.slave.clocks import Clock, Lockstep, RealTime
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
 
+pytestmark = pytest.mark.real_time
+
 NODE, HELD_PA, PUSH_PA = 5, 17e3, 60e3
 SYNC, RPDO, TPDOS = 0x80, 0x200 + NODE, (0x180 + NODE, 0x280 + NODE, 0x380 + NODE)
 EMCY, HEARTBEAT = 0x80 + NODE, 0x700 + NODE

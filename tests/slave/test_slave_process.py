@@ -16,6 +16,8 @@ from pymodbus.client import ModbusTcpClient
 from config.device import SIMULATED_MAP
 from sim.slave.clocks import MOST_CATCH_UP_S
 
+pytestmark = pytest.mark.real_time
+
 COMMAND = SIMULATED_MAP.command_pa.address
 ENDED_WELL = (0, "", "")
 

@@ -17,6 +17,8 @@ from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
 
+pytestmark = pytest.mark.real_time
+
 PLACES = SIMULATED_MAP.places
 COMMAND = PLACES["command_pa"].address
 TIMEOUT = PLACES["communication_timeout_s"].address

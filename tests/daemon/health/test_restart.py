@@ -11,6 +11,8 @@ import pytest
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
 
+pytestmark = pytest.mark.real_time
+
 WITHIN_S = 20.0
 DAEMON = """[valve]
 name = 'FV-101'
