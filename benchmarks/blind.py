@@ -114,7 +114,7 @@ def line(family: str, seed: int) -> Line:
         "verdict": found.verdict,
         "missing": list(found.missing),
         "suspected": list(found.suspected),
-        "sets": [[each.name for each in step.alike] for step in found.steps if step.added],
+        "sets": [[each.name for each in step.indistinguishable] for step in found.steps if step.added],
         "ranked": [each.name for each in found.steps[0].candidates[:3]],
         "at_floor": found.best.at_floor,
         "structured": found.best.structured,

@@ -65,15 +65,16 @@ def servo_motor(runs: tuple[str, ...]) -> Iterator[str]:
             yield base + "".join(f"{errors[name]:>21.3f}" if name in errors else f"{'in':>21}" for name in TRIED)
         yield f"{'':<10}{found.verdict}: {', '.join(found.missing)}"
         for each in found.candidates:
-            if each.why_not:
-                yield f"{'':<10}step {each.step}, {each.name}: {each.why_not}"
+            if not each.accepted:
+                yield f"{'':<10}step {each.step}, {each.name}: {each.rejection_reason}"
 
 
 def forces(found: ForceDiagnosis) -> Iterator[str]:
     """Yield the figures of a balance of forces, N."""
     for number, step in enumerate(found.steps, start=1):
         yield f"  step {number}: {step.before.test_rms_n:.3g} N held out, {step.before.train_rms_n:.3g} fitted; " + (
-            f"added {' or '.join(step.alike)}: {step.added.fit.test_rms_n:.3g}, {step.added.fit.train_rms_n:.3g}"
+            f"added {' or '.join(each.name for each in step.indistinguishable)}: "
+            f"{step.added.fit.test_rms_n:.3g}, {step.added.fit.train_rms_n:.3g}"
             if step.added
             else "nothing accepted"
         )

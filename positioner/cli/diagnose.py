@@ -8,7 +8,7 @@ from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
     from workbench.select.diagnosis import Diagnosis
-    from workbench.select.preview import Suspect
+    from workbench.select.preview import TangentScore
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
 EXAMPLE = "positioner diagnose rec.csv --valve seed --test other.csv --json diagnosed.json"
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
             test=test,
             effects=arguments.effects,
             seed=arguments.seed,
-            told=_tell_preview,
+            on_preview=_tell_preview,
             progress=show,
         )
     if diagnosis.experiment:
@@ -92,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if diagnosis.verdict == "adequate" else 1
 
 
-def _tell_preview(suspects: "tuple[Suspect, ...]") -> None:
+def _tell_preview(suspects: "tuple[TangentScore, ...]") -> None:
     named = ", ".join(f"{each.name} {each.score:.2f}" for each in suspects[:PREVIEWED])
     print(f"tangent preview, not a verdict: {named}", flush=True)
 
@@ -109,10 +109,10 @@ def _lines(diagnosis: "Diagnosis", path: Path) -> list[str]:
         ]
         for each in step.candidates:
             if each.model is None or each.gain is None:
-                lines.append(f"  {each.name:<20}{each.why_not}")
+                lines.append(f"  {each.name:<20}{each.rejection_reason}")
                 continue
             errors, found = each.model.errors, each.gain
-            said = "accepted" if each.accepted else each.why_not
+            said = "accepted" if each.accepted else each.rejection_reason
             lines.append(
                 f"  {each.name:<20}{1e3 * errors.train_rmse_m:>11.4f}{1e3 * errors.test_rmse_m:>13.4f}"
                 f"{1e3 * errors.test_block_m:>12.4f}{found.bic:>10.1f}{found.standard_errors:>12.1f}  {said}"

@@ -97,7 +97,7 @@ def test_an_effect_that_would_have_to_be_negative_is_refused_and_said_so(tmp_pat
     (drag,) = found.candidates
     assert not drag.physical
     assert not drag.accepted
-    assert "the recording wants quadratic_drag.drag_ns2_per_m2 beyond 0" in drag.why_not
+    assert "the recording wants quadratic_drag.drag_ns2_per_m2 beyond 0" in drag.rejection_reason
 
 
 def test_one_class_is_not_ranked_inside(tmp_path: Path) -> None:
@@ -117,10 +117,10 @@ def test_no_imitation_of_the_bare_valve_is_named() -> None:
     hidden = hide(11015)
     assert [each.name for each in hidden.truth.effect] == ["sensor_gain"]
     found = diagnose(hidden.fit, hidden.base, test=hidden.test, effects=("sensor_lag", "sensor_gain"))
-    why_not = {each.name: each.why_not for each in found.candidates}
+    reasons = {each.name: each.rejection_reason for each in found.candidates}
     assert found.verdict == "adequate"
-    assert why_not["sensor_gain"] == "no record of pressure and position tells it from spring_n_per_m"
-    assert why_not["sensor_lag"] == "explains no better than sensor_gain, the bare valve with other parameters"
+    assert reasons["sensor_gain"] == "no record of pressure and position tells it from spring_n_per_m"
+    assert reasons["sensor_lag"] == "explains no better than sensor_gain, the bare valve with other parameters"
     assert "a parameter that was kept is off: with sensor_gain" in found.sentence
     assert "mm. Fit again with the mass free." in found.sentence
 
@@ -155,7 +155,7 @@ def test_what_nothing_proves_is_suspected_and_no_more() -> None:
     assert found.suspected == ("spring_hardening",)
     assert as_json(found)["suspected"] == ["spring_hardening"]
     (suspect,) = (each for each in found.candidates if each.name == "spring_hardening")
-    said = f"Suspected, not proved: spring_hardening; of spring_hardening, {suspect.why_not}."
+    said = f"Suspected, not proved: spring_hardening; of spring_hardening, {suspect.rejection_reason}."
     assert said in found.sentence
     assert "standard errors, more than 3 needed" in said
     assert f"scatters: a repeated command repeats the position to {1e3 * found.split.floor_m:.3g} mm" in found.sentence

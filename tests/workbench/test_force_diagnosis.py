@@ -72,7 +72,7 @@ def test_friction_that_falls_with_speed_is_found_and_its_opposite_is_refused() -
     opposite = diagnosed(excess_n=-25.0)
     tried = [each for each in opposite.candidates if each.name == "stribeck"]
     assert tried
-    assert all("the rows want stribeck.excess_n below 0" in each.why_not for each in tried)
+    assert all("the rows want stribeck.excess_n below 0" in each.rejection_reason for each in tried)
 
 
 def test_a_test_recording_is_judged_and_never_fitted() -> None:

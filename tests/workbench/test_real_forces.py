@@ -75,8 +75,8 @@ def test_a_falling_friction_with_speed_is_refused_as_unphysical(never_trained_on
     _, found = never_trained_on
     tried = [each for step in found.steps[1:] for each in step.candidates if each.name == "stribeck"]
     assert tried
-    assert not any(each.why_not == "" for each in tried)
-    assert any("stribeck.excess_n below 0" in each.why_not for each in tried)
+    assert not any(each.accepted for each in tried)
+    assert any("stribeck.excess_n below 0" in each.rejection_reason for each in tried)
 
 
 def test_one_pressure_alone_does_not_show_that_friction_grows_with_it() -> None:
@@ -98,7 +98,7 @@ def test_friction_grows_over_the_stroke_by_position_or_pressure(curve: ForceDiag
 
 def test_the_curves_errors_are_those_established(curve: ForceDiagnosis) -> None:
     assert curve.base.test_rms_n == pytest.approx(560.0, rel=0.03)
-    in_either_n = [each.fit.test_rms_n for each in curve.steps[0].candidates if each.name in curve.steps[0].alike]
+    in_either_n = [each.fit.test_rms_n for each in curve.steps[0].candidates if each.name in curve.indistinguishable[0]]
     assert in_either_n == pytest.approx([320.0, 320.0], rel=0.03)
 
 

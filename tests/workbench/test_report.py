@@ -123,7 +123,7 @@ def test_the_ranking_has_the_diagnosis_s_numbers(diagnosed_page: Page, diagnosed
         candidate = next(each for name, each in candidates.items() if row[0][0].startswith(name))
         assert candidate.model is not None
         assert float(row[2][1].removesuffix(" m")) == pytest.approx(candidate.model.errors.test_rmse_m, rel=1e-5)
-        assert candidate.why_not in row[1][0]
+        assert candidate.rejection_reason in row[1][0]
     assert len(diagnosed_page.tables["table-ranking-1"]) == len(candidates) + 1
 
 

@@ -52,7 +52,7 @@ def test_the_tables_have_the_diagnosis_s_numbers(page: Page, diagnosed: ForceDia
     outcomes = {row[0][0].removesuffix("\n"): row[1][0] for row in page.tables["table-ranking-1"][1:]}
     for each in diagnosed.steps[0].candidates:
         (said,) = (outcome for name, outcome in outcomes.items() if name.startswith(each.name))
-        assert said == "added" if each.name == "pressure_friction" else each.why_not in said
+        assert said == "added" if each.name == "pressure_friction" else each.rejection_reason in said
     parameters = {row[0][0]: row for row in page.tables["table-parameters"][1:]}
     growth = parameters["pressure friction: growth"]
     assert (growth[1][0], growth[4][0]) == ("–", "N/kPa")

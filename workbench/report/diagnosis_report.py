@@ -32,9 +32,10 @@ from workbench.report.page import (
 from workbench.report.plot_series import drawn, rounded
 from workbench.report.ranking import Tried
 from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
-from workbench.select.diagnosis import Candidate, Diagnosis, Model, Step
+from workbench.select.diagnosis import Diagnosis
+from workbench.select.effect_acceptance import LEAST_BIC
+from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import untold
-from workbench.select.evidence import LEAST_BIC
 from workbench.select.experiment import Experiment
 
 DIAGNOSIS_WORDS = {
@@ -141,7 +142,7 @@ def _names(diagnosis: Diagnosis) -> frozenset[str]:
 
 
 def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
-    stages: list[tuple[str, Model, Candidate | None]] = [("as it was, refitted", diagnosis.base, None)]
+    stages: list[tuple[str, EvaluatedModel, EffectCandidate | None]] = [("as it was, refitted", diagnosis.base, None)]
     stages += [
         (f"+ {step.added.name}", step.added.model, step.added)
         for step in diagnosis.steps
@@ -177,7 +178,7 @@ def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
         ),
         table("table-fall", head, rows),
         text(
-            "The median second is the error in a typical second: one slip missed by a hair weighs nothing in it, and "
+            "The median second is the error in a typical second: one narrowly mistimed slip weighs nothing in it, and "
             "much in the rms."
         ),
     )
@@ -227,8 +228,8 @@ def _ranking(diagnosis: Diagnosis, seen: _Seen) -> str:
     return tried_effects(races, seen.floor_m, LENGTH, "second by second")
 
 
-def _tried(step: Step) -> list[Tried]:
-    added, alike = step.added.name if step.added else "", [each.name for each in step.alike]
+def _tried(step: EffectStep) -> list[Tried]:
+    added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
         Tried(
             each.name,
@@ -236,8 +237,8 @@ def _tried(step: Step) -> list[Tried]:
             each.model.errors.train_rmse_m if each.model else None,
             each.gain.standard_errors if each.gain else None,
             each.gain.bic if each.gain else None,
-            outcome(each.name, added, alike, refused=not each.accepted),
-            each.why_not,
+            outcome(each.name, added, rivals, refused=not each.accepted),
+            each.rejection_reason,
         )
         for each in step.candidates
     ]

@@ -8,8 +8,8 @@ from workbench.report import ranking
 from workbench.report.page import Row, plot, preformatted, section, subheading, table, text
 from workbench.report.ranking import Tried
 from workbench.report.units import Quantity
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_REDUCTION, LEAST_STANDARD_ERRORS
 from workbench.select.equivalence import classes, told_apart
-from workbench.select.evidence import LEAST_BIC, LEAST_GAIN, LEAST_STANDARD_ERRORS
 
 VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
@@ -38,11 +38,11 @@ def headline(verdict: str, missing: Sequence[str]) -> tuple[str, str]:
     return VERDICTS[verdict]
 
 
-def outcome(name: str, added: str, alike: Collection[str], *, refused: bool) -> str:
+def outcome(name: str, added: str, indistinguishable: Collection[str], *, refused: bool) -> str:
     """Return what came of an effect."""
     if name == added:
         return "added"
-    if name in alike:
+    if name in indistinguishable:
         return "as good"
     return "refused" if refused else "accepted"
 
@@ -52,8 +52,8 @@ def tried_effects(races: Sequence[Race], floor: float | None, of: Quantity, part
     shown = [
         text(
             "Each effect of the library was added in turn and the whole model refitted with it, all with equal effort. "
-            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, {parts}, falls "
-            f"by more than {100 * LEAST_GAIN:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
+            f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, {parts}, falls by more "
+            f"than {100 * LEAST_REDUCTION:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
             "and its parameters are physically possible."
         )
     ]

@@ -33,7 +33,7 @@ from workbench.report.page import (
 from workbench.report.plot_series import rounded
 from workbench.report.ranking import Tried
 from workbench.report.units import FORCE, Shown, force, parameter, times
-from workbench.select.evidence import AT_FLOOR
+from workbench.select.block_errors import AT_FLOOR
 
 DRAWN = 6_000
 """Rows drawn at most."""
@@ -236,16 +236,16 @@ def _ranking(diagnosis: ForceDiagnosis) -> str:
 
 
 def _tried(step: ForceStep) -> list[Tried]:
-    added = step.added.name if step.added else ""
+    added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
         Tried(
             each.name,
             each.fit.test_rms_n,
             each.fit.train_rms_n,
-            each.standard_errors,
-            each.bic,
-            outcome(each.name, added, step.alike, refused=bool(each.why_not)),
-            each.why_not,
+            each.gain.standard_errors,
+            each.gain.bic,
+            outcome(each.name, added, rivals, refused=not each.accepted),
+            each.rejection_reason,
         )
         for each in step.candidates
     ]

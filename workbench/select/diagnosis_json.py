@@ -8,7 +8,8 @@ from math import isfinite
 from typing import Any
 
 from workbench.fit.fitting import Fit
-from workbench.select.diagnosis import Candidate, Diagnosis, Model
+from workbench.select.diagnosis import Diagnosis
+from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import untold
 
 
@@ -32,7 +33,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _model(model: Model) -> dict[str, Any]:
+def _model(model: EvaluatedModel) -> dict[str, Any]:
     return {
         "effects": list(model.effects),
         **_errors(model),
@@ -42,7 +43,7 @@ def _model(model: Model) -> dict[str, Any]:
     }
 
 
-def _errors(model: Model) -> dict[str, float]:
+def _errors(model: EvaluatedModel) -> dict[str, float]:
     return {
         "train_rmse_m": model.errors.train_rmse_m,
         "test_rmse_m": model.errors.test_rmse_m,
@@ -64,7 +65,7 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _candidate(candidate: Candidate) -> dict[str, Any]:
+def _candidate(candidate: EffectCandidate) -> dict[str, Any]:
     """An effect that could not be fitted has neither errors nor parameters."""
     model, found = candidate.model, candidate.gain
     return {
@@ -79,5 +80,5 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "parameters": parameters_json(model.fit) if model else {},
         "physical": candidate.physical,
         "accepted": candidate.accepted,
-        "why_not": candidate.why_not,
+        "why_not": candidate.rejection_reason,
     }

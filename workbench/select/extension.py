@@ -18,7 +18,8 @@ from sim.effect import find_effect
 from workbench.data.held_out import Part, Split, residual_m, split
 from workbench.fit.fitting import Fit, fit
 from workbench.model.free_run import FreeRun
-from workbench.select.evidence import Errors, Gain, errors, gain
+from workbench.select.block_errors import BlockErrors, block_errors
+from workbench.select.effect_acceptance import Gain, gain
 
 Progress = Callable[[str, float], None]
 
@@ -31,9 +32,9 @@ class Extension:
     given_train_rmse_m: float
     given_test_rmse_m: float
     refitted: Fit
-    refitted_errors: Errors
+    refitted_errors: BlockErrors
     extended: Fit
-    extended_errors: Errors
+    extended_errors: BlockErrors
     gain: Gain
     split: Split
 
@@ -89,7 +90,7 @@ def extend(
         workers=workers,
         progress=lambda done: tell(f"fitting with {', '.join(effects)}", done),
     )
-    before_errors, after_errors = errors(before, on), errors(after, on)
+    before_errors, after_errors = block_errors(before, on), block_errors(after, on)
     return Extension(
         effects=tuple(effects),
         given_train_rmse_m=_rmse_m(valve, on.train),

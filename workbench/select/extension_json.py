@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from workbench.select.block_errors import BlockErrors
 from workbench.select.diagnosis_json import parameters_json
-from workbench.select.evidence import Errors
 from workbench.select.extension import Extension
 
 
@@ -26,7 +26,7 @@ def as_json(extension: Extension) -> dict[str, Any]:
     }
 
 
-def _errors(errors: Errors) -> dict[str, float]:
+def _errors(errors: BlockErrors) -> dict[str, float]:
     return {
         "train_rmse_m": errors.train_rmse_m,
         "test_rmse_m": errors.test_rmse_m,

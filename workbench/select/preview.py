@@ -29,14 +29,14 @@ Series = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Suspect:
+class TangentScore:
     """An effect and the share of the residual's energy, 0 to 1, that its tangent explains."""
 
     name: str
     score: float
 
 
-def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Suspect, ...]:
+def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[TangentScore, ...]:
     """Rank the effects by their tangents on the fitted part, best first."""
     record = split.train.record
     composition = Composition.from_file(base.valve)
@@ -56,7 +56,7 @@ def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Sus
         return float(r @ t) ** 2 / energy if energy > 0.0 else 0.0
 
     found = [
-        Suspect(name, max(score(each) for each in _tangents(base, effect, name, record, bare)))
+        TangentScore(name, max(score(each) for each in _tangents(base, effect, name, record, bare)))
         for name, effect in library.items()
     ]
     return tuple(sorted(found, key=lambda each: -each.score))

@@ -52,8 +52,8 @@ def _lines(diagnosis: "ForceDiagnosis") -> list[str]:
         ]
         for each in step.candidates:
             lines.append(
-                f"  {each.name:<20}{each.fit.train_rms_n:>11.4g}{each.fit.test_rms_n:>13.4g}{each.bic:>10.1f}"
-                f"{each.held_out:>7.0%}{each.standard_errors:>12.1f}  {each.why_not or 'accepted'}"
+                f"  {each.name:<20}{each.fit.train_rms_n:>11.4g}{each.fit.test_rms_n:>13.4g}{each.gain.bic:>10.1f}"
+                f"{each.gain.held_out:>7.0%}{each.gain.standard_errors:>12.1f}  {each.rejection_reason or 'accepted'}"
             )
     lines += ["", f"with {' and '.join(diagnosis.missing) or 'nothing added'}:"]
     for name, value in diagnosis.best.parameters.items():

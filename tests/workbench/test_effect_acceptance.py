@@ -10,9 +10,17 @@ from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
 from workbench.data.held_out import joined, residual_m, split
 from workbench.data.record import ready
+from workbench.select.block_errors import (
+    BlockErrors,
+    block_logs,
+    independent_share,
+    indistinguishable,
+    relative_error_reduction,
+)
+from workbench.select.effect_acceptance import Gain
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
-from workbench.select.evidence import Errors, Gain, alike, block_logs, fall, fallen, independent
 from workbench.select.structure import STRUCTURED, structure
+from workbench.select.verdict_sentence import reduction_sentence
 
 LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
 NOISE_M = 5e-5
@@ -43,11 +51,11 @@ def test_an_error_far_below_the_floor_does_not_count_as_a_gain() -> None:
     assert tiny == pytest.approx(none, abs=1e-6)
 
 
-def test_a_slip_missed_by_a_hair_does_not_hide_a_gain_in_all_other_blocks() -> None:
+def test_a_narrowly_mistimed_slip_does_not_hide_a_gain_in_all_other_blocks() -> None:
     before = np.log(np.full(30, 1e-4))
     after = np.log(np.full(30, 5e-5))
     after[12:15] = np.log(6e-3)
-    gain, standard_errors = fall(before, after)
+    gain, standard_errors = relative_error_reduction(before, after)
     assert gain > 0.05
     assert standard_errors > 2.0
 
@@ -55,7 +63,7 @@ def test_a_slip_missed_by_a_hair_does_not_hide_a_gain_in_all_other_blocks() -> N
 def test_a_slip_met_by_luck_is_no_gain() -> None:
     before = np.log(np.full(30, 5e-5))
     before[12:14] = np.log(6e-3)
-    _, standard_errors = fall(before, np.log(np.full(30, 5e-5)))
+    _, standard_errors = relative_error_reduction(before, np.log(np.full(30, 5e-5)))
     assert standard_errors < 2.0
 
 
@@ -73,41 +81,41 @@ def test_the_floor_is_missed_by_many_blocks_or_by_far_in_what_was_fitted(
     train_rmse: float, test_rmse: float, train_block: float, test_block: float, there: bool
 ) -> None:
     none = np.zeros(0)
-    assert Errors(train_rmse, test_rmse, train_block, test_block, none, none, 0.0, 1.0).at_floor(1.0) is there
+    assert BlockErrors(train_rmse, test_rmse, train_block, test_block, none, none, 0.0, 1.0).at_floor(1.0) is there
 
 
-def errors_of(logs: np.ndarray) -> Errors:
-    return Errors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0)
+def errors_of(logs: np.ndarray) -> BlockErrors:
+    return BlockErrors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0)
 
 
-def test_two_are_alike_that_differ_by_a_slip_missed_by_a_hair_and_not_if_one_is_worse_throughout() -> None:
+def test_two_are_indistinguishable_that_differ_by_a_narrowly_mistimed_slip_and_not_if_one_is_worse_throughout() -> None:
     best = np.log(np.full(60, 5e-5)) + 0.05 * np.random.default_rng(3).standard_normal(60)
     missed = best.copy()
     missed[40] = np.log(6e-3)
-    assert alike(best, missed)
-    assert not alike(best, best + 0.1)
+    assert indistinguishable(best, missed)
+    assert not indistinguishable(best, best + 0.1)
 
 
 def test_a_fall_is_never_said_of_an_error_that_rises() -> None:
     before = replace(errors_of(np.zeros(60)), test_rmse_m=1.31e-4, test_block_m=9e-5)
-    assert fallen(before, errors_of(np.zeros(60))) == "the held-out error falls from 0.131 to 0.1 mm"
+    assert reduction_sentence(before, errors_of(np.zeros(60))) == "the held-out error falls from 0.131 to 0.1 mm"
     missed = replace(before, test_rmse_m=4.39e-4, test_block_m=5e-5)
-    assert fallen(before, missed) == (
+    assert reduction_sentence(before, missed) == (
         "the held-out error of a typical second falls from 0.09 to 0.05 mm, "
-        "though a slip missed by a hair moves the rms from 0.131 to 0.439 mm"
+        "though a narrowly mistimed slip moves the rms from 0.131 to 0.439 mm"
     )
 
 
 def test_what_hangs_together_is_few_independent_samples() -> None:
     white = noise(20000)
-    assert independent(white) == pytest.approx(1.0, abs=0.03)
+    assert independent_share(white) == pytest.approx(1.0, abs=0.03)
     wandering = np.zeros(20000)
     for i in range(1, wandering.size):
         wandering[i] = 0.9 * wandering[i - 1] + white[i]
-    assert independent(wandering) == pytest.approx(0.1 / 1.9, rel=0.15)
+    assert independent_share(wandering) == pytest.approx(0.1 / 1.9, rel=0.15)
     wandering[::7] = np.nan
-    assert independent(wandering) == pytest.approx(0.1 / 1.9, rel=0.2)
-    assert independent(np.zeros(100)) == 1.0
+    assert independent_share(wandering) == pytest.approx(0.1 / 1.9, rel=0.2)
+    assert independent_share(np.zeros(100)) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -119,14 +127,14 @@ def test_what_hangs_together_is_few_independent_samples() -> None:
     ],
 )
 def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> None:
-    assert said in gain.short(explained=False)
+    assert said in gain.rejection_reason(explained=False)
 
 
 def test_what_passes_every_part_is_not_refused() -> None:
-    assert not Gain(11.0, 0.06, 2.1, 0.1).short(explained=False)
-    assert "10 % are independent: 9, more than 10" in Gain(90.0, 0.5, 9.0, 0.1).short(explained=True)
-    assert "more than 3 needed" in Gain(11.0, 0.06, 2.9, 1.0).short(explained=True)
-    assert not Gain(11.0, 0.06, 3.1, 1.0).short(explained=True)
+    assert not Gain(11.0, 0.06, 2.1, 0.1).rejection_reason(explained=False)
+    assert "10 % are independent: 9, more than 10" in Gain(90.0, 0.5, 9.0, 0.1).rejection_reason(explained=True)
+    assert "more than 3 needed" in Gain(11.0, 0.06, 2.9, 1.0).rejection_reason(explained=True)
+    assert not Gain(11.0, 0.06, 3.1, 1.0).rejection_reason(explained=True)
 
 
 def test_noise_has_no_structure() -> None:

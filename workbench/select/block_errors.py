@@ -1,0 +1,125 @@
+"""How far a fit is off, on what was fitted and on what was held out, second by second.
+
+    l_b = log rms of the error in block b      blocks of 1 s: within one the errors hang together
+    d_b = l_b(base) - l_b(candidate)           held within +-log 2
+    reduction = 1 - exp(-mean d_b),            its standard error from the spread of d_b over the blocks
+    rho = corr(r_i, r_i+1),  (1 - rho) / (1 + rho) of the samples are independent
+
+Static friction is only known to an interval, so that on held-out data a slip is narrowly mistimed now and then, and the
+blocks up to the next slip have an error a hundred times the noise, whatever the model. Therefore no block counts for
+more than a factor of 2.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.recording import Column
+from workbench.data.held_out import Split, residual_m
+from workbench.fit.fitting import Fit
+from workbench.select.structure import clipped, structure
+
+BLOCK_S = 1.0
+AT_FLOOR, RARELY_OFF = 1.25, 1.75
+"""A model reaches the floor if its block error, and its plain error where it was fitted, are within these of it."""
+MOST_LEFT = 0.1
+"""Of the position's standard deviation: a model that leaves more explains little, however badly the valve repeats."""
+MOST_LOG_RATIO = float(np.log(2.0))
+"""What one block counts at most."""
+LEAST_STANDARD_ERROR = 0.01
+"""Of a mean logarithm: no better known, however equal the blocks."""
+NEGLIGIBLE = 0.1
+"""Of the floor: what an error below it is does not matter."""
+SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
+"""Within one of these two models are indistinguishable."""
+
+
+@dataclass(frozen=True, slots=True)
+class BlockErrors:
+    """How far a fit is off, m."""
+
+    train_rmse_m: float
+    test_rmse_m: float
+    train_block_m: float
+    """Geometric mean of the fitted blocks' errors."""
+    test_block_m: float
+    """Median of the held-out blocks' errors."""
+    logs: Column
+    """l_b of the held-out blocks, (blocks,)."""
+    all_logs: Column
+    """l_b of the fitted and the held-out blocks, (blocks,)."""
+    structure: float
+    """How much of the residual hangs on the state, fitted or held out, whichever is more (`structure`)."""
+    independent_share: float
+    """Share of the fitted samples that are independent."""
+
+    def at_floor(self, floor_m: float) -> bool:
+        """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
+
+        Nor may what was fitted be missed by far in a few places: what acts rarely is there for the whole time.
+        """
+        mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
+        return mostly and self.train_rmse_m <= RARELY_OFF * floor_m
+
+    def follows(self, moved_m: float) -> bool:
+        """Whether a typical second's error is small against the motion, given by its standard deviation, m."""
+        return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * moved_m
+
+
+def block_errors(fit: Fit, split: Split) -> BlockErrors:
+    """Return how far a fit is off on what it was fitted to and on what was held out."""
+    negligible_m = NEGLIGIBLE * split.floor_m
+    train, test = split.train, split.judged
+    fitted_m = residual_m(train, fit.predict(train.recording))
+    held_out_m = residual_m(test, fit.predict(test.recording))
+    rows = np.isfinite(held_out_m)
+    fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m)
+    logs = block_logs(test.record.time_s, held_out_m, negligible_m)
+    return BlockErrors(
+        train_rmse_m=fit.rms_m,
+        test_rmse_m=float(np.sqrt(np.mean(held_out_m[rows] ** 2))),
+        train_block_m=float(np.exp(np.mean(fitted_logs))),
+        test_block_m=float(np.exp(np.median(logs))),
+        logs=logs,
+        all_logs=np.concatenate([fitted_logs, logs]),
+        structure=max(structure(train.record, fitted_m), structure(test.record, held_out_m)),
+        independent_share=independent_share(fitted_m),
+    )
+
+
+def block_logs(time_s: Column, error_m: Column, negligible_m: float) -> Column:
+    """Return l_b, the log rms of the error in each block of 1 s that has samples which count, (blocks,).
+
+    Args:
+        time_s: time, s, (samples,).
+        error_m: simulated less measured position, m, (samples,); NaN where a sample does not count.
+        negligible_m: added in quadrature, m, so that what is far below it makes no difference.
+    """
+    rows = np.flatnonzero(np.isfinite(error_m))
+    _, block = np.unique(np.floor((time_s[rows] - time_s[0]) / BLOCK_S), return_inverse=True)
+    squares = np.bincount(block, error_m[rows] ** 2) / np.bincount(block)
+    return np.asarray(0.5 * np.log(squares + negligible_m**2 + np.finfo(float).tiny))
+
+
+def relative_error_reduction(before: Column, after: Column) -> tuple[float, float]:
+    """Return by what part the block error falls, and that in its standard errors; l_b of the same blocks, (blocks,)."""
+    d = np.clip(before - after, -MOST_LOG_RATIO, MOST_LOG_RATIO)
+    mean = float(np.mean(d))
+    error = float(np.std(d)) / d.size**0.5
+    return 1.0 - float(np.exp(-mean)), mean / max(error, LEAST_STANDARD_ERROR)
+
+
+def indistinguishable(best: Column, other: Column) -> bool:
+    """Whether the block errors l_b, (blocks,), do not tell two apart: within 2 standard errors or 2 %."""
+    reduction, standard_errors = relative_error_reduction(other, best)
+    return reduction < SAME_REDUCTION or standard_errors < SAME_STANDARD_ERRORS
+
+
+def independent_share(error_m: Column) -> float:
+    """Return the share of samples that are independent, at most 1; the error, m, clipped at 5 robust deviations."""
+    e = clipped(error_m)
+    pairs = np.isfinite(e[1:]) & np.isfinite(e[:-1])
+    power = float(np.nanmean(e**2)) if pairs.any() else 0.0
+    rho = float(np.mean(e[1:][pairs] * e[:-1][pairs])) / power if power > 0.0 else 0.0
+    rho = min(max(rho, 0.0), 1.0)
+    return (1.0 - rho) / (1.0 + rho)

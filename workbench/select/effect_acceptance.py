@@ -1,0 +1,73 @@
+"""The rule by which an effect is accepted: evidence on what was fitted, and a smaller error on what was held out.
+
+    BIC = n log(2 C / n) + k log n             C soft-L1 cost, k free parameters; the evidence is base less candidate
+    reduction, in its standard errors          of the held-out block errors (`block_errors`)
+
+A falling held-out error is needed for an effect; it proves none. The rule is the same for a balance of forces, where
+the blocks are strokes or readings in place of seconds.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.fit.fitting import Fit
+from workbench.select.block_errors import BlockErrors, relative_error_reduction
+
+LEAST_BIC = 10.0
+LEAST_REDUCTION = 0.05
+LEAST_STANDARD_ERRORS, WHERE_EXPLAINED = 2.0, 3.0
+"""More where nothing is left to explain: of twenty candidates one falls by two deviations by pure chance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """How much a candidate is better than its base."""
+
+    bic: float
+    held_out: float
+    """Relative reduction of the held-out block error."""
+    standard_errors: float
+    """The same in its own standard errors."""
+    independent_share: float
+    """Share of the samples that are independent: the evidence is worth so much of `bic`."""
+
+    def rejection_reason(self, explained: bool) -> str:
+        """Say what the candidate lacks to be accepted; empty if nothing.
+
+        Args:
+            explained: whether the model before leaves nothing to explain.
+        """
+        least = WHERE_EXPLAINED if explained else LEAST_STANDARD_ERRORS
+        if self.bic <= LEAST_BIC:
+            return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
+        if explained and self.independent_share * self.bic <= LEAST_BIC:
+            return (
+                f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
+                f"are independent: {self.independent_share * self.bic:.2g}, more than {LEAST_BIC:g} needed"
+            )
+        if self.held_out <= LEAST_REDUCTION:
+            return (
+                f"the held-out error falls by {100 * self.held_out:.2g} %, more than {100 * LEAST_REDUCTION:g} % needed"
+            )
+        if self.standard_errors <= least:
+            return f"the held-out error falls by {self.standard_errors:.2g} standard errors, more than {least:g} needed"
+        return ""
+
+
+def gain(base: Fit, candidate: Fit, base_errors: BlockErrors, candidate_errors: BlockErrors) -> Gain:
+    """Compare a candidate with its base."""
+    held_out, standard_errors = relative_error_reduction(base_errors.logs, candidate_errors.logs)
+    return Gain(bic(base) - bic(candidate), held_out, standard_errors, candidate_errors.independent_share)
+
+
+def bic(fit: Fit) -> float:
+    """Return the robust Bayesian information criterion: less is better."""
+    n = fit.count
+    return float(n * np.log(2.0 * max(fit.cost, np.finfo(float).tiny) / n) + len(fit.parameters) * np.log(n))
+
+
+def log_likelihood_difference(one: Fit, other: Fit) -> float:
+    """Return twice the log-likelihood of one fit less that of another, n log(C_other / C_one): BIC without k log n."""
+    least = np.finfo(float).tiny
+    return float(one.count * np.log(max(other.cost, least) / max(one.cost, least)))

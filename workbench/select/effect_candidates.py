@@ -1,0 +1,192 @@
+"""One forward step judged: every refitted effect against the model before, by the rule and by its physical range.
+
+Pure functions of fits and errors: nothing is simulated here.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from config.valve_file import ValveParameters
+from sim.effect import Effect, Parameter
+from workbench.fit.fitting import Fit
+from workbench.select.block_errors import BlockErrors, indistinguishable
+from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
+from workbench.select.equivalence import algebraic_class, bare_parameter, classes
+from workbench.select.forward_selection import Candidate, ForwardStep
+from workbench.select.structure import STRUCTURED
+
+AT_END = 0.2
+"""Of the weakest start: nearer to the end of its range a parameter is at it."""
+SAME_COST = 1.01
+"""Factor on the cost within which two members of a class came out as the one they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluatedModel:
+    """A fit and how it does on what was held out."""
+
+    fit: Fit
+    errors: BlockErrors
+    at_floor: bool
+
+    @property
+    def structured(self) -> bool:
+        """Whether the residual still hangs on the state."""
+        return self.errors.structure > STRUCTURED
+
+    @property
+    def explained(self) -> bool:
+        """Whether nothing is left but what no model explains."""
+        return self.at_floor and not self.structured
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in it."""
+        return tuple(each.name for each in self.fit.valve.effect)
+
+
+@dataclass(frozen=True, slots=True)
+class EffectCandidate(Candidate):
+    """An effect refitted beside the model before; without a model it could not be fitted."""
+
+    model: EvaluatedModel | None
+    gain: Gain | None
+    physical: bool
+
+    @property
+    def evidence(self) -> float:
+        """BIC of the model before less that with the effect; minus infinity if it could not be fitted."""
+        return self.gain.bic if self.gain else -float("inf")
+
+
+EffectStep = ForwardStep[EvaluatedModel, EffectCandidate]
+
+
+def judged_step(
+    before: EvaluatedModel, models: Mapping[str, EvaluatedModel | str], number: int, library: Mapping[str, Effect]
+) -> EffectStep:
+    """Hold every candidate against the model before, and choose the one to be added.
+
+    Args:
+        before: the model without any of them.
+        models: by the effect's name, its model, or why it could not be fitted.
+        number: of the step, from 1.
+        library: the effects by name.
+    """
+    candidates = tuple(_candidate(number, name, before, model, library) for name, model in models.items())
+    equivalent = _bare_equivalent(candidates, before.explained, library)
+    candidates, added = _best(_better_than(equivalent, candidates) if equivalent else candidates, library)
+    suspect = None if added or equivalent else _suspect(candidates, library)
+    rivals, suspected = (_rivals(candidates, each, library) if each else () for each in (added, suspect))
+    return ForwardStep(before, candidates, added, rivals, equivalent, suspected)
+
+
+def _candidate(
+    number: int, name: str, before: EvaluatedModel, model: EvaluatedModel | str, library: Mapping[str, Effect]
+) -> EffectCandidate:
+    if isinstance(model, str):
+        return EffectCandidate(number, name, model, None, None, False)
+    found = gain(before.fit, model.fit, before.errors, model.errors)
+    beyond = _beyond(name, model.fit, library[name])
+    same = bare_parameter(name, library)
+    reason = beyond or found.rejection_reason(before.explained)
+    if same and not reason:
+        reason = f"no record of pressure and position tells it from {same}"
+    return EffectCandidate(number, name, reason, model, found, not beyond)
+
+
+def _best(
+    candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]
+) -> tuple[tuple[EffectCandidate, ...], EffectCandidate | None]:
+    """Return the candidates by evidence, and the best accepted one, or the first of its class."""
+    ordered = tuple(sorted(candidates, key=_evidence, reverse=True))
+    accepted = {each.name: each for each in ordered if each.accepted}
+    if not accepted:
+        return ordered, None
+    best, first = next(iter(accepted.values())), accepted[min(classes(accepted, library)[0])]
+    assert best.model
+    assert first.model
+    # A class is not ranked inside, but a search that failed is no reason to go on from there.
+    return ordered, first if first.model.fit.cost < SAME_COST * best.model.fit.cost else best
+
+
+def _bare_equivalent(
+    candidates: Sequence[EffectCandidate], explained: bool, library: Mapping[str, Effect]
+) -> EffectCandidate | None:
+    """Return the best that would be accepted but that it is the bare valve by another name, if there is one."""
+    passing = _passing(candidates, explained)
+    return max((each for each in passing if bare_parameter(each.name, library)), key=_evidence, default=None)
+
+
+def _better_than(equivalent: EffectCandidate, candidates: Sequence[EffectCandidate]) -> tuple[EffectCandidate, ...]:
+    """Reject what does no better than the bare valve by another name: no imitation of it is to be named."""
+    least = equivalent.evidence + LEAST_BIC
+    reason = f"explains no better than {equivalent.name}, the bare valve with other parameters"
+    return tuple(
+        replace(each, rejection_reason=reason) if each.accepted and each.evidence <= least else each
+        for each in candidates
+    )
+
+
+def _suspect(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]) -> EffectCandidate | None:
+    """Return what has the most evidence of all that would be accepted if more were left to explain."""
+    passing = _passing(candidates, explained=False)
+    return max((each for each in passing if _may_be_there(each, library)), key=_evidence, default=None)
+
+
+def _rivals(
+    candidates: Sequence[EffectCandidate], best: EffectCandidate, library: Mapping[str, Effect]
+) -> tuple[EffectCandidate, ...]:
+    """Return what is not told from the best, accepted or not: what narrowly passes the rule proves no more."""
+    assert best.model
+    refitted = {each.name: each for each in candidates if each.model}
+    as_good = [
+        each.name
+        for each in refitted.values()
+        if _may_be_there(each, library)
+        and each.model
+        and indistinguishable(best.model.errors.all_logs, each.model.errors.all_logs)
+    ]
+    # A class is one by algebra, whether or not the search for each of its members succeeded.
+    return tuple(
+        refitted[name]
+        for each in classes(as_good, library)
+        for name in sorted(algebraic_class(min(each), library))
+        if name in refitted
+    )
+
+
+def _may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> bool:
+    """Whether an effect is physical, has evidence, and is not the bare valve by another name."""
+    evident = candidate.physical and candidate.evidence > LEAST_BIC
+    return evident and bare_parameter(candidate.name, library) is None
+
+
+def _passing(candidates: Sequence[EffectCandidate], explained: bool) -> list[EffectCandidate]:
+    """Return the physical ones that pass the rule, as it is where something is left to explain, or nothing."""
+    return [each for each in candidates if each.physical and each.gain and not each.gain.rejection_reason(explained)]
+
+
+def _evidence(candidate: EffectCandidate) -> float:
+    return candidate.evidence
+
+
+def _beyond(name: str, found: Fit, effect: Effect) -> str:
+    """Say which parameter of an effect the recording wants beyond its physical range; empty if none."""
+    for key, declared in effect.parameters.items():
+        parameter = found.parameters.get(f"{effect.name}.{key}")
+        if parameter and not parameter.physical and _at_end(parameter.value, declared, found.valve.valve):
+            return (
+                f"not physical: the recording wants {name}.{key} beyond {parameter.value:.4g}, "
+                f"the end of its range from {declared.least:g} to {declared.most:g}"
+            )
+    return ""
+
+
+def _at_end(value: float, declared: Parameter, valve: ValveParameters) -> bool:
+    """Whether a value lies nearer to an end of the range than a fifth of any start that is not the end itself."""
+    starts = declared.starts_for(valve)
+    return any(
+        abs(value - end) < AT_END * min((abs(start - end) for start in starts if start != end), default=0.0)
+        for end in (declared.least, declared.most)
+    )

@@ -1,0 +1,174 @@
+"""The forward search by simulation: every effect of the library refitted in full, step by step.
+
+A step fits the valve with each effect added, all with the same effort. Before they are judged, the valve without is
+fitted once more from the base parameters of the best of those with: an optimiser's failure must not look like physics.
+Steps go on until the added model explains all, nothing more is accepted, or three effects are added.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+from config.errors import InputError
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from sim.effect import Effect
+from workbench.data.held_out import Split
+from workbench.fit.fitting import Fit, fit, profiled
+from workbench.fit.objective import NARROW, SimulationError
+from workbench.model.free_run import FreeRun
+from workbench.model.parameters import free_parameters
+from workbench.select.block_errors import block_errors
+from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
+from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
+from workbench.select.equivalence import classes, imitation
+from workbench.select.experiment import Experiment, experiment
+from workbench.select.forward_selection import MOST_ADDED, without_missing
+
+MOST_STEPS = 5
+"""Steps made at most: a step that is judged anew is followed by others."""
+BETTER = 0.999
+"""Factor on the cost at which a base fit counts as better than the one before."""
+LEFT_BEHIND = 1.0
+"""Of BIC: less is nothing."""
+
+Progress = Callable[[str, float], None]
+
+
+class EffectSearch:
+    """The forward search over one split recording, and what it holds on to."""
+
+    def __init__(
+        self,
+        split: Split,
+        library: Mapping[str, Effect],
+        *,
+        seed: int,
+        workers: int,
+        progress: Progress,
+    ) -> None:
+        self._split = split
+        self._library = library
+        self._seed = seed
+        self._workers = workers
+        self._progress = progress
+
+    def base(self, valve: ValveFile) -> EvaluatedModel:
+        """Fit a valve as it is, without intervals.
+
+        Raises:
+            InputError: the recording holds too little.
+        """
+        return self._evaluated(
+            fit(
+                self._split.train.recording,
+                valve,
+                seed=self._seed,
+                workers=self._workers,
+                profile=False,
+                progress=lambda done: self._progress("fitting the valve as it is", done),
+            )
+        )
+
+    def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
+        """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""
+        steps: list[EffectStep] = []
+        here = base
+        for _ in range(MOST_STEPS):
+            following = self._step(len(steps) + 1, here)
+            if steps:
+                steps[-1] = without_missing(steps[-1], following, self._library)
+            steps = self._judged_anew([*steps, following])
+            added = steps[-1].added
+            if added is None or added.model is None or added.model.explained or len(steps) == MOST_ADDED:
+                break
+            here = added.model
+        return tuple(steps)
+
+    def with_intervals(self, model: EvaluatedModel) -> EvaluatedModel:
+        """Return a model with the profile intervals of its parameters."""
+        return replace(model, fit=profiled(model.fit, self._split.train.recording))
+
+    def experiment(self, steps: Sequence[EffectStep]) -> Experiment | None:
+        """Choose the input for the first set with more than one class: one valve of each class."""
+        for step in steps:
+            fits = {each.name: each.model.fit for each in step.indistinguishable if each.model}
+            apart = [fits[min(each)] for each in classes(fits, self._library)]
+            if len(apart) > 1:
+                self._progress("choosing the experiment", 0.0)
+                record = self._split.judged.record
+                return experiment(apart, record, seed=self._seed, workers=self._workers)
+        return None
+
+    def _step(self, number: int, before: EvaluatedModel) -> EffectStep:
+        names = [name for name in self._library if name not in before.effects]
+        models = self._refitted(number, before, names)
+        before = self._base_from(before, [each for each in models.values() if isinstance(each, EvaluatedModel)])
+        # No effect makes a valve worse: what the base has left behind is refitted from it.
+        fitted = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
+        behind = [name for name, each in fitted.items() if log_likelihood_difference(before.fit, each) > LEFT_BEHIND]
+        models |= self._refitted(number, before, behind)
+        return judged_step(before, models, number, self._library)
+
+    def _judged_anew(self, steps: list[EffectStep]) -> list[EffectStep]:
+        """Judge an earlier step anew if what was added last does better in it than its own search had found.
+
+        A search that failed there is no reason to keep what was added in its place; all later steps are dropped then.
+        """
+        last = steps[-1].added
+        if last is None or last.model is None:
+            return steps
+        valve = last.model.fit.valve
+        for i, step in enumerate(steps[:-1]):
+            effects = (*step.before.fit.valve.effect, *(each for each in valve.effect if each.name == last.name))
+            alone = self.base(ValveFile(valve=valve.valve, effect=effects))
+            models = {each.name: each.model or each.rejection_reason for each in step.candidates}
+            tried = models[last.name]
+            if not isinstance(tried, EvaluatedModel) or log_likelihood_difference(alone.fit, tried.fit) > LEAST_BIC:
+                return [*steps[:i], judged_step(step.before, models | {last.name: alone}, i + 1, self._library)]
+        return steps
+
+    def _base_from(self, before: EvaluatedModel, models: Sequence[EvaluatedModel]) -> EvaluatedModel:
+        """Return the model before, fitted again where a search from a better one's parameters ends below it."""
+        better = [each.fit.valve for each in models if bic(before.fit) - bic(each.fit) > LEAST_BIC]
+        imitations = [each for each in map(imitation, better) if each]
+        valves = [*(each.valve for each in better), *imitations]
+        bare = [ValveFile(valve=valve, effect=before.fit.valve.effect) for valve in valves]
+        with ThreadPoolExecutor(self._workers) as pool:
+            costs = list(pool.map(partial(self._local_minimum, before.fit), bare))
+        if not costs or min(costs) > BETTER * before.fit.cost:
+            return before
+        return self.base(bare[costs.index(min(costs))])
+
+    def _local_minimum(self, base: Fit, valve: ValveFile) -> float:
+        """Return the cost at which a search from this valve's parameters ends."""
+        composition = Composition.from_file(valve)
+        run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure)
+        parameters = free_parameters(composition, tuple(base.parameters))
+        error = SimulationError(run, composition, parameters, composition.theta)
+        return error.cost(error.descended_at(NARROW, error.coordinates(composition.theta)))
+
+    def _refitted(self, number: int, before: EvaluatedModel, names: Sequence[str]) -> dict[str, EvaluatedModel | str]:
+        """Refit the named effects, each on one thread; where that is not possible, say why."""
+        train, here = self._split.train.recording, before.fit
+
+        def refitted(name: str) -> EvaluatedModel | str:
+            try:
+                found = fit(train, here.valve, effects=(name,), base=here, seed=self._seed, workers=1, profile=False)
+            except InputError as error:
+                return error.problem
+            return self._evaluated(found)
+
+        # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
+        dearest_first = sorted(names, key=lambda name: -len(self._library[name].parameters))
+        models: dict[str, EvaluatedModel | str] = {}
+        with ThreadPoolExecutor(self._workers) as pool:
+            for name, model in zip(dearest_first, pool.map(refitted, dearest_first), strict=True):
+                models[name] = model
+                self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
+        return {name: models[name] for name in names}
+
+    def _evaluated(self, found: Fit) -> EvaluatedModel:
+        errors = block_errors(found, self._split)
+        return EvaluatedModel(found, errors, errors.at_floor(self._split.floor_m))

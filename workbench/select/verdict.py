@@ -1,0 +1,34 @@
+"""The verdict of a diagnosis: what follows from the best model and the steps to it. Nothing is simulated here.
+
+adequate      nothing is missing: no effect is accepted, and the valve explains the record without
+missing       these effects, and with them all is explained
+one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
+unexplained   something is missing that the library does not have; what lowered the error so far is still named.
+              Or the valve scatters so much that a tenth of the motion is left, which no model could explain
+untrusted     the searches disagree, and the best of them explains nothing
+"""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from workbench.select.effect_candidates import EffectStep, EvaluatedModel
+
+Verdict = Literal["adequate", "missing", "one_of", "unexplained", "untrusted"]
+
+
+def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], moved_m: float) -> Verdict:
+    """Return the verdict.
+
+    Args:
+        best: the last model accepted, or the valve as it is.
+        steps: the forward steps made.
+        moved_m: standard deviation of the position that was fitted, m.
+    """
+    if best.explained and not best.errors.follows(moved_m):
+        return "unexplained"
+    added = [step for step in steps if step.added]
+    if best.explained and not added:
+        return "adequate"
+    if best.explained:
+        return "one_of" if any(len(step.indistinguishable) > 1 for step in added) else "missing"
+    return "unexplained" if best.fit.trusted else "untrusted"

@@ -1,0 +1,90 @@
+"""A verdict in a sentence: what is missing, by how much the error fell, and what would tell rivals apart."""
+
+from collections.abc import Mapping, Sequence
+
+from sim.effect import Effect
+from workbench.data.held_out import Split
+from workbench.select.block_errors import BlockErrors
+from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
+from workbench.select.equivalence import classes, told_apart
+from workbench.select.verdict import Verdict
+
+SCATTERS = 3.0
+"""Times the noise: a valve that repeats itself no better scatters."""
+REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
+
+
+def verdict_sentence(
+    verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
+) -> str:
+    """Return the verdict in one or a few sentences; lengths in mm."""
+    names = " and ".join(step.added.name for step in steps if step.added)
+    before, after = 1e3 * steps[0].before.errors.test_rmse_m, 1e3 * best.errors.test_rmse_m
+    fell = reduction_sentence(steps[0].before.errors, best.errors)
+    repeat = "" if parts.repeats else REPEAT
+    equivalent = steps[0].bare_equivalent
+    if verdict == "adequate" and equivalent and equivalent.model:
+        after = 1e3 * equivalent.model.errors.test_rmse_m
+        return (
+            f"No effect is missing, but a parameter that was kept is off: with {equivalent.name}, the bare valve by "
+            f"another name, the held-out error falls from {before:.3g} to {after:.3g} mm. Fit again with the mass free."
+        )
+    if verdict == "adequate":
+        said = f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
+        return said + _suspicion(steps[0].suspected) + _scatter(parts)
+    if verdict == "missing":
+        return f"Missing: {names}; {fell}, and nothing is left to explain."
+    if verdict == "one_of":
+        rivals = (tuple(each.name for each in step.indistinguishable) for step in steps)
+        return f"Missing: {names}, or another that does as well; {fell}." + "".join(
+            rivals_sentence(each, library) for each in rivals
+        )
+    begun = f" {names} explains a part: {fell}." if names else f" The held-out error is {after:.3g} mm."
+    if verdict == "unexplained":
+        return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
+    return f"Not to be trusted: the searches end at different errors.{begun}"
+
+
+def reduction_sentence(before: BlockErrors, after: BlockErrors) -> str:
+    """Say how the held-out error falls; where a narrowly mistimed slip outweighs all else, in a typical second."""
+    whole = f"from {1e3 * before.test_rmse_m:.3g} to {1e3 * after.test_rmse_m:.3g} mm"
+    if after.test_rmse_m < before.test_rmse_m:
+        return f"the held-out error falls {whole}"
+    typical = f"from {1e3 * before.test_block_m:.3g} to {1e3 * after.test_block_m:.3g} mm"
+    return (
+        f"the held-out error of a typical second falls {typical}, though a narrowly mistimed slip moves the rms {whole}"
+    )
+
+
+def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
+    """Say what would tell equally good effects apart, with a leading space; empty for fewer than two."""
+    if len(names) < 2:
+        return ""
+    texts = [
+        f" {name} or {other}: {told_apart(name, other, library) or 'no record of pressure and position tells'}."
+        for i, name in enumerate(names)
+        for other in names[i + 1 :]
+        if told_apart(name, other, library) or len(classes((name, other), library)) == 1
+    ]
+    return "".join(texts) or f" Equally good: {', '.join(names)}."
+
+
+def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
+    if not suspected:
+        return ""
+    best = max(suspected, key=lambda each: each.evidence)
+    return (
+        f" Suspected, not proved: {' or '.join(each.name for each in suspected)}; of {best.name}, "
+        f"{best.rejection_reason}. A longer recording would tell."
+    )
+
+
+def _scatter(parts: Split) -> str:
+    """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it."""
+    noise_m = max(each.record.noise_m for each in (parts.train, parts.judged))
+    if parts.floor_m < SCATTERS * noise_m:
+        return ""
+    return (
+        f" The valve itself scatters: a repeated command repeats the position to {1e3 * parts.floor_m:.3g} mm, where "
+        f"the sensor's noise is {1e3 * noise_m:.2g} mm. What makes the difference follows neither command nor position."
+    )
