@@ -12,9 +12,9 @@ from config.valve_file import EffectTable, load_valve, shipped_valve
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.estimation import Estimates, Identification, IdentificationSettings
 from positioner.estimation.algebraic import Identifier
-from positioner.estimation.batch import RecordSettings, identify
+from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.online import READINGS
-from positioner.estimation.refiner import InPlace, Job
+from positioner.estimation.refiner import InProcessRefiner, RefinementJob
 from positioner.estimation.weighted import CHAINS, ROWS, Feeds, kernel
 from positioner.paper import hardships, noise_table
 from sim.valve import Valve
@@ -256,12 +256,12 @@ def _latency() -> list[str]:
     rng = np.random.default_rng(0)
     t, x, u = seed_motion(PERIOD_S)
     process = RefinementProcess()
-    refiner = process.refiner(patient=True)
+    refiner = process.refiner(blocking=True)
     sleep(STARTED_S)  # a daemon's process is there long before a window closes
     times_ms = []
     for _ in range(2 * RUNS):
         measured = x + rng.normal(0, 1e-4 * SETTINGS.stroke_m, len(x))
-        job = Job(t, measured, u, RecordSettings(pressure_held=True))
+        job = RefinementJob(t, measured, u, BatchSettings(pressure_held=True))
         begin = perf_counter()
         refiner.submit(job)
         refiner.collect()
@@ -289,7 +289,7 @@ def _limits() -> list[str]:
         ("lag 0.3 s, command taken for it", (slow.time_s, slow.position_m, np.append(0.0, slow.command_pa[1:]))),
     ):
         t, x, u = columns
-        found = identify(t, x + rng.normal(0, 1e-4 * SETTINGS.stroke_m, len(x)), u, RecordSettings())
+        found = identify(t, x + rng.normal(0, 1e-4 * SETTINGS.stroke_m, len(x)), u, BatchSettings())
         said = ", ".join(
             f"{name} {getattr(found.estimates, name).reason.name}" for name in ("a", "b_over_c", "k_over_c")
         )
@@ -303,7 +303,7 @@ def _ageing() -> list[str]:
     valve = Valve.from_file(load_valve(shipped_valve("seed")))
     valve.rest_at(0.05)
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Identification(replace(SETTINGS, noise_std_m=None, pressure_pa=4e5), InPlace())
+    identification = Identification(replace(SETTINGS, noise_std_m=None, pressure_pa=4e5), InProcessRefiner())
     identification.restart()
     coulomb_n, static_n, spring, area = (-TRUE[5] * AREA, 1708.09, -TRUE[4] * AREA, AREA)
     errors = []

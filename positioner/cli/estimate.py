@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from config.recording import Recording
-    from positioner.estimation.batch import Recorded, RecordSettings
+    from positioner.estimation.batch import BatchResult, BatchSettings
 
 HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
 EXAMPLE = "positioner estimate rec.csv --json estimated.json"
@@ -48,23 +48,23 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if found.estimates.law_ready else 1
 
 
-def _pressure(recording: "Recording", arguments: argparse.Namespace) -> tuple[Any, "RecordSettings"]:
+def _pressure(recording: "Recording", arguments: argparse.Namespace) -> tuple[Any, "BatchSettings"]:
     """Return the measured pressure, or else the command: a row's is in force until the next row."""
     import numpy as np
 
-    from positioner.estimation.batch import RecordSettings
+    from positioner.estimation.batch import BatchSettings
 
     measured = recording.columns.get("pressure_pa")
     held = None if arguments.pressure is None else arguments.pressure == "held"
     if measured is not None and np.isfinite(measured).mean() > 0.5:
-        return measured, RecordSettings(noise_std_m=arguments.noise_m, pressure_held=held)
+        return measured, BatchSettings(noise_std_m=arguments.noise_m, pressure_held=held)
     command = recording.command_pa
     ahead = np.append(command[:1], command[:-1])
-    return ahead, RecordSettings(noise_std_m=arguments.noise_m, pressure_held=True if held is None else held)
+    return ahead, BatchSettings(noise_std_m=arguments.noise_m, pressure_held=True if held is None else held)
 
 
-def _lines(path: Path, found: "Recorded", samples: int) -> list[str]:
-    lines = [f"{path}: {samples} samples, {found.stretches} motions fitted, {found.left_out} left out"]
+def _lines(path: Path, found: "BatchResult", samples: int) -> list[str]:
+    lines = [f"{path}: {samples} samples, {found.segments} motions fitted, {found.left_out} left out"]
     stamps = "; time stamps jitter: samples taken as even" if found.evened else ""
     lines.append(f"  noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples{stamps}")
     lines.append(f"  {'':10}{'value':>14}{'std':>12}  {'unit':12}")
@@ -81,7 +81,7 @@ def _lines(path: Path, found: "Recorded", samples: int) -> list[str]:
     return [line.rstrip() for line in lines]
 
 
-def as_json(found: "Recorded") -> dict[str, object]:
+def as_json(found: "BatchResult") -> dict[str, object]:
     """Return the numbers: per name value, std, valid and reason; null where there is none."""
     numbers: dict[str, object] = {name: _one(getattr(found.estimates, name)) for name in UNITS}
     return numbers | {
@@ -91,7 +91,7 @@ def as_json(found: "Recorded") -> dict[str, object]:
         "condition": _finite(found.condition),
         "pressure": found.pressure,
         "time_stamps_evened": found.evened,
-        "motions": found.stretches,
+        "motions": found.segments,
         "left_out": found.left_out,
     }
 

@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     last = snapshots[-1].decision
     ratios = last.applied.ratios
     if ratios is None:
-        raise Unfulfilled(f"{arguments.valve}: not identified, so not controlled: {last.applied.refused.text}")
+        raise Unfulfilled(f"{arguments.valve}: not identified, so not controlled: {last.applied.last_refusal.text}")
     print(f"identified b/c = {ratios.b_over_c:.6g} Pa/m, k/c = {ratios.k_over_c:.6g} Pa")
     print(f"{arguments.out}: {len(snapshots)} samples")
     return 0

@@ -109,7 +109,7 @@ def _tell(decision: Decision) -> None:
         why=decision.inhibit_reason.name,
         command_pa=decision.command_pa,
         identifications=decision.applied.count,
-        refusal=decision.applied.refused.name,
+        refusal=decision.applied.last_refusal.name,
         singly=decision.estimates.b.reason.name,
     )
 

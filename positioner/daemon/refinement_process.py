@@ -22,8 +22,8 @@ from typing import IO, cast
 import numpy as np
 
 from positioner.daemon.logs import say
-from positioner.estimation.batch import Recorded, RecordSettings
-from positioner.estimation.refiner import Job
+from positioner.estimation.batch import BatchResult, BatchSettings
+from positioner.estimation.refiner import RefinementJob
 
 log = logging.getLogger(__name__)
 
@@ -38,14 +38,14 @@ class RefinementProcess:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        self._jobs: SimpleQueue[tuple[ProcessRefiner, Job] | None] = SimpleQueue()
+        self._jobs: SimpleQueue[tuple[ProcessRefiner, RefinementJob] | None] = SimpleQueue()
         self.alive = True
         self._thread = Thread(target=self._serve, name="refinement", daemon=True)
         self._thread.start()
 
-    def refiner(self, *, patient: bool = False) -> "ProcessRefiner":
+    def refiner(self, *, blocking: bool = False) -> "ProcessRefiner":
         """Return a side for one valve; a patient one waits for its results, as a device in lockstep does."""
-        return ProcessRefiner(self, patient=patient)
+        return ProcessRefiner(self, blocking=blocking)
 
     def stop(self) -> None:
         """End the process."""
@@ -60,7 +60,7 @@ class RefinementProcess:
             self._process.kill()
             self._process.wait()
 
-    def put(self, refiner: "ProcessRefiner", job: Job) -> None:
+    def put(self, refiner: "ProcessRefiner", job: RefinementJob) -> None:
         """Queue a job."""
         self._jobs.put((refiner, job))
 
@@ -85,23 +85,23 @@ class RefinementProcess:
                 try:
                     pickle.dump(job, down)
                     down.flush()
-                    result: Recorded | None = pickle.load(up)
+                    result: BatchResult | None = pickle.load(up)
                 except (OSError, EOFError, pickle.UnpicklingError) as error:
                     self.alive = False
                     result = None
                     say(log, logging.ERROR, "the refinement process is gone", reason=str(error))
-                refiner.give(result)
+                refiner.deliver(result)
                 task = self._jobs.get()
 
 
 class ProcessRefiner:
     """One valve's side: a `Refiner`."""
 
-    def __init__(self, process: RefinementProcess, *, patient: bool) -> None:
+    def __init__(self, process: RefinementProcess, *, blocking: bool) -> None:
         self._process = process
-        self._patient = patient
-        self._there = Event()
-        self._result: Recorded | None = None
+        self._blocking = blocking
+        self._ready = Event()
+        self._result: BatchResult | None = None
         self._pending = False
 
     @property
@@ -109,29 +109,29 @@ class ProcessRefiner:
         """Whether a result is still to come."""
         return self._pending
 
-    def submit(self, job: Job) -> bool:
+    def submit(self, job: RefinementJob) -> bool:
         """Send a job; False when one is under way or the process is gone."""
         if self._pending or not self._process.alive:
             return False
-        self._there.clear()
+        self._ready.clear()
         self._pending = True
         self._process.put(self, job)
         return True
 
-    def collect(self) -> Recorded | None:
+    def collect(self) -> BatchResult | None:
         """Return the result, once."""
         if not self._pending:
             return None
-        if not (self._there.wait(LONGEST_WAIT_S) if self._patient else self._there.is_set()):
+        if not (self._ready.wait(LONGEST_WAIT_S) if self._blocking else self._ready.is_set()):
             return None
         result, self._result = self._result, None
         self._pending = False
         return result
 
-    def give(self, result: Recorded | None) -> None:
+    def deliver(self, result: BatchResult | None) -> None:
         """Take a result from the process; None when there will be none."""
         self._result = result
-        self._there.set()
+        self._ready.set()
 
 
 def _warm_up() -> None:
@@ -139,7 +139,7 @@ def _warm_up() -> None:
     time_s = np.arange(0.0, 0.2, 1e-3)
     pressure_pa = np.where(time_s > 0.05, 1.0, 0.0)
     moved = np.maximum(time_s - 0.05, 0.0)
-    Job(time_s, moved**2, pressure_pa, RecordSettings(noise_std_m=1e-5, pressure_held=True)).done()
+    RefinementJob(time_s, moved**2, pressure_pa, BatchSettings(noise_std_m=1e-5, pressure_held=True)).run()
 
 
 def _work() -> None:
@@ -149,12 +149,12 @@ def _work() -> None:
     down, up = sys.stdin.buffer, sys.stdout.buffer
     while True:
         try:
-            job: Job = pickle.load(down)
+            job: RefinementJob = pickle.load(down)
         except EOFError:
             return
-        result: Recorded | None
+        result: BatchResult | None
         try:
-            result = job.done()
+            result = job.run()
         except (ArithmeticError, ValueError) as error:  # numpy.linalg.LinAlgError is a ValueError
             print(f"refinement failed: {error}", file=sys.stderr)
             result = None

@@ -122,7 +122,7 @@ def _assembled(
     else:
         _require_plausible(reading, held_pa, settings, where)
     recorder = _recorder(file, source)
-    controller = Controller(settings, held_pa, refinement.refiner(patient=file.cycle.pace == "device"))
+    controller = Controller(settings, held_pa, refinement.refiner(blocking=file.cycle.pace == "device"))
     kept = None if file.health.folder is None else Kept.in_folder(source.parent / file.health.folder, file.valve.name)
     health = Health(HealthSettings.of(file.health, file.valve.stroke_m), kept.record if kept else None)
     with about(file.valve.name):

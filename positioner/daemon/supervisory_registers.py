@@ -250,7 +250,7 @@ def _estimate_getters() -> dict[str, Getter]:
         "k_over_c_applied": lambda s, _: r.k_over_c if (r := s.decision.applied.ratios) else math.nan,
         "identifications": lambda s, _: s.decision.applied.count & 0xFFFF,
         "refusals": lambda s, _: s.decision.applied.refusals & 0xFFFF,
-        "refusal": lambda s, _: s.decision.applied.refused,
+        "refusal": lambda s, _: s.decision.applied.last_refusal,
     }
     for name in (*ESTIMATED, "breakaway"):
         getters |= _estimate_getters_of(name)

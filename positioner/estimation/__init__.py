@@ -1,8 +1,7 @@
 """Estimation: what the valve's parameters and its friction are, from the samples of its motion.
 
-`Identification` takes a sample and gives `Estimates`; `accept` decides which of them are applied. Behind it, one idea
-a file: the algebraic `identifier` and its `solution`, the `derivatives` as FIR filters, `motion`, `friction`, and the
-`judgement` of what came out. Needs numpy only; time comes in with the samples.
+`Identification` takes a sample and gives `Estimates`; `accept` decides which of them are applied. Needs numpy only;
+time comes in with the samples.
 """
 
 from config.codes import Refusal

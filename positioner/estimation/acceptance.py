@@ -31,24 +31,24 @@ class Applied:
         ratios: in use; None before the first identification.
         count: how many identifications were accepted.
         refusals: how many were refused.
-        refused: why the last identification was refused; `Refusal.VALID` when it was accepted.
+        last_refusal: why the last identification was refused; `Refusal.VALID` when it was accepted.
     """
 
     ratios: Ratios | None = None
     count: int = 0
     refusals: int = 0
-    refused: Refusal = Refusal.NOT_STARTED
+    last_refusal: Refusal = Refusal.NOT_STARTED
 
 
 def accept(applied: Applied, estimated: Estimates) -> Applied:
     """Return what is applied after an identification: its numbers, or those in use and why."""
-    reason = _why_not(applied.ratios, estimated)
+    reason = _refusal(applied.ratios, estimated)
     if reason is not Refusal.VALID:
-        return replace(applied, refusals=applied.refusals + 1, refused=reason)
+        return replace(applied, refusals=applied.refusals + 1, last_refusal=reason)
     return Applied(_ratios(applied.ratios, estimated), applied.count + 1, applied.refusals, Refusal.VALID)
 
 
-def _why_not(ratios: Ratios | None, estimated: Estimates) -> Refusal:
+def _refusal(ratios: Ratios | None, estimated: Estimates) -> Refusal:
     slope, friction = estimated.b_over_c, estimated.k_over_c
     for each in (slope, friction):
         if not (each.valid or each.reason is Refusal.NOT_ASKED):
@@ -58,12 +58,12 @@ def _why_not(ratios: Ratios | None, estimated: Estimates) -> Refusal:
     if ratios is None:
         missing = slope if not slope.valid else friction
         return missing.reason
-    if _far(slope, ratios.b_over_c) or _far(friction, ratios.k_over_c):
+    if _changes_implausibly(slope, ratios.b_over_c) or _changes_implausibly(friction, ratios.k_over_c):
         return Refusal.IMPLAUSIBLE_CHANGE
     return Refusal.VALID
 
 
-def _far(new: Estimate, in_use: float) -> bool:
+def _changes_implausibly(new: Estimate, in_use: float) -> bool:
     return new.valid and not 1 / LARGEST_CHANGE <= new.value / in_use <= LARGEST_CHANGE
 
 

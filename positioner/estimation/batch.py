@@ -1,4 +1,4 @@
-"""Identification from a whole record at once: cut it into motions, fit them by maximum likelihood, judge the result.
+"""Identification from a whole record at once: find its motions, fit them by maximum likelihood, check the result.
 
 The daemon's refinement and `positioner estimate` are this one function. What is not known is not guessed:
 
@@ -15,9 +15,9 @@ The daemon's refinement and `positioner estimate` are this one function. What is
 - where no jump of the pressure begins a motion, its first milliseconds are the drop from F_s to F_c, whose course the
   model leaves out. The mass must then be identifiable from what follows after five of the stem's time constants.
 
-Break-away: F_s/A lies between the largest force at which the stem was seen to rest and the force at which it left,
+Break-away: F_s/A lies between the largest force at which the stem rested and the force at which it left,
 both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
-their intervals share (`breaking_away`).
+their intervals share (`breakaway_force`).
 """
 
 from dataclasses import dataclass, replace
@@ -28,13 +28,12 @@ import numpy as np
 
 from config.codes import Refusal
 from positioner.estimation.array import Array
-from positioner.estimation.breakaway_force import between, narrowed
-from positioner.estimation.breakaway_force import judged as judged_breakaway
-from positioner.estimation.estimates import Estimate, Estimates, no_estimates, none
-from positioner.estimation.likelihood import CLEAR, Fit, Prior, refine
+from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
+from positioner.estimation.estimates import Estimate, Estimates, no_estimate, no_estimates
+from positioner.estimation.likelihood import CLEAR, LikelihoodFit, Prior, fit_motions
+from positioner.estimation.motion_segment import MotionSegment
 from positioner.estimation.running_noise import PositionNoise
-from positioner.estimation.segmentation import Cut, cut
-from positioner.estimation.stretch import Stretch
+from positioner.estimation.segmentation import Segmentation, find_motions
 
 MOST_STRETCHES = 8
 """The farthest motions of a record are fitted together; more add little and cost much."""
@@ -49,14 +48,14 @@ SETTLED = 5.0
 FEWEST_LATER = 12
 LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
 """Of time stamps about an even grid, shares of the period, between which they may be those of samples taken evenly."""
-SEEN_WITHIN = 3
-"""Samples after which a stem that left its rest is seen to have."""
+DETECTED_WITHIN = 3
+"""Samples after which a stem that left its rest has measurably done so."""
 LEAST_MISFIT = 2e-4
 """Share of the travel below which residuals are no misfit worth the name."""
 
 
 @dataclass(frozen=True, slots=True)
-class RecordSettings:
+class BatchSettings:
     """How a record is identified.
 
     Attributes:
@@ -75,8 +74,8 @@ class RecordSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
-    """What a record says.
+class BatchResult:
+    """Result of the identification from a record.
 
     Attributes:
         estimates: with standard deviations and reasons.
@@ -84,23 +83,24 @@ class Recorded:
         pressure: how it was taken between the samples: "held", "held ahead" or "linear".
         evened: whether the time stamps were taken to jitter about samples taken evenly.
         noise_std_m: of the position, as given or measured.
-        stretches: motions fitted, and how many were seen but cut out.
+        segments: how many motions were fitted.
+        left_out: how many were found and not fitted.
         condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
     """
 
     estimates: Estimates
-    fit: Fit | None
+    fit: LikelihoodFit | None
     pressure: str
     evened: bool
     noise_std_m: float
-    stretches: int
+    segments: int
     left_out: int
     condition: float
 
 
 def identify(
-    time_s: Array, position_m: Array, pressure_pa: Array, settings: RecordSettings, prior: Prior | None = None
-) -> Recorded:
+    time_s: Array, position_m: Array, pressure_pa: Array, settings: BatchSettings, prior: Prior | None = None
+) -> BatchResult:
     """Identify the valve from a record.
 
     Args:
@@ -118,30 +118,35 @@ def identify(
             noise_std_m = _resolution_m(x) / sqrt(12)
     else:
         noise_std_m = settings.noise_std_m
-    tries = [_fitted(t, x, shown, u_taken, noise_std_m, settings, prior) for shown, u_taken in _taken(u, settings)]
-    best = min(tries, key=_misses_m)
-    even_s = evened(t) if best.fit is not None else None
+    hypotheses = [
+        _fitted(t, x, interpolation, pressures, noise_std_m, settings, prior)
+        for interpolation, pressures in _interpolations(u, settings)
+    ]
+    best = min(hypotheses, key=_residual_m)
+    even_s = even_instants(t) if best.fit is not None else None
     if even_s is not None and best.fit is not None:
-        again = _fitted(even_s, x, best.shown, best.pressure_pa, noise_std_m, settings, prior, near=best.fit.p[:2])
-        best = min((best, replace(again, evened=True)), key=_misses_m)
+        again = _fitted(
+            even_s, x, best.interpolation, best.pressure_pa, noise_std_m, settings, prior, near=best.fit.p[:2]
+        )
+        best = min((best, replace(again, evened=True)), key=_residual_m)
     if best.fit is None:
-        reason = Refusal.WAITING_FOR_MOTION if best.cut.moving_share == 0 else Refusal.WINDOW_TOO_SHORT
+        reason = Refusal.WAITING_FOR_MOTION if best.segmentation.moving_share == 0 else Refusal.WINDOW_TOO_SHORT
         nothing = no_estimates(reason)
-        return Recorded(nothing, None, best.shown, False, noise_std_m, 0, best.cut.too_short, nan)
-    estimates = _judged(best, noise_std_m, settings, float(t[-1]))
-    return Recorded(
+        return BatchResult(nothing, None, best.interpolation, False, noise_std_m, 0, best.segmentation.too_short, nan)
+    estimates = _estimates(best, noise_std_m, settings, float(t[-1]))
+    return BatchResult(
         estimates=replace(estimates, breakaway=_breakaway(best, estimates, settings.largest_relative_std)),
         fit=best.fit,
-        pressure=best.shown,
+        pressure=best.interpolation,
         evened=best.evened,
         noise_std_m=noise_std_m,
-        stretches=len(best.chosen),
-        left_out=best.cut.too_short + len(best.cut.stretches) - len(best.chosen),
+        segments=len(best.chosen),
+        left_out=best.segmentation.too_short + len(best.segmentation.segments) - len(best.chosen),
         condition=condition(best.fit),
     )
 
 
-def evened(time_s: Array) -> Array | None:
+def even_instants(time_s: Array) -> Array | None:
     """Return the even instants about which time stamps jitter; None when they do not, or are not even at all.
 
     Samples that are missing leave their instants out.
@@ -173,7 +178,7 @@ def _resolution_m(position_m: Array) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _taken(pressure_pa: Array, settings: RecordSettings) -> list[tuple[str, Array]]:
+def _interpolations(pressure_pa: Array, settings: BatchSettings) -> list[tuple[str, Array]]:
     """Return the ways in which the pressure may go between the samples, each with the pressures that say so."""
     if settings.pressure_held is not None:
         return [("held" if settings.pressure_held else "linear", pressure_pa)]
@@ -182,54 +187,56 @@ def _taken(pressure_pa: Array, settings: RecordSettings) -> list[tuple[str, Arra
 
 
 @dataclass(frozen=True, slots=True)
-class _Try:
-    shown: str
+class _Hypothesis:
+    """A fit under one assumption on the pressure between the samples, and on the time stamps."""
+
+    interpolation: str
     pressure_pa: Array
-    cut: Cut
-    chosen: tuple[Stretch, ...]
-    fit: Fit | None
+    segmentation: Segmentation
+    chosen: tuple[MotionSegment, ...]
+    fit: LikelihoodFit | None
     evened: bool = False
 
 
-def _misses_m(each: _Try) -> float:
+def _residual_m(each: _Hypothesis) -> float:
     return each.fit.residual_std_m if each.fit is not None else float("inf")
 
 
-def _misfits(each: _Try, noise_std_m: float) -> bool:
-    """Whether the residuals are more than the sensor's noise."""
+def _does_not_fit(each: _Hypothesis, noise_std_m: float) -> bool:
+    """Return whether the residuals are more than the sensor's noise."""
     if each.fit is None:
         return False
-    travel_m = max(float(np.ptp(stretch.position_m)) for stretch in each.chosen)
+    travel_m = max(float(np.ptp(segment.position_m)) for segment in each.chosen)
     return each.fit.residual_std_m > max(MISFIT * noise_std_m, LEAST_MISFIT * travel_m)
 
 
 def _fitted(
     t: Array,
     x: Array,
-    shown: str,
+    interpolation: str,
     u: Array,
     noise_std_m: float,
-    settings: RecordSettings,
+    settings: BatchSettings,
     prior: Prior | None,
     near: Array | None = None,
-) -> _Try:
-    found = cut(t, x, u, noise_std_m, settings.moving_threshold_m_per_s)
-    chosen = _farthest(found.stretches)
-    fit = refine(list(chosen), held=shown != "linear", prior=prior, near=near) if chosen else None
-    return _Try(shown, u, found, chosen, fit)
+) -> _Hypothesis:
+    found = find_motions(t, x, u, noise_std_m, settings.moving_threshold_m_per_s)
+    chosen = _longest_motions(found.segments)
+    fit = fit_motions(list(chosen), held=interpolation != "linear", prior=prior, near=near) if chosen else None
+    return _Hypothesis(interpolation, u, found, chosen, fit)
 
 
-def _farthest(stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+def _longest_motions(segments: tuple[MotionSegment, ...]) -> tuple[MotionSegment, ...]:
     """Return the motions that go farthest, in order of time; both directions where there are both."""
-    order = sorted(range(len(stretches)), key=lambda each: -float(np.ptp(stretches[each].position_m)))
+    order = sorted(range(len(segments)), key=lambda each: -float(np.ptp(segments[each].position_m)))
     chosen = order[:MOST_STRETCHES]
-    other = [each for each in order if stretches[each].direction != stretches[order[0]].direction] if order else []
+    other = [each for each in order if segments[each].direction != segments[order[0]].direction] if order else []
     if other and not set(other) & set(chosen):
         chosen = [*chosen[:-1], other[0]]
-    return tuple(stretches[each] for each in sorted(chosen))
+    return tuple(segments[each] for each in sorted(chosen))
 
 
-def condition(fit: Fit) -> float:
+def condition(fit: LikelihoodFit) -> float:
     """Return the condition of the information about (ln τ, ln μ, ln g, ln q), its diagonal scaled to 1."""
     std = np.sqrt(np.diag(fit.covariance))
     if not np.isfinite(std).all() or not std.all():
@@ -238,13 +245,13 @@ def condition(fit: Fit) -> float:
     return float(sizes[0] / sizes[-1]) if sizes[-1] > 0 else float("inf")
 
 
-def _judged(best: _Try, noise_std_m: float, settings: RecordSettings, time_s: float) -> Estimates:
-    """Return the estimates of a fit, each valid or not and why."""
+def _estimates(best: _Hypothesis, noise_std_m: float, settings: BatchSettings, time_s: float) -> Estimates:
+    """Return the estimates of a fit, each valid or with the reason why not."""
     assert best.fit is not None
     fit = _widened(best.fit, settings)
     values, std = fit.theta.tolist(), np.sqrt(np.abs(np.diag(fit.theta_covariance))).tolist()
-    singly = _why_not_singly(best, fit, settings.largest_relative_std)
-    together = Refusal.MODEL_DOES_NOT_FIT if _misfits(best, noise_std_m) else Refusal.VALID
+    singly = _refusal_of_each(best, fit, settings.largest_relative_std)
+    together = Refusal.MODEL_DOES_NOT_FIT if _does_not_fit(best, noise_std_m) else Refusal.VALID
     unphysical = (
         values[0] > 0 and Refusal.A_POSITIVE,
         values[1] >= 0 and Refusal.B_NOT_NEGATIVE,
@@ -265,7 +272,7 @@ def _judged(best: _Try, noise_std_m: float, settings: RecordSettings, time_s: fl
     return Estimates(a, b, c, k, b_over_c, k_over_c, progress=1.0, time_s=time_s)
 
 
-def _widened(fit: Fit, settings: RecordSettings) -> Fit:
+def _widened(fit: LikelihoodFit, settings: BatchSettings) -> LikelihoodFit:
     """Return the fit with the covariance that correlated residuals and noise of the pressure leave."""
     factor = 1.0
     if fit.correlation > SIGNIFICANT:
@@ -276,16 +283,16 @@ def _widened(fit: Fit, settings: RecordSettings) -> Fit:
     return replace(fit, covariance=fit.covariance * factor)
 
 
-def _why_not_singly(best: _Try, fit: Fit, largest: float) -> Refusal:
-    if fit.jumps == 0 and not _mass_shows_later(best, fit, largest):
+def _refusal_of_each(best: _Hypothesis, fit: LikelihoodFit, largest: float) -> Refusal:
+    if fit.jumps == 0 and not _mass_identifiable_later(best, fit, largest):
         return Refusal.MASS_NOT_IDENTIFIABLE
     if fit.leverage > LARGEST_LEVERAGE or not float(fit.covariance[1, 1]) ** 0.5 <= largest:
         return Refusal.MASS_NOT_IDENTIFIABLE
     return Refusal.VALID
 
 
-def _mass_shows_later(best: _Try, fit: Fit, largest: float) -> bool:
-    """Whether ln μ is known well enough without the first five time constants of every motion."""
+def _mass_identifiable_later(best: _Hypothesis, fit: LikelihoodFit, largest: float) -> bool:
+    """Return whether ln μ is known well enough without the first five time constants of every motion."""
     settled_s = SETTLED * float(np.exp(max(fit.p[0], fit.p[1] / 2)))
     later = []
     for each in best.chosen:
@@ -293,34 +300,36 @@ def _mass_shows_later(best: _Try, fit: Fit, largest: float) -> bool:
         if len(each.time_s) - first >= FEWEST_LATER:
             rows = slice(first, None)
             time_s, position_m, pressure_pa = each.time_s[rows], each.position_m[rows], each.pressure_pa[rows]
-            later.append(Stretch(each.direction, time_s, position_m, pressure_pa, begins=0, earliest=0, rests_from=0))
-    again = refine(later, held=best.shown != "linear", guess=fit.p[:2]) if later else None
+            later.append(
+                MotionSegment(each.direction, time_s, position_m, pressure_pa, begins=0, earliest=0, rests_from=0)
+            )
+    again = fit_motions(later, held=best.interpolation != "linear", guess=fit.p[:2]) if later else None
     return again is not None and float(again.covariance[1, 1]) ** 0.5 <= largest
 
 
-def _breakaway(best: _Try, estimates: Estimates, largest: float) -> Estimate:
+def _breakaway(best: _Hypothesis, estimates: Estimates, largest: float) -> Estimate:
     """Return F_s/A from the rests and what ended them."""
     if not estimates.b_over_c.valid:
-        return none(estimates.b_over_c.reason)
+        return no_estimate(estimates.b_over_c.reason)
     slope, slope_std = estimates.b_over_c.value, estimates.b_over_c.std
     bounds = []
-    for stretch in best.chosen:
-        if stretch.begins == 0:
+    for segment in best.chosen:
+        if segment.begins == 0:
             continue
-        i = stretch.begins
-        rest_m = float(stretch.position_m[:i].mean())
-        force_pa = stretch.direction * (stretch.pressure_pa + slope * rest_m)
-        steps = np.diff(force_pa[stretch.earliest : i + 3])
-        jump = stretch.earliest + int(steps.argmax())
+        i = segment.begins
+        rest_m = float(segment.position_m[:i].mean())
+        force_pa = segment.direction * (segment.pressure_pa + slope * rest_m)
+        steps = np.diff(force_pa[segment.earliest : i + 3])
+        jump = segment.earliest + int(steps.argmax())
         others = np.delete(steps, steps.argmax())
         if len(others) and others.max() > CLEAR * steps.max():  # a ramp: the stem left within a few samples
-            low, high = i - SEEN_WITHIN, i + 1
+            low, high = i - DETECTED_WITHIN, i + 1
         else:
             low, high = jump, jump + 1
         bounds.append((float(force_pa[: max(0, low) + 1].max()), float(force_pa[high]), slope_std * abs(rest_m)))
     least_pa = -estimates.k_over_c.value if estimates.k_over_c.valid else 0.0
     events = [(max(low, least_pa), high, std) for low, high, std in bounds if high > max(low, least_pa)]
     if not events:
-        return none(Refusal.WAITING_FOR_MOTION)
-    together = reduce(narrowed, (between(low, high, std) for low, high, std in events))
-    return judged_breakaway(together, largest)
+        return no_estimate(Refusal.WAITING_FOR_MOTION)
+    together = reduce(intersection, (from_interval(low, high, std) for low, high, std in events))
+    return with_validity(together, largest)

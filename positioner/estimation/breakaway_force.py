@@ -1,12 +1,12 @@
 """Static friction from where the stem broke away: an event leaves an interval, and events together what they share.
 
-F_s/A lies between the largest force under which the stem was seen to rest, l, and the one under which it left, h.
+F_s/A lies between the largest force under which the stem rested, l, and the one under which it left, h.
 Evenly likely in between, it is (l + h)/2 with the standard deviation (h - l)/sqrt(12); so a value and its deviation say
 the interval, value -+ sqrt(3) std. A mean of events would not do: pressures that always jump far beyond would
 agree with each other, and on nothing that is true. Intervals that share nothing, as the friction or the sensors vary,
 leave what lies between them.
 
-Between two events the friction may have walked, as in `moves`: the interval widens.
+Between two events the friction may have walked, as in `passive`: the interval widens.
 """
 
 from math import hypot, isfinite, sqrt
@@ -18,28 +18,28 @@ WALK_PER_SQRT_S = 3e-3
 """Share of F_s by which it walks in a second, as the standard deviation."""
 
 
-def between(low_pa: float, high_pa: float, std_pa: float = 0.0) -> Estimate:
+def from_interval(low_pa: float, high_pa: float, std_pa: float = 0.0) -> Estimate:
     """Return F_s/A of an interval whose ends are known to a standard deviation."""
     return Estimate((low_pa + high_pa) / 2, hypot((high_pa - low_pa) / sqrt(12), std_pa), Refusal.VALID)
 
 
-def narrowed(one: Estimate, other: Estimate) -> Estimate:
-    """Return what two events say together."""
+def intersection(one: Estimate, other: Estimate) -> Estimate:
+    """Return what two events leave: the intersection of their intervals, or what lies between them."""
     low = max(each.value - sqrt(3) * each.std for each in (one, other))
     high = min(each.value + sqrt(3) * each.std for each in (one, other))
-    return between(min(low, high), max(low, high))
+    return from_interval(min(low, high), max(low, high))
 
 
-def followed(before: Estimate, event: Estimate, elapsed_s: float) -> Estimate:
+def after_event(before: Estimate, event: Estimate, elapsed_s: float) -> Estimate:
     """Return what is known after an event, some time after what was known before; either may be no number."""
     if not isfinite(before.value):
         return event
     aged = Estimate(before.value, hypot(before.std, WALK_PER_SQRT_S * before.value * sqrt(elapsed_s)), Refusal.VALID)
-    return narrowed(aged, event) if isfinite(event.value) else aged
+    return intersection(aged, event) if isfinite(event.value) else aged
 
 
-def judged(estimate: Estimate, largest_relative_std: float) -> Estimate:
-    """Return the estimate, valid or too uncertain."""
+def with_validity(estimate: Estimate, largest_relative_std: float) -> Estimate:
+    """Return the estimate with its reason: valid or too uncertain."""
     if not isfinite(estimate.value):
         return estimate
     known = estimate.std <= largest_relative_std * estimate.value

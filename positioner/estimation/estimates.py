@@ -1,4 +1,4 @@
-"""What the identification hands on: each value with its standard deviation, and valid or why not."""
+"""What the identification hands on: each value with its standard deviation, and the reason if it is not valid."""
 
 from dataclasses import dataclass, replace
 from math import nan
@@ -20,13 +20,13 @@ class Estimate:
         return self.reason is Refusal.VALID
 
 
-def none(reason: Refusal) -> Estimate:
-    """Return the estimate of which only is known why there is none."""
+def no_estimate(reason: Refusal) -> Estimate:
+    """Return an estimate without a value, for a reason."""
     return Estimate(nan, nan, reason)
 
 
-NO_BREAKAWAY = none(Refusal.WAITING_FOR_MOTION)
-"""Nothing has been seen to break away yet."""
+NO_BREAKAWAY = no_estimate(Refusal.WAITING_FOR_MOTION)
+"""No break-away measured yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +62,14 @@ class Estimates:
 
     def only(self, *, parameters: bool, friction: bool) -> "Estimates":
         """Return what was asked for: a, b, c and b/c; k and k/c."""
-        unasked = none(Refusal.NOT_ASKED)
+        unasked = no_estimate(Refusal.NOT_ASKED)
         kept = self
         if not parameters:
             kept = replace(kept, a=unasked, b=unasked, c=unasked, b_over_c=unasked)
         return kept if friction else replace(kept, k=unasked, k_over_c=unasked)
 
     @property
-    def doubt(self) -> float:
+    def relative_variance(self) -> float:
         """Sum of the variances, relative, of the numbers of the control law that were asked for."""
         asked = [each for each in (self.b_over_c, self.k_over_c) if each.reason is not Refusal.NOT_ASKED]
         return sum((each.std / each.value) ** 2 for each in asked)
@@ -82,6 +82,6 @@ class Estimates:
 
 
 def no_estimates(reason: Refusal) -> Estimates:
-    """Return estimates of which only is known why there are none."""
-    nothing = none(reason)
+    """Return estimates without values, for a reason."""
+    nothing = no_estimate(reason)
     return Estimates(nothing, nothing, nothing, nothing, nothing, nothing, progress=0.0, time_s=nan, breakaway=nothing)

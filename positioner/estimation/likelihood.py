@@ -23,8 +23,8 @@ from math import exp, log
 import numpy as np
 
 from positioner.estimation.array import Array
+from positioner.estimation.motion_segment import MotionSegment
 from positioner.estimation.stem_response import responses
-from positioner.estimation.stretch import Stretch
 
 MOST_ROWS = 8000
 """A longer motion is averaged in blocks. A block of length T_b shifts μ by T_b^2/24: with 8000 of them nothing."""
@@ -60,7 +60,7 @@ class Prior:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class LikelihoodFit:
     """The most likely parameters.
 
     Attributes:
@@ -147,14 +147,14 @@ class FreeStart:
         return replace(motion, time_s=time_s)
 
 
-def refine(
-    stretches: list[Stretch],
+def fit_motions(
+    segments: list[MotionSegment],
     *,
     held: bool,
     guess: Array | None = None,
     prior: Prior | None = None,
     near: Array | None = None,
-) -> Fit | None:
+) -> LikelihoodFit | None:
     """Fit all stretches together.
 
     Args:
@@ -167,38 +167,38 @@ def refine(
     Returns:
         The fit; None when the samples are fewer than the unknowns, or carry no motion.
     """
-    motions = [_ready(each, _jump(each, held), held) for each in stretches]
+    motions = [_ready(each, _jump(each, held), held) for each in segments]
     if sum(len(each.position_m) for each in motions) < 6 + 2 * len(motions):
         return None
     start = near if near is not None else _searched(motions, guess, prior)
     if start is None:
         return None
-    placed = [_in_a_gap(each, motion, start) for each, motion in zip(stretches, motions, strict=True)]
+    placed = [_in_a_gap(each, motion, start) for each, motion in zip(segments, motions, strict=True)]
     p = np.append(start, [each.free_start.expected for each in placed if each.free_start is not None])
     return _judged(placed, _settled(placed, p, prior), prior)
 
 
-def _jump(stretch: Stretch, held: bool) -> int | None:
+def _jump(segment: MotionSegment, held: bool) -> int | None:
     """Return the sample after which the pressure's jump set the stem in motion; None when no one jump stands out."""
-    if stretch.begins == 0 or not held:
+    if segment.begins == 0 or not held:
         return None
-    around = slice(stretch.earliest, stretch.begins + 3)
-    jumps = np.abs(np.diff(stretch.pressure_pa[around]))
+    around = slice(segment.earliest, segment.begins + 3)
+    jumps = np.abs(np.diff(segment.pressure_pa[around]))
     order = np.argsort(-jumps, kind="stable")
     if len(jumps) == 0 or (len(jumps) > 1 and jumps[order[1]] > CLEAR * jumps[order[0]]) or jumps[order[0]] == 0:
         return None
-    return stretch.earliest + int(order[0])
+    return segment.earliest + int(order[0])
 
 
-def _ready(stretch: Stretch, jump: int | None, held: bool, rows: int = MOST_ROWS) -> Motion:
+def _ready(segment: MotionSegment, jump: int | None, held: bool, rows: int = MOST_ROWS) -> Motion:
     """Put a stretch into rows, from the jump that set it in motion, or else from where it surely moves."""
     from_rest = jump is not None
-    first = jump + 1 if jump is not None else (stretch.begins + 2 if stretch.begins else 0)
-    time_s = stretch.time_s[first:]
-    pressure_pa = stretch.pressure_pa[first:]
-    position_m = stretch.position_m[first:]
-    rest = stretch.position_m[stretch.rests_from : first] if from_rest else position_m[:0]
-    start_s, start_pa = float(stretch.time_s[max(0, first - 1)]), float(stretch.pressure_pa[max(0, first - 1)])
+    first = jump + 1 if jump is not None else (segment.begins + 2 if segment.begins else 0)
+    time_s = segment.time_s[first:]
+    pressure_pa = segment.pressure_pa[first:]
+    position_m = segment.position_m[first:]
+    rest = segment.position_m[segment.rests_from : first] if from_rest else position_m[:0]
+    start_s, start_pa = float(segment.time_s[max(0, first - 1)]), float(segment.pressure_pa[max(0, first - 1)])
     weight = np.ones(len(time_s))
     if len(time_s) > rows:
         edges = _edges(len(time_s), rows, growing=False)
@@ -211,7 +211,7 @@ def _ready(stretch: Stretch, jump: int | None, held: bool, rows: int = MOST_ROWS
         start_s -= 1e-9 * float(time_s[-1] - start_s)  # the first sample is a row like the others
     count = _counted(rest, position_m)
     return Motion(
-        direction=stretch.direction,
+        direction=segment.direction,
         time_s=np.append(start_s, time_s),
         pressure_pa=np.append(start_pa, pressure_pa),
         position_m=position_m,
@@ -433,13 +433,13 @@ def _solved(R: Array) -> Array:
     return np.asarray(np.linalg.lstsq(R[:, :-1], R[:, -1], rcond=1e-15)[0])
 
 
-def _in_a_gap(stretch: Stretch, motion: Motion, p: Array) -> Motion:
+def _in_a_gap(segment: MotionSegment, motion: Motion, p: Array) -> Motion:
     """Return the motion begun at the likeliest of the commands that a gap may hide; as it is when there is no gap."""
     if motion.free_velocity:
         return motion
-    first = int(np.searchsorted(stretch.time_s, motion.time_s[0], side="right"))
-    free = FreeStart(float(stretch.time_s[first - 1]), float(stretch.time_s[first]))
-    steps = np.diff(stretch.time_s)
+    first = int(np.searchsorted(segment.time_s, motion.time_s[0], side="right"))
+    free = FreeStart(float(segment.time_s[first - 1]), float(segment.time_s[first]))
+    steps = np.diff(segment.time_s)
     period_s, gap_s = float(np.median(steps)), free.latest_s - free.earliest_s
     missed = round(gap_s / period_s)
     if missed < 2:
@@ -456,7 +456,7 @@ def _in_a_gap(stretch: Stretch, motion: Motion, p: Array) -> Motion:
     return replace(motion, free_start=replace(free, expected=likeliest / missed, weight=weight))
 
 
-def _judged(motions: list[Motion], p: Array, prior: Prior | None) -> Fit:
+def _judged(motions: list[Motion], p: Array, prior: Prior | None) -> LikelihoodFit:
     """Return the fit at the minimum with its covariance."""
     system = _system(motions, p, prior)
     linear, _ = system.solved()
@@ -468,7 +468,7 @@ def _judged(motions: list[Motion], p: Array, prior: Prior | None) -> Fit:
     order = [R.shape[1] - len(p), R.shape[1] - len(p) + 1, 0, 1]
     scale = np.concatenate((system.scale, np.ones(len(p))))[order]
     covariance = variance * _inverse_information(R)[np.ix_(order, order)] / np.outer(scale, scale)
-    return Fit(
+    return LikelihoodFit(
         p=np.append(p[:2], linear[:2]),
         covariance=covariance,
         root=_root(tangent, order, scale),

@@ -6,7 +6,7 @@ of that noise and of a threshold, and ends when it falls under the threshold or 
     begins   |v| > threshold + 5 σ_v         ends   |v| < threshold, or the sign changes
 
 While the stem moves one way the slope cannot change its sign, and over a window of standstill it is zero: so the end is
-seen at the latest one window after it was. The beginning is then found in the positions themselves.
+detected at the latest one window after it was. The beginning is then found in the positions themselves.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ CERTAIN = 5.0
 """Standard deviations by which a velocity stands out: once in some million windows by chance."""
 
 
-class Motion:
+class MotionDetector:
     """Direction of motion, sample by sample.
 
     Args:
@@ -42,7 +42,7 @@ class Motion:
         return self.direction
 
 
-def beginning(position_m: Array, direction: int, noise_m: float) -> int:
+def motion_start(position_m: Array, direction: int, noise_m: float) -> int:
     """Return the index at which a motion in the given direction began within a window that ends in it.
 
     It is the last sample that does not yet stand out of the window's extreme, which noise alone puts some two to

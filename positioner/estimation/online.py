@@ -1,14 +1,14 @@
-"""Identification of a sticking valve, sample by sample: motion, identifier, friction and judgement put together.
+"""Identification of a sticking valve, sample by sample: motion, identifier, friction and validity put together.
 
 A record of the last N samples, one derivative window, goes ahead of the identifier: a sample is used when it leaves
-the record at its old end. So when motion is seen, its beginning is still to come and time zero is put exactly there;
-when the stem is found to have stopped, the samples of the standstill that were taken for motion are dropped unused.
-The estimates are one derivative window old for that, and say so by `time_s`.
+the record at its old end. So when motion is detected, its beginning is still to come and time zero is put exactly
+there; when the stem is found to have stopped, the samples of the standstill that were taken for motion are dropped
+unused. The estimates are one derivative window old for that, and say so by `time_s`.
 
 With a `Refiner`, the samples since the restart go out to be fitted by maximum likelihood when the window is complete,
 and the progress stays short of 1 until the result is back: it replaces the algebraic one if it is acceptable. With
 eta_1 = 1 (`passive`), no excitation will fill a window: each ordinary move goes out when the stem has come to rest,
-with what the moves before it told as the prior (`moves`).
+with the posterior of the moves before it as the prior (`passive`).
 """
 
 from dataclasses import dataclass, replace
@@ -18,24 +18,24 @@ import numpy as np
 
 from config.codes import Refusal
 from positioner.estimation.algebraic import Identifier
-from positioner.estimation.batch import Recorded, RecordSettings
-from positioner.estimation.breakaway_force import followed, judged
+from positioner.estimation.batch import BatchResult, BatchSettings
+from positioner.estimation.breakaway_force import after_event, with_validity
 from positioner.estimation.derivatives import Derivatives
-from positioner.estimation.estimates import NO_BREAKAWAY, Estimate, Estimates, no_estimates, none
+from positioner.estimation.estimates import NO_BREAKAWAY, Estimate, Estimates, no_estimate, no_estimates
 from positioner.estimation.friction_estimator import RunningMeans
-from positioner.estimation.motion_detector import Motion, beginning
-from positioner.estimation.passive import Known, absorbed
-from positioner.estimation.refiner import Job, Refiner
+from positioner.estimation.motion_detector import MotionDetector, motion_start
+from positioner.estimation.passive import MovesPosterior, posterior_after
+from positioner.estimation.refiner import RefinementJob, Refiner
 from positioner.estimation.running_noise import PositionNoise
-from positioner.estimation.sample_window import Record
-from positioner.estimation.validity import Judge
+from positioner.estimation.sample_window import SampleWindow
+from positioner.estimation.validity import ValidityCheck
 from positioner.estimation.weighted import Solution
 
 READINGS = 16
 """Times per window at which (13) is solved."""
-ALMOST = 0.99
+PROGRESS_WHILE_REFINING = 0.99
 """Progress while the refinement is awaited."""
-PATIENCE_S = 2.0
+REFINEMENT_TIMEOUT_S = 2.0
 """Time after which a refinement is no longer awaited."""
 MOST_KEPT = 200_000
 """Samples kept for a refinement: a window at the seed's 10 us twice over."""
@@ -89,7 +89,7 @@ class Identification:
     Attributes:
         estimates: what is known by now.
         velocity_m_per_s, acceleration_m_per_s2: (19), (21) at the latest sample; NaN until the filters are full.
-        direction: of the motion seen, +1 up, -1 down, 0 none.
+        direction: of the detected motion, +1 up, -1 down, 0 none.
         moves: ordinary moves that gave acceptable estimates, by passive identification.
     """
 
@@ -98,7 +98,7 @@ class Identification:
         self._refiner = refiner
         self._kept: list[tuple[float, float, float]] = []
         self._awaited_since_s: float | None = None
-        self._known: Known | None = None
+        self._posterior: MovesPosterior | None = None
         self._broke_away, self._broke_away_s = NO_BREAKAWAY, 0.0
         self._passive = False
         self.moves = 0
@@ -106,14 +106,14 @@ class Identification:
         self._identifier = Identifier(
             settings.window_s, settings.stroke_m, settings.pressure_pa, pressure_held=settings.pressure_held
         )
-        self._record = Record(settings.derivative_window_s)
+        self._record = SampleWindow(settings.derivative_window_s)
         self._noise = PositionNoise()
         self._derivatives = Derivatives()
-        self._motion = Motion(settings.moving_threshold_m_per_s)
+        self._motion = MotionDetector(settings.moving_threshold_m_per_s)
         self._means = RunningMeans()
         self._solution: Solution | None = None  # the last whose b/c was valid
-        self._asked = (False, False)
-        self._doubt = inf  # of the estimates, by what was asked for last
+        self._requested = (False, False)
+        self._relative_variance = inf  # of the estimates, by what was asked for last
         self._age = 0  # of the oldest sample in the record, in samples since the motion began
         self._clear_record()
         self._restart_window()
@@ -121,7 +121,7 @@ class Identification:
 
     @property
     def direction(self) -> int:
-        """Direction of the motion seen."""
+        """Direction of the detected motion."""
         return self._motion.direction
 
     def restart(self) -> None:
@@ -131,7 +131,7 @@ class Identification:
         self._restart_window()
         self._kept.clear()
         self._awaited_since_s = self._rest_in = None
-        self._doubt = inf
+        self._relative_variance = inf
         self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
 
     def update(
@@ -159,15 +159,15 @@ class Identification:
         """
         if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
             return self.estimates
-        if (parameters, friction) != self._asked:
-            self._ask(parameters, friction)
+        if (parameters, friction) != self._requested:
+            self._request(parameters, friction)
         self._passive = passive and self._refiner is not None
         self._take(time_s, position_m, pressure_pa)
         if self._refiner is not None:
             self._refine(self._refiner, time_s, position_m, pressure_pa)
         if self._record.full:
-            self._watch()
-            wanted = any(self._asked) and not self._complete and not self._passive
+            self._detect_motion()
+            wanted = any(self._requested) and not self._complete and not self._passive
             if wanted and self._motion.direction and self._age >= 0:
                 self._collect()
         return self.estimates
@@ -193,7 +193,9 @@ class Identification:
         result = refiner.collect()
         if result is not None:
             self._take_refined(result, time_s)
-        elif self._awaited_since_s is not None and (not refiner.pending or time_s - self._awaited_since_s > PATIENCE_S):
+        elif self._awaited_since_s is not None and (
+            not refiner.pending or time_s - self._awaited_since_s > REFINEMENT_TIMEOUT_S
+        ):
             self._awaited_since_s = None
             self.estimates = replace(self.estimates, progress=1.0)
 
@@ -201,40 +203,40 @@ class Identification:
         """Let what was kept be fitted."""
         settings = self._settings
         columns = np.array(self._kept).T
-        asked = RecordSettings(
+        asked = BatchSettings(
             noise_std_m=settings.noise_std_m,
             pressure_noise_std_pa=settings.pressure_noise_std_pa,
             pressure_held=settings.pressure_held,
             moving_threshold_m_per_s=settings.moving_threshold_m_per_s,
             largest_relative_std=settings.largest_relative_std,
         )
-        prior = self._known.prior(time_s) if self._passive and self._known is not None else None
-        if refiner.submit(Job(columns[0], columns[1], columns[2], asked, prior)) and not self._passive:
+        prior = self._posterior.prior(time_s) if self._passive and self._posterior is not None else None
+        if refiner.submit(RefinementJob(columns[0], columns[1], columns[2], asked, prior)) and not self._passive:
             self._awaited_since_s = time_s
         if self._passive:
             self._kept = [each for each in self._kept if each[0] > time_s - MOVE_REST_S]
 
-    def _take_refined(self, result: Recorded, time_s: float) -> None:
+    def _take_refined(self, result: BatchResult, time_s: float) -> None:
         self._awaited_since_s = None
         fits = result.fit is not None and result.estimates.b_over_c.reason is not Refusal.MODEL_DOES_NOT_FIT
         if result.fit is not None and fits:
-            self._known = absorbed(self._known if self._passive else None, result.fit, time_s)
-        parameters, friction = self._asked
+            self._posterior = posterior_after(self._posterior if self._passive else None, result.fit, time_s)
+        parameters, friction = self._requested
         refined = result.estimates.only(parameters=parameters, friction=friction)
         if refined.acceptable:
             before = self._broke_away if self._passive else NO_BREAKAWAY
-            broke_away = followed(before, refined.breakaway, time_s - self._broke_away_s)
+            broke_away = after_event(before, refined.breakaway, time_s - self._broke_away_s)
             self._broke_away, self._broke_away_s = broke_away, time_s
-            self.estimates = replace(refined, breakaway=judged(broke_away, self._settings.largest_relative_std))
+            self.estimates = replace(refined, breakaway=with_validity(broke_away, self._settings.largest_relative_std))
             self.moves += self._passive
         elif not self._passive:
             self.estimates = replace(self.estimates, progress=1.0)
 
-    def _ask(self, parameters: bool, friction: bool) -> None:
-        self._asked = (parameters, friction)
-        self._doubt = inf  # what was known before gives way to whatever is acceptable
+    def _request(self, parameters: bool, friction: bool) -> None:
+        self._requested = (parameters, friction)
+        self._relative_variance = inf  # what was known before gives way to whatever is acceptable
         self._restart_window()
-        if any(self._asked) and not self.estimates.acceptable:
+        if any(self._requested) and not self.estimates.acceptable:
             self.estimates = no_estimates(Refusal.WAITING_FOR_MOTION)
 
     def _restart_window(self) -> None:
@@ -256,8 +258,8 @@ class Identification:
         self._until_block = 0
         self.velocity_m_per_s = self.acceleration_m_per_s2 = nan
 
-    def _watch(self) -> None:
-        """Take the derivatives at the latest sample and see whether, and since when, the stem moves."""
+    def _detect_motion(self) -> None:
+        """Take the derivatives at the latest sample and find whether, and since when, the stem moves."""
         record = self._record
         time_s, position_m = record.time_s, record.position_m
         velocity, acceleration, slope = self._derivatives.estimate(time_s, position_m)
@@ -276,10 +278,10 @@ class Identification:
             return
         if before:
             self._interrupt(Refusal.MOTION_ENDED)
-            if self._passive and any(self._asked):
+            if self._passive and any(self._requested):
                 self._rest_in = record.length
         if direction:
-            self._age = -beginning(position_m, direction, noise_m)
+            self._age = -motion_start(position_m, direction, noise_m)
 
     def _collect(self) -> None:
         """Use the oldest sample of the record, on its way out."""
@@ -289,7 +291,7 @@ class Identification:
             self._identifier.restart()
             self._means.restart()
             self._zero_s, self._next_reading_s = time_s, 0.0
-        parameters, friction = self._asked
+        parameters, friction = self._requested
         if parameters:
             self._identifier.update(time_s, position_m, pressure_pa)
         settings = self._settings
@@ -307,7 +309,7 @@ class Identification:
         if self._complete and self._refiner is not None and not self._passive:
             self._hand_out(self._refiner, float(self._record.time_s[-1]))
             if self._awaited_since_s is not None:
-                self.estimates = replace(self.estimates, progress=ALMOST)
+                self.estimates = replace(self.estimates, progress=PROGRESS_WHILE_REFINING)
 
     def _read(self, time_s: float) -> Estimates:
         """Return what the window says so far."""
@@ -319,42 +321,42 @@ class Identification:
         return Estimates(a, b, c, k, b_over_c, k_over_c, progress=progress, time_s=time_s)
 
     def _read_parameters(self) -> tuple[Estimate, Estimate, Estimate, Estimate]:
-        if not self._asked[0]:
-            return (none(Refusal.NOT_ASKED),) * 4
+        if not self._requested[0]:
+            return (no_estimate(Refusal.NOT_ASKED),) * 4
         solution = self._identifier.solve(self._noise_std_m, self._settings.pressure_noise_std_pa)
         if solution is None:
-            return (none(Refusal.ILL_CONDITIONED),) * 4
-        a, b, c, b_over_c = self._judge().parameters(solution)
+            return (no_estimate(Refusal.ILL_CONDITIONED),) * 4
+        a, b, c, b_over_c = self._validity_check().parameters(solution)
         if b_over_c.valid:
             self._solution = solution
         return a, b, c, b_over_c
 
     def _read_friction(self) -> tuple[Estimate, Estimate]:
-        if not self._asked[1]:
-            return (none(Refusal.NOT_ASKED),) * 2
+        if not self._requested[1]:
+            return (no_estimate(Refusal.NOT_ASKED),) * 2
         if self._solution is None:
-            return (none(Refusal.PARAMETERS_MISSING),) * 2
+            return (no_estimate(Refusal.PARAMETERS_MISSING),) * 2
         means = self._means.means(self._derivatives.weights)
         if means is None:
-            return (none(Refusal.WINDOW_TOO_SHORT),) * 2
-        return self._judge().friction(self._solution, means, self._motion.direction)
+            return (no_estimate(Refusal.WINDOW_TOO_SHORT),) * 2
+        return self._validity_check().friction(self._solution, means, self._motion.direction)
 
-    def _judge(self) -> Judge:
+    def _validity_check(self) -> ValidityCheck:
         settings = self._settings
-        return Judge(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
+        return ValidityCheck(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
 
     def _publish(self, fresh: Estimates) -> None:
         """Take fresh estimates, unless what an earlier stretch of motion has given is known better."""
-        doubt = fresh.doubt if fresh.acceptable else inf
-        if doubt < self._doubt or not self.estimates.acceptable:
+        relative_variance = fresh.relative_variance if fresh.acceptable else inf
+        if relative_variance < self._relative_variance or not self.estimates.acceptable:
             self.estimates = replace(fresh, breakaway=self.estimates.breakaway)
-            self._doubt = doubt
+            self._relative_variance = relative_variance
         else:
             self.estimates = replace(self.estimates, progress=fresh.progress)
 
     def _interrupt(self, reason: Refusal) -> None:
         """Close the window; say why if it was too short to have given anything."""
-        if self._complete or not any(self._asked):
+        if self._complete or not any(self._requested):
             return
         if self._elapsed_s < self._settings.minimum_window_s and not self.estimates.acceptable:
             self.estimates = no_estimates(reason)

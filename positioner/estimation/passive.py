@@ -1,8 +1,8 @@
-"""Passive identification: what ordinary moves say, one after another, about a valve that ages.
+"""Passive identification: a valve that ages, identified from its ordinary moves.
 
 A move of the DCS is some tens of milliseconds of motion between two rests. Alone it tells little of m and F_v, much of
 q = -F_c/k_s: the stem comes to rest where g u + q σ is. So each move is fitted with what was known before it as the
-prior (`refinement`): the posterior is the next prior, a Kalman filter whose measurement is a whole motion. Between two
+prior (`likelihood`): the posterior is the next prior, a Kalman filter whose measurement is a whole motion. Between two
 moves Δt apart the parameters may have walked,
 
     std of the change = w sqrt(Δt)      w: 0.3 % of q, 0.01 % of g, 0.05 for 100 s of ln τ and ln μ
@@ -17,21 +17,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from positioner.estimation.likelihood import Fit, Prior
+from positioner.estimation.likelihood import LikelihoodFit, Prior
 
 WALK_PER_SQRT_S = np.array([5e-3, 5e-3, 1e-4, 3e-3])
 """Of ln τ and ln μ; of g and q as shares."""
-LOUD = 3.0
-"""Residuals that outweigh those of the moves before so many times are no move of this valve."""
+OUTLIER = 3.0
+"""Residuals so many times those of the moves before are an outlier, no move of this valve."""
 FORGETTING = 0.1
 """Weight of a move in what is known of the noise."""
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """What the moves up to now have told, and when the last of them ended."""
+class MovesPosterior:
+    """What is known after the moves up to now, and when the last of them ended."""
 
-    fit: Fit
+    fit: LikelihoodFit
     time_s: float
 
     def prior(self, time_s: float) -> Prior:
@@ -46,13 +46,13 @@ class Known:
         return Prior(self.fit.p, (np.sqrt(np.maximum(powers, 0.0))[:, None] * axes.T) / size)
 
 
-def absorbed(known: Known | None, fit: Fit, time_s: float) -> Known | None:
+def posterior_after(posterior: MovesPosterior | None, fit: LikelihoodFit, time_s: float) -> MovesPosterior | None:
     """Return what is known after a move, or what was known when the move does not inform."""
     if not (np.isfinite(fit.p).all() and np.isfinite(fit.root).all()):
-        return known
-    if known is None:
-        return Known(fit, time_s)
-    if fit.residual_std_m > LOUD * known.fit.residual_std_m:
-        return known
-    noise_m = (1 - FORGETTING) * known.fit.residual_std_m + FORGETTING * fit.residual_std_m
-    return Known(replace(fit, residual_std_m=noise_m), time_s)
+        return posterior
+    if posterior is None:
+        return MovesPosterior(fit, time_s)
+    if fit.residual_std_m > OUTLIER * posterior.fit.residual_std_m:
+        return posterior
+    noise_m = (1 - FORGETTING) * posterior.fit.residual_std_m + FORGETTING * fit.residual_std_m
+    return MovesPosterior(replace(fit, residual_std_m=noise_m), time_s)

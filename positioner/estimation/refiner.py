@@ -1,40 +1,40 @@
-"""Who refines: a job goes out, its result comes back, at once or some cycles later.
+"""The refinement of an identification: a job goes out, its result comes back, at once or some cycles later.
 
 The control core hands a job to a `Refiner` and asks at each sample whether the result is there. In virtual time it is
-computed `InPlace`; the daemon has a process of its own for it (`positioner.daemon.refinement_process`), for a fit of
-some tens of milliseconds has no place in a cycle of one.
+computed by `InProcessRefiner`; the daemon has a process of its own for it (`positioner.daemon.refinement_process`), for
+a fit of some tens of milliseconds has no place in a cycle of one.
 """
 
 from dataclasses import dataclass
 from typing import Protocol
 
 from positioner.estimation.array import Array
-from positioner.estimation.batch import Recorded, RecordSettings, identify
+from positioner.estimation.batch import BatchResult, BatchSettings, identify
 from positioner.estimation.likelihood import Prior
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
-    """Samples to identify the valve from; see `recorded.identify`."""
+class RefinementJob:
+    """Samples to identify the valve from; see `batch.identify`."""
 
     time_s: Array
     position_m: Array
     pressure_pa: Array
-    settings: RecordSettings
+    settings: BatchSettings
     prior: Prior | None = None
 
-    def done(self) -> Recorded:
-        """Do it."""
+    def run(self) -> BatchResult:
+        """Run it."""
         return identify(self.time_s, self.position_m, self.pressure_pa, self.settings, self.prior)
 
 
 class Refiner(Protocol):
     """One job at a time."""
 
-    def submit(self, job: Job) -> bool:
+    def submit(self, job: RefinementJob) -> bool:
         """Take a job; False when there is one under way, or nobody to do it."""
 
-    def collect(self) -> Recorded | None:
+    def collect(self) -> BatchResult | None:
         """Return the result, once; None when there is none (yet)."""
 
     @property
@@ -42,19 +42,19 @@ class Refiner(Protocol):
         """Whether a result is still to come."""
 
 
-class InPlace:
-    """Does the job where it is called."""
+class InProcessRefiner:
+    """Runs the job in the calling thread."""
 
     def __init__(self) -> None:
-        self._result: Recorded | None = None
+        self._result: BatchResult | None = None
 
-    def submit(self, job: Job) -> bool:
-        """Do it."""
-        self._result = job.done()
+    def submit(self, job: RefinementJob) -> bool:
+        """Run a job."""
+        self._result = job.run()
         return True
 
-    def collect(self) -> Recorded | None:
-        """Return what came out of it, once."""
+    def collect(self) -> BatchResult | None:
+        """Return its result, once."""
         result, self._result = self._result, None
         return result
 

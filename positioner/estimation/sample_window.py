@@ -10,7 +10,7 @@ _TURNS = 8
 """The record is moved back to the front of its memory once in this many times its length."""
 
 
-class Record:
+class SampleWindow:
     """A ring of samples that is always one contiguous stretch.
 
     Args:

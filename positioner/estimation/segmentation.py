@@ -1,8 +1,8 @@
-"""A record cut into motions of one direction: rest, reversal and the time at an end stop are left out.
+"""The motions of one direction in a record: rest, reversal and the time at an end stop are left out.
 
 The straight line's slope over a window of length T about each sample tells whether the stem moves there. White noise σ
 sampled every h leaves the slope a standard deviation of sqrt(12 h) σ / T^(3/2); T is chosen so that it is a fifth of
-the slowest motion that is to be seen, and no shorter than six samples:
+the slowest motion that is to be detected, and no shorter than six samples:
 
     T = (sqrt(12 h) σ / σ_v)^(2/3),    σ_v = threshold
 
@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from positioner.estimation.array import Array
-from positioner.estimation.stretch import Stretch
+from positioner.estimation.motion_segment import MotionSegment
 
 FEWEST = 6
 """Samples in a slope's window, and in a motion."""
@@ -35,55 +35,57 @@ BROKEN = 20.0
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
-    """A record cut.
+class Segmentation:
+    """The motions of a record, and what lies between them.
 
     Attributes:
-        stretches: motions, in order of time.
+        segments: motions, in order of time.
         rests: (begin, end) rows of the rests between them, for what breaks away and what does not.
-        too_short: motions that were seen but are too short to be fitted.
+        too_short: motions that are too short to be fitted.
         moving_share: part of the record's time in motion.
     """
 
-    stretches: tuple[Stretch, ...]
+    segments: tuple[MotionSegment, ...]
     rests: tuple[tuple[int, int], ...]
     too_short: int
     moving_share: float
 
 
-def cut(time_s: Array, position_m: Array, pressure_pa: Array, noise_std_m: float, threshold_m_per_s: float) -> Cut:
-    """Cut a record.
+def find_motions(
+    time_s: Array, position_m: Array, pressure_pa: Array, noise_std_m: float, threshold_m_per_s: float
+) -> Segmentation:
+    """Find the motions of a record.
 
     Args:
         time_s: N increasing time stamps.
         position_m: N measured positions.
-        pressure_pa: N pressures, as in `Stretch`.
+        pressure_pa: N pressures, as in `MotionSegment`.
         noise_std_m: of the positions.
         threshold_m_per_s: velocity below which the stem counts as stopped.
     """
     if len(time_s) < 2 * FEWEST:
-        return Cut((), (), 0, 0.0)
+        return Segmentation((), (), 0, 0.0)
     period_s = float(np.median(np.diff(time_s)))
     window = _window(period_s, noise_std_m, threshold_m_per_s, len(time_s))
     slope = slopes(time_s, position_m, window)
     # Rounding leaves a slope of its own where nothing moves.
     std = max(sqrt(12.0 / window) * noise_std_m / (window * period_s), 1e-3 * threshold_m_per_s)
-    found, too_short, rests, stretches = _moving(slope, threshold_m_per_s, std), 0, [], []
+    found, too_short, rests, segments = _moving(slope, threshold_m_per_s, std), 0, [], []
     before = 0
     for number, (begin, end, direction) in enumerate(found):
         after = found[number + 1][0] if number + 1 < len(found) else len(time_s)
-        stretch, bounds = _trimmed(
+        segment, bounds = _trimmed(
             time_s, position_m, pressure_pa, (before, begin, end, after), direction, window, noise_std_m
         )
-        if stretch is None or _is_broken(stretch, period_s):
+        if segment is None or _is_broken(segment, period_s):
             too_short += 1
         else:
-            stretches.append(stretch)
+            segments.append(segment)
         rests.append((before, bounds[0]))
         before = bounds[1]
     rests.append((before, len(time_s)))
     moving = sum(end - begin for begin, end, _ in found) / len(time_s)
-    return Cut(tuple(stretches), tuple(each for each in rests if each[1] > each[0]), too_short, moving)
+    return Segmentation(tuple(segments), tuple(each for each in rests if each[1] > each[0]), too_short, moving)
 
 
 def _window(period_s: float, noise_std_m: float, threshold_m_per_s: float, count: int) -> int:
@@ -134,8 +136,8 @@ def _trimmed(
     direction: int,
     window: int,
     noise_std_m: float,
-) -> tuple[Stretch | None, tuple[int, int]]:
-    """Return the stretch between the end of the motion before and the begin of the next, and its own rows."""
+) -> tuple[MotionSegment | None, tuple[int, int]]:
+    """Return the segment between the end of the motion before and the begin of the next, and its own rows."""
     before, begin, end, after = rows
     travel = direction * position_m
     band = STANDS_OUT * noise_std_m + 1e-9
@@ -148,7 +150,7 @@ def _trimmed(
         return None, (starts, max(stop, starts))
     first = rests_from if from_rest else starts
     return (
-        Stretch(
+        MotionSegment(
             direction=direction,
             time_s=time_s[first:stop],
             position_m=position_m[first:stop],
@@ -197,5 +199,5 @@ def _reaches_rest(travel: Array, begin: int, end: int, after: int, band: float, 
     return begin + int(reached[0]) if len(reached) else end
 
 
-def _is_broken(stretch: Stretch, period_s: float) -> bool:
-    return float(np.diff(stretch.time_s).max()) > BROKEN * period_s
+def _is_broken(segment: MotionSegment, period_s: float) -> bool:
+    return float(np.diff(segment.time_s).max()) > BROKEN * period_s

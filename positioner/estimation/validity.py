@@ -1,4 +1,4 @@
-"""From what the identifier and the friction means say to estimates: standard deviations, and valid or why not.
+"""Standard deviation and validity of what the identifier and the friction means give.
 
 Each estimate f is a function of θ = (a, b, c) with gradient g, and of the filtered means. To first order
 
@@ -25,8 +25,8 @@ LARGEST_NOISE_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Judge:
-    """How uncertain an estimate may be, and the noise of the sensors it is judged by.
+class ValidityCheck:
+    """How uncertain an estimate may be, and the noise of the sensors that makes it so.
 
     Attributes:
         largest_relative_std: standard deviation allowed, as a share of the value.
@@ -41,14 +41,14 @@ class Judge:
     def parameters(self, solution: Solution) -> tuple[Estimate, Estimate, Estimate, Estimate]:
         """Return a, b, c and b/c."""
         a, b, c = solution.theta.tolist()
-        singly = _why_not_singly(solution)
+        singly = _refusal_of_each(solution)
         unit = np.eye(3)
         ratio = np.array((0.0, 1 / c, -b / c**2))
         return (
-            self._judge(a, _std(solution, unit[0], biased=True), Refusal.A_POSITIVE if a > 0 else None, singly),
-            self._judge(b, _std(solution, unit[1], biased=True), Refusal.B_NOT_NEGATIVE if b >= 0 else None, singly),
-            self._judge(c, _std(solution, unit[2], biased=True), Refusal.C_NOT_POSITIVE if c <= 0 else None, singly),
-            self._judge(b / c, _std(solution, ratio), Refusal.B_OVER_C_NOT_NEGATIVE if b / c >= 0 else None),
+            self._estimate(a, _std(solution, unit[0], biased=True), Refusal.A_POSITIVE if a > 0 else None, singly),
+            self._estimate(b, _std(solution, unit[1], biased=True), Refusal.B_NOT_NEGATIVE if b >= 0 else None, singly),
+            self._estimate(c, _std(solution, unit[2], biased=True), Refusal.C_NOT_POSITIVE if c <= 0 else None, singly),
+            self._estimate(b / c, _std(solution, ratio), Refusal.B_OVER_C_NOT_NEGATIVE if b / c >= 0 else None),
         )
 
     def friction(self, solution: Solution, means: Means, direction: int) -> tuple[Estimate, Estimate]:
@@ -63,13 +63,15 @@ class Judge:
         of_ratio = np.array((-v, -x, -u - direction * k / c)) * direction / c
         k_std = _std(solution, of_k, filters, biased=True)
         ratio_std = _std(solution, of_ratio, filters / c)
-        singly = _why_not_singly(solution)
+        singly = _refusal_of_each(solution)
         return (
-            self._judge(k, k_std, Refusal.K_NOT_NEGATIVE if k >= 0 else None, singly),
-            self._judge(k / c, ratio_std, Refusal.K_OVER_C_NOT_NEGATIVE if k / c >= 0 else None),
+            self._estimate(k, k_std, Refusal.K_NOT_NEGATIVE if k >= 0 else None, singly),
+            self._estimate(k / c, ratio_std, Refusal.K_OVER_C_NOT_NEGATIVE if k / c >= 0 else None),
         )
 
-    def _judge(self, value: float, std: float, unphysical: Refusal | None, singly: Refusal = Refusal.VALID) -> Estimate:
+    def _estimate(
+        self, value: float, std: float, unphysical: Refusal | None, singly: Refusal = Refusal.VALID
+    ) -> Estimate:
         if singly is not Refusal.VALID:
             return Estimate(value, std, singly)
         if not std <= self.largest_relative_std * abs(value):
@@ -77,7 +79,7 @@ class Judge:
         return Estimate(value, std, Refusal.VALID if unphysical is None else unphysical)
 
 
-def _why_not_singly(solution: Solution) -> Refusal:
+def _refusal_of_each(solution: Solution) -> Refusal:
     """Return why a, b, c and k may not be used singly, although their ratios may."""
     if solution.gaps:
         return Refusal.COMMANDS_MISSED

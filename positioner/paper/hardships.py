@@ -20,7 +20,7 @@ import numpy as np
 
 from config.valve_file import ValveFile
 from positioner.estimation.array import Array
-from positioner.estimation.batch import RecordSettings, identify
+from positioner.estimation.batch import BatchSettings, identify
 from positioner.paper.noise_table import NAMES, Motion, bound, motion_at, true_values
 
 PERIOD_S, REST, ROWS = 1e-3, 100, 800
@@ -91,7 +91,7 @@ def hardships(file: ValveFile, noise_pu: float, seeds: int) -> Iterator[Hardship
             stamps_s = moved.time_s
             if kind.stamps:
                 stamps_s = stamps_s + PERIOD_S * JITTER * rng.uniform(-1, 1, len(stamps_s))
-            found = identify(stamps_s, measured, moved.pressure_pa, RecordSettings(pressure_held=True)).estimates
+            found = identify(stamps_s, measured, moved.pressure_pa, BatchSettings(pressure_held=True)).estimates
             each = [getattr(found, name) for name in NAMES]
             errors.append([one.value / at - 1 for one, at in zip(each, true, strict=True)])
             within.append([abs(one.value - at) < one.std for one, at in zip(each, true, strict=True)])

@@ -21,7 +21,7 @@ import numpy as np
 
 from config.valve_file import ValveFile
 from positioner.estimation.array import Array
-from positioner.estimation.batch import RecordSettings, identify
+from positioner.estimation.batch import BatchSettings, identify
 from positioner.estimation.stem_response import responses
 from positioner.paper.formulas import solved
 from positioner.paper.scenario import ALPHA_PA, BETA_PA, OMEGA_RAD_PER_S
@@ -132,7 +132,7 @@ def cell(file: ValveFile, moved: Motion, period_s: float, noise_pu: float, seeds
     for seed in range(seeds):
         rng = np.random.default_rng((seed, round(1e6 * period_s), round(1e6 * noise_pu)))
         measured = moved.position_m + rng.normal(0, noise_m, len(moved.position_m))
-        found = identify(moved.time_s, measured, moved.pressure_pa, RecordSettings(pressure_held=True)).estimates
+        found = identify(moved.time_s, measured, moved.pressure_pa, BatchSettings(pressure_held=True)).estimates
         each = [getattr(found, name) for name in NAMES]
         ours.append([one.value for one in each])
         reported.append([one.std for one in each])

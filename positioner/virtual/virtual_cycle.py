@@ -16,7 +16,7 @@ from positioner.daemon.health import Health, HealthSettings
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.snapshot import Snapshot
-from positioner.estimation.refiner import InPlace
+from positioner.estimation.refiner import InProcessRefiner
 
 Script = Callable[[Snapshot, Requests], Requests]
 """A DCS: what it asks for after a snapshot, given what it asked for before."""
@@ -28,7 +28,7 @@ def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests) -> Cycl
     link = Link(MemoryDriver(device), pace)
     held_pa, _ = link.open()
     health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
-    controller = Controller(Settings.of(daemon), held_pa, InPlace())
+    controller = Controller(Settings.of(daemon), held_pa, InProcessRefiner())
     return Cycle(link, controller, pace, requests, recorder=None, health=health)
 
 

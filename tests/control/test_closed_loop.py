@@ -79,7 +79,7 @@ def test_a_second_identification_that_finds_nothing_leaves_the_first_in_use() ->
     second = plant.identify(0.5)
     assert second.applied.ratios == first.applied.ratios
     assert (second.applied.count, second.applied.refusals) == (1, 1)
-    assert second.applied.refused is not Refusal.VALID
+    assert second.applied.last_refusal is not Refusal.VALID
 
 
 def test_a_ratio_alone_is_renewed_by_the_friction_estimator() -> None:

@@ -20,7 +20,7 @@ from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.snapshot import Snapshot
-from positioner.estimation.refiner import InPlace
+from positioner.estimation.refiner import InProcessRefiner
 from positioner.virtual.virtual_cycle import played, virtual_cycle
 from sim.slave.modbus_slave import device_of
 
@@ -47,7 +47,7 @@ def recorded(folder: Path) -> list[str]:
         link = Link(driver_for(ModbusTcpDevice(port=port_in(slave), reply_timeout_s=5.0)), pace)
         held_pa, _ = link.open()
         recorder = Recorder(folder / "recordings", "v", 10_000_000, 2)
-        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa, InPlace()), pace, EXCITED, recorder)
+        cycle = Cycle(link, Controller(Settings.of(DAEMON), held_pa, InProcessRefiner()), pace, EXCITED, recorder)
         recorder.start()
         for _ in played(cycle, dcs, 1.8):
             pass

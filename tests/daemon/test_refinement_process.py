@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 
 from positioner.daemon.refinement_process import ProcessRefiner, RefinementProcess
-from positioner.estimation.batch import RecordSettings
-from positioner.estimation.refiner import Job
+from positioner.estimation.batch import BatchSettings
+from positioner.estimation.refiner import RefinementJob
 from tests.estimation.stem import NOISE, TRUTH, grid, run, swing
 
 pytestmark = pytest.mark.real_time
 
 
-def job() -> Job:
+def job() -> RefinementJob:
     moved = run(swing, grid(1e-3, -0.1, 0.8)).noisy(np.random.default_rng(1))
-    return Job(moved.time_s, moved.position_m, moved.pressure_pa, RecordSettings(noise_std_m=NOISE, pressure_held=True))
+    return RefinementJob(
+        moved.time_s, moved.position_m, moved.pressure_pa, BatchSettings(noise_std_m=NOISE, pressure_held=True)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +31,11 @@ def process() -> Iterator[RefinementProcess]:
 
 
 def test_a_job_is_done_elsewhere_exactly_as_here(process: RefinementProcess) -> None:
-    refiner = process.refiner(patient=True)
+    refiner = process.refiner(blocking=True)
     assert refiner.submit(job())
     assert refiner.pending
     assert not refiner.submit(job()), "one at a time"
-    result, here = refiner.collect(), job().done()
+    result, here = refiner.collect(), job().run()
     assert result is not None
     assert result.estimates == here.estimates
     assert result.estimates.b.value == pytest.approx(TRUTH["b"], rel=0.01)
@@ -63,9 +65,9 @@ def test_asking_does_not_wait(process: RefinementProcess) -> None:
 
 
 def test_a_job_that_makes_no_sense_fails_alone(process: RefinementProcess) -> None:
-    refiner = process.refiner(patient=True)
+    refiner = process.refiner(blocking=True)
     bad = job()
-    assert refiner.submit(Job(bad.time_s, bad.position_m[:-1], bad.pressure_pa, bad.settings))
+    assert refiner.submit(RefinementJob(bad.time_s, bad.position_m[:-1], bad.pressure_pa, bad.settings))
     assert refiner.collect() is None
     assert not refiner.pending
     assert refiner.submit(job())
@@ -74,7 +76,7 @@ def test_a_job_that_makes_no_sense_fails_alone(process: RefinementProcess) -> No
 
 def test_a_process_that_died_refuses() -> None:
     process = RefinementProcess()
-    refiner = process.refiner(patient=True)
+    refiner = process.refiner(blocking=True)
     assert refiner.submit(job())
     assert refiner.collect() is not None
     assert process._process is not None

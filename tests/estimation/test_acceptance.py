@@ -9,7 +9,7 @@ from config.codes import Refusal
 from positioner.estimation.acceptance import Applied, Ratios, accept
 from positioner.estimation.estimates import Estimate, Estimates, no_estimates
 
-IN_USE = Applied(Ratios(-8e5, -2e4), count=3, refusals=1, refused=Refusal.VALID)
+IN_USE = Applied(Ratios(-8e5, -2e4), count=3, refusals=1, last_refusal=Refusal.VALID)
 VALID, UNCERTAIN, NOT_ASKED = Refusal.VALID, Refusal.TOO_UNCERTAIN, Refusal.NOT_ASKED
 
 
@@ -51,7 +51,7 @@ def test_a_bad_identification_never_replaces_a_good_one(
 ) -> None:
     after = accept(before, estimated(slope, friction))
     assert after.ratios == ratios
-    assert after.refused is refused
+    assert after.last_refusal is refused
     accepted = refused is VALID
     assert (after.count - before.count, after.refusals - before.refusals) == (accepted, not accepted)
 
@@ -60,7 +60,7 @@ def test_a_bad_identification_never_replaces_a_good_one(
 def test_nothing_found_is_a_refusal_that_says_why(reason: Refusal) -> None:
     after = accept(IN_USE, no_estimates(reason))
     assert after.ratios == IN_USE.ratios
-    assert after.refused is reason
+    assert after.last_refusal is reason
 
 
 def test_every_reason_has_its_own_text() -> None:

@@ -7,10 +7,10 @@ import pytest
 
 from config.codes import Refusal
 from config.valve_file import load_valve, shipped_valve
-from positioner.estimation.breakaway_force import between, followed, judged, narrowed
-from positioner.estimation.estimates import Estimate, none
+from positioner.estimation.breakaway_force import after_event, from_interval, intersection, with_validity
+from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.online import Identification, IdentificationSettings
-from positioner.estimation.refiner import InPlace
+from positioner.estimation.refiner import InProcessRefiner
 from sim.valve import Valve
 from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE
 
@@ -18,33 +18,33 @@ PERIOD_S, EVERY_S = 2e-3, 20.0
 
 
 def test_two_events_leave_what_their_intervals_share() -> None:
-    both = narrowed(between(20.0, 30.0), between(24.0, 60.0))
+    both = intersection(from_interval(20.0, 30.0), from_interval(24.0, 60.0))
     assert both.value == pytest.approx(27.0)
     assert both.std == pytest.approx(6 / 12**0.5)
 
 
 def test_many_wide_events_do_not_make_a_narrow_one() -> None:
-    known = between(22.0, 60.0)
+    known = from_interval(22.0, 60.0)
     for _ in range(50):
-        known = narrowed(known, between(22.0, 60.0))
+        known = intersection(known, from_interval(22.0, 60.0))
     assert known.std == pytest.approx(38 / 12**0.5)
-    assert judged(known, 0.05).reason is Refusal.TOO_UNCERTAIN
+    assert with_validity(known, 0.05).reason is Refusal.TOO_UNCERTAIN
 
 
 def test_events_that_share_nothing_leave_what_lies_between() -> None:
-    both = narrowed(between(20.0, 22.0), between(26.0, 30.0))
+    both = intersection(from_interval(20.0, 22.0), from_interval(26.0, 30.0))
     assert 22.0 < both.value < 26.0
     assert both.std == pytest.approx(4 / 12**0.5)
 
 
 def test_what_is_known_ages_and_a_move_without_an_event_takes_nothing_away() -> None:
-    known, no_event = between(26.0, 27.0), none(Refusal.WAITING_FOR_MOTION)
-    assert followed(no_event, known, 10.0) == known
-    aged = followed(known, no_event, 600.0)
+    known, no_event = from_interval(26.0, 27.0), no_estimate(Refusal.WAITING_FOR_MOTION)
+    assert after_event(no_event, known, 10.0) == known
+    aged = after_event(known, no_event, 600.0)
     assert aged.value == known.value
     assert aged.std > 2 * known.std
-    assert followed(aged, known, 1.0).std == pytest.approx(known.std)
-    assert judged(Estimate(nan, nan, Refusal.WAITING_FOR_MOTION), 0.05).reason is Refusal.WAITING_FOR_MOTION
+    assert after_event(aged, known, 1.0).std == pytest.approx(known.std)
+    assert with_validity(Estimate(nan, nan, Refusal.WAITING_FOR_MOTION), 0.05).reason is Refusal.WAITING_FOR_MOTION
 
 
 @pytest.mark.parametrize("ramp_s", [0.2, 0.0], ids=["ramps", "jumps"])
@@ -52,7 +52,7 @@ def test_ordinary_moves_tell_the_static_friction_if_they_begin_slowly(ramp_s: fl
     valve = Valve.from_file(load_valve(shipped_valve("seed")))
     valve.rest_at(0.05)
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InPlace())
+    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InProcessRefiner())
     identification.restart()
     for move in range(8):
         target_m = STROKE * float(rng.uniform(0.3, 0.8))

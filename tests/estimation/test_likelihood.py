@@ -8,15 +8,15 @@ import pytest
 
 from config.codes import Refusal
 from config.valve_file import load_valve, shipped_valve
-from positioner.estimation.batch import Recorded, RecordSettings, evened, identify
-from positioner.estimation.likelihood import refine
-from positioner.estimation.segmentation import cut
+from positioner.estimation.batch import BatchResult, BatchSettings, even_instants, identify
+from positioner.estimation.likelihood import fit_motions
+from positioner.estimation.segmentation import find_motions
 from positioner.estimation.stem_response import responses, roots
 from sim.valve import Valve
 from tests.estimation.stem import COULOMB, NOISE, PSI, STATIC, STROKE, TRUTH, A, Array, B, C, K, Run, grid, run, swing
 
 NAMES = tuple(TRUTH)
-HELD = RecordSettings(pressure_held=True)
+HELD = BatchSettings(pressure_held=True)
 TAU, MU = A / B, -1 / B
 
 
@@ -24,15 +24,15 @@ def moved(period_s: float = 1e-3, rest_s: float = 0.1) -> Run:
     return run(swing, grid(period_s, -rest_s, 0.8), fine_s=period_s)
 
 
-def found(each: Run, settings: RecordSettings = HELD) -> Recorded:
+def found(each: Run, settings: BatchSettings = HELD) -> BatchResult:
     return identify(each.time_s, each.position_m, each.pressure_pa, settings)
 
 
-def errors(each: Recorded) -> list[float]:
+def errors(each: BatchResult) -> list[float]:
     return [getattr(each.estimates, name).value / TRUTH[name] - 1 for name in NAMES]
 
 
-def reasons(each: Recorded) -> list[Refusal]:
+def reasons(each: BatchResult) -> list[Refusal]:
     return [getattr(each.estimates, name).reason for name in NAMES]
 
 
@@ -81,7 +81,7 @@ def test_the_response_obeys_its_differential_equation(tau: float, mu: float) -> 
 
 @pytest.mark.parametrize("period_s", [1e-3, 5e-3])
 def test_without_noise_it_is_exact(period_s: float) -> None:
-    each = found(moved(period_s), RecordSettings(noise_std_m=1e-9, pressure_held=True))
+    each = found(moved(period_s), BatchSettings(noise_std_m=1e-9, pressure_held=True))
     assert max(map(abs, errors(each))) < 1e-6
     assert reasons(each) == [Refusal.VALID] * 6
 
@@ -116,11 +116,11 @@ def test_evened_stamps_keep_the_gaps() -> None:
     even_s = grid(1e-3, 0.0, 0.5)
     keep = rng.uniform(size=501) >= 0.05
     stamps_s = (even_s + 5e-5 * rng.uniform(-1, 1, 501))[keep]
-    again_s = evened(stamps_s)
+    again_s = even_instants(stamps_s)
     assert again_s is not None
     np.testing.assert_allclose(again_s, even_s[keep], atol=1e-5)
-    assert evened(even_s) is None
-    assert evened(np.cumsum(rng.exponential(1e-3, 500))) is None
+    assert even_instants(even_s) is None
+    assert even_instants(np.cumsum(rng.exponential(1e-3, 500))) is None
 
 
 def test_the_sample_at_which_it_broke_away_is_lost() -> None:
@@ -146,7 +146,7 @@ def test_behind_a_lag_of_0_3_s_only_the_ratios_are_known() -> None:
     fine = run(lagged, grid(1e-4, -0.1, 1.0))
     rows = slice(None, None, 10)
     seen = Run(fine.time_s[rows], fine.position_m[rows], fine.pressure_pa[rows]).noisy(np.random.default_rng(1))
-    for settings in (RecordSettings(), RecordSettings(pressure_held=False)):
+    for settings in (BatchSettings(), BatchSettings(pressure_held=False)):
         each = found(seen, settings)
         assert reasons(each) == [Refusal.MASS_NOT_IDENTIFIABLE] * 4 + [Refusal.VALID] * 2
         assert max(map(abs, errors(each)[4:])) < 0.01
@@ -176,7 +176,7 @@ def swung(until_s: float) -> Run:
 
 def test_rest_and_reversal_are_cut_out() -> None:
     whole = swung(1.7).noisy(np.random.default_rng(2))
-    pieces = cut(whole.time_s, whole.position_m, whole.pressure_pa, NOISE, 1e-3).stretches
+    pieces = find_motions(whole.time_s, whole.position_m, whole.pressure_pa, NOISE, 1e-3).segments
     assert [piece.direction for piece in pieces] == [1, -1, 1]
     assert [float(piece.time_s[piece.begins]) for piece in pieces] == pytest.approx([0.0, 0.9, 1.3], abs=1e-3)
     each = found(whole)
@@ -212,7 +212,7 @@ def test_nothing_moves_nothing_is_known() -> None:
     each = found(still)
     assert set(reasons(each)) == {Refusal.WAITING_FOR_MOTION}
     assert each.fit is None
-    assert refine([], held=True) is None
+    assert fit_motions([], held=True) is None
 
 
 def test_samples_that_are_no_numbers_are_missing_samples() -> None:

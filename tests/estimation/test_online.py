@@ -273,7 +273,7 @@ def test_a_later_motion_that_tells_less_replaces_nothing_until_it_tells_more() -
     for sample in noisy.samples():
         estimates = identification.update(*sample, parameters=True, friction=True)
         if estimates.acceptable:
-            doubts.append(estimates.doubt)
+            doubts.append(estimates.relative_variance)
             readings += estimates.progress > 0.5 and estimates.time_s < 0.66 and sample[0] > 1.25
     assert doubts == sorted(doubts, reverse=True)
     assert before.acceptable

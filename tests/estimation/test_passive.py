@@ -5,7 +5,7 @@ import pytest
 
 from config.valve_file import load_valve, shipped_valve
 from positioner.estimation.online import Identification, IdentificationSettings
-from positioner.estimation.refiner import InPlace
+from positioner.estimation.refiner import InProcessRefiner
 from sim.valve import Valve
 from tests.estimation.stem import AREA, COULOMB, NOISE, SPRING, STATIC, STROKE
 
@@ -16,7 +16,7 @@ def test_friction_that_drifts_by_30_percent_in_10_minutes_is_followed_within_3_p
     valve = Valve.from_file(load_valve(shipped_valve("seed")))
     valve.rest_at(0.05)
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InPlace())
+    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InProcessRefiner())
     identification.restart()
     errors = []
     for move in range(MOVES):
@@ -48,7 +48,7 @@ def test_a_first_move_alone_tells_nothing_that_may_be_used() -> None:
     valve = Valve.from_file(load_valve(shipped_valve("seed")))
     valve.rest_at(0.05)
     pressure_pa, rng = valve.pressure_pa, np.random.default_rng(0)
-    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InPlace())
+    identification = Identification(IdentificationSettings(stroke_m=STROKE, pressure_pa=4e5), InProcessRefiner())
     identification.restart()
     for row in range(250):
         if row == 100:

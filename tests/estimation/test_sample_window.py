@@ -5,11 +5,11 @@ from collections import deque
 import numpy as np
 import pytest
 
-from positioner.estimation.sample_window import Record
+from positioner.estimation.sample_window import SampleWindow
 
 
 def test_holds_the_last_samples_in_order_for_ever() -> None:
-    record = Record(window_s=0.019)
+    record = SampleWindow(window_s=0.019)
     truth: deque[tuple[float, ...]] = deque(maxlen=20)
     for i in range(1000):
         sample = (i * 1e-3, float(i) ** 2, -float(i))
@@ -24,7 +24,7 @@ def test_holds_the_last_samples_in_order_for_ever() -> None:
 
 
 def test_a_missing_sample_is_no_gap_and_a_gap_is() -> None:
-    record = Record(window_s=0.05)
+    record = SampleWindow(window_s=0.05)
     assert not record.breaks(0.0)
     for i in range(30):
         record.append(i * 1e-3, 0.0, 0.0)
@@ -36,7 +36,7 @@ def test_a_missing_sample_is_no_gap_and_a_gap_is() -> None:
 
 @pytest.mark.parametrize("period_s", [1e-5, 1e-3, 5e-3])
 def test_its_length_follows_from_the_period(period_s: float) -> None:
-    record = Record(window_s=0.05)
+    record = SampleWindow(window_s=0.05)
     for i in range(6):
         record.append(i * period_s, 0.0, 0.0)
     assert record.length == round(0.05 / period_s) + 1

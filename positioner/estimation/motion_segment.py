@@ -1,4 +1,4 @@
-"""A stretch of motion of one direction, with the rest that it began from: what a fit takes."""
+"""A segment of a record: motion in one direction, with the rest that it began from."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ from positioner.estimation.array import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class MotionSegment:
     """Samples of one motion, SI units, N of each.
 
     Attributes:
@@ -14,7 +14,7 @@ class Stretch:
         time_s: increasing.
         position_m: measured.
         pressure_pa: held: of the interval before each sample; else at each sample.
-        begins: the sample after which the stem seems to have begun to move; 0: it moved already.
+        begins: the last sample before the stem measurably moves; 0: it moved already.
         earliest: the first sample after which it may have begun; from it to `begins` the stem rests or has hardly left.
         rests_from: the first sample of that rest.
     """
