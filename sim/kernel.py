@@ -4,18 +4,21 @@ The kernel's text is `karnopp.py` with its empty places filled: each effect's fu
 the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
 effects' texts and of this file, and the numba version. numba keeps the machine code beside it. A change in any of them
 is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
+Of several processes that need it at once, one compiles and the others wait: the file is locked meanwhile.
 (numba's own cache does not see a change in a callee's file.) No fast-math: the order of operations is the text's.
 
 numba is untyped: its types stop here.
 """
 
 import atexit
+import fcntl
 import hashlib
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -87,7 +90,8 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
 def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int) -> Kernel:
     digest = hashlib.sha256(text.encode()).hexdigest()
     module = _module(f"valve_kernel_{digest}")
-    exec(compile(text, written(digest, text), "exec", dont_inherit=True), module.__dict__)
+    path = written(digest, text)
+    exec(compile(text, path, "exec", dont_inherit=True), module.__dict__)
     for i, (path, source) in enumerate(sources):
         part = _module(f"{module.__name__}_{i}")
         execute(source, path, part.__dict__)
@@ -96,10 +100,11 @@ def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int)
     entries = {name: getattr(module, name) for name in ENTRIES}
     _inlined(module.__dict__)
     try:
-        compiled = {
-            name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, nogil=True, **OPTIONS)(entry)
-            for name, entry in entries.items()
-        }
+        with _locked(path):
+            compiled = {
+                name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, nogil=True, **OPTIONS)(entry)
+                for name, entry in entries.items()
+            }
     except Exception as error:
         if not sources:
             raise
@@ -144,6 +149,18 @@ def _write(path: Path, text: str) -> Path:
             file.write(text)
         Path(file.name).replace(path)
     return path
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Keep other processes from compiling the file meanwhile: numba's index of the cache is not safe against them.
+
+    Where the file system has no locks each compiles for itself.
+    """
+    with path.open() as file:
+        with suppress(OSError):
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 @cache
