@@ -58,6 +58,14 @@ class Recording:
         columns, metadata = _read(Path(path), REQUIRED, CLOCK_STEPS_TOLERATED)
         return cls(columns, metadata)
 
+    def write(self, path: Path | str) -> None:
+        """Write as CSV, or as Parquet if the file is named so; numbers keep every bit.
+
+        Raises:
+            InputError: Parquet without pyarrow.
+        """
+        write_recording(Path(path), self)
+
     def __len__(self) -> int:
         return len(self.time_s)
 

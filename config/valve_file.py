@@ -81,6 +81,15 @@ def load_valve(path: Path | str) -> ValveFile:
     return file.model_copy(update={"effect": tuple(each.seen_from(path.parent) for each in file.effect)})
 
 
+def valve(name: Path | str) -> ValveFile:
+    """Read a valve file, or one that comes with the package by its name.
+
+    Raises:
+        InputError: there is none of that name; or names file, key, value and what is allowed.
+    """
+    return load_valve(find_valve(str(name)))
+
+
 def shipped_valve(name: str) -> Path:
     """Return the path of a valve file that comes with the package.
 

@@ -10,12 +10,13 @@ from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile
 
 
-def write_valve(path: Path, file: ValveFile, remarks: Sequence[str] = ()) -> None:
+def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) -> None:
     """Write a valve file, own effects named by their paths as seen from its folder; remarks become comments.
 
     Raises:
         InputError: it cannot be written.
     """
+    path = Path(path)
     beside = file.model_copy(update={"effect": tuple(_seen_from(path.parent, each) for each in file.effect)})
     text = "".join(f"# {remark}\n" for remark in remarks) + valve_toml(beside)
     try:

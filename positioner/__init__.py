@@ -1,5 +1,152 @@
-"""The site gateway: a daemon that positions a sticking valve, and the small tools around it.
+"""Sticking pneumatic control valves: identify, position, simulate, and find what a model of one lacks.
 
-`estimation` identifies the valve from integrals of its signals, `control` is the pure core (supervision, states
-S0 to S3, the law), `daemon` gives it a bus, a clock and registers, `cli` is the roof: one file a command.
+    import positioner as pos
+
+    valve = pos.valve("seed")                             a valve file, or one that comes along by its name
+    recording = pos.Recording.read("rec.csv")
+    print(pos.compare(recording, valve).summary())
+
+The names below are the library: they stay where rooms behind them move. Each is loaded when it is first asked for, so
+that `import positioner` takes no time and a gateway needs no more than it runs; what needs an extra says which.
+docs/library.md has an example of each. The rooms:
+
+    estimation   identifies the valve from integrals of its signals
+    control      the pure core: supervision, states S0 to S3, the law
+    daemon       gives it a bus, a clock and registers
+    response     step-response figures of a recording
+    cli          the roof: one file a command
 """
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from config.device import Device
+    from config.errors import InputError
+    from config.loading import Fraction, NonNegative, Port, Positive
+    from config.recording import Recording
+    from config.valve_file import ValveFile, valve
+    from config.writing import write_valve
+    from drivers.boundary import (
+        BadReply,
+        Capabilities,
+        Driver,
+        DriverError,
+        NoConnection,
+        NoReply,
+        Reading,
+        Refused,
+    )
+    from positioner.estimation.recording_estimates import RecordingEstimates, estimate
+    from positioner.response.response_figures import Response, respond
+    from sim.simulation import simulate
+    from workbench.blind.hiding import Hidden, hide
+    from workbench.compare.comparison import Comparison, compare
+    from workbench.data.imposed_motion import read_imposed
+    from workbench.fit.fitting import Fit, fit
+    from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
+    from workbench.select.diagnosis import Diagnosis, diagnose
+    from workbench.select.extension import Extension, extend
+
+__version__ = "0.1.0"
+
+_ROOMS = {
+    "config.device": ("Device",),
+    "config.errors": ("InputError",),
+    "config.loading": ("Fraction", "NonNegative", "Port", "Positive"),
+    "config.recording": ("Recording",),
+    "config.valve_file": ("ValveFile", "valve"),
+    "config.writing": ("write_valve",),
+    "drivers.boundary": (
+        "BadReply",
+        "Capabilities",
+        "Driver",
+        "DriverError",
+        "NoConnection",
+        "NoReply",
+        "Reading",
+        "Refused",
+    ),
+    "positioner.estimation.recording_estimates": ("RecordingEstimates", "estimate"),
+    "positioner.response.response_figures": ("Response", "respond"),
+    "sim.simulation": ("simulate",),
+    "workbench.blind.hiding": ("Hidden", "hide"),
+    "workbench.compare.comparison": ("Comparison", "compare"),
+    "workbench.data.imposed_motion": ("read_imposed",),
+    "workbench.fit.fitting": ("Fit", "fit"),
+    "workbench.forces.force_diagnosis": ("ForceDiagnosis", "diagnose_forces"),
+    "workbench.select.diagnosis": ("Diagnosis", "diagnose"),
+    "workbench.select.extension": ("Extension", "extend"),
+}
+"""The library's names, by where they live today."""
+_LIVES_IN = {name: room for room, names in _ROOMS.items() for name in names}
+
+__all__ = [
+    "BadReply",
+    "Capabilities",
+    "Comparison",
+    "Device",
+    "Diagnosis",
+    "Driver",
+    "DriverError",
+    "Extension",
+    "Fit",
+    "ForceDiagnosis",
+    "Fraction",
+    "Hidden",
+    "InputError",
+    "NoConnection",
+    "NoReply",
+    "NonNegative",
+    "Port",
+    "Positive",
+    "Reading",
+    "Recording",
+    "RecordingEstimates",
+    "Refused",
+    "Response",
+    "ValveFile",
+    "compare",
+    "diagnose",
+    "diagnose_forces",
+    "estimate",
+    "extend",
+    "fit",
+    "hide",
+    "read_imposed",
+    "respond",
+    "simulate",
+    "valve",
+    "write_valve",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load one of the library's names at its first use (PEP 562).
+
+    Raises:
+        AttributeError: the library has no such name.
+        ImportError: an extra is not installed, or a foreign package hides one of ours; one line says which.
+    """
+    if name not in _LIVES_IN:
+        raise AttributeError(f"module 'positioner' has no attribute {name!r}; it has: {', '.join(__all__)}")
+    from importlib import import_module
+
+    from positioner.own_packages import in_the_way
+
+    if said := in_the_way():
+        raise ImportError(f"positioner.{name}: {said}")
+    from config.extras import told
+
+    try:
+        found = getattr(import_module(_LIVES_IN[name]), name)
+    except ModuleNotFoundError as error:
+        if said := told(f"positioner.{name}", error):
+            raise ModuleNotFoundError(said, name=error.name) from None
+        raise
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """Return the library's names, for completion."""
+    return sorted({*globals(), *__all__})

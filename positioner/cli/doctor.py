@@ -1,7 +1,8 @@
-"""`positioner doctor`: checks a daemon's file, its bus, the machine's timing and permissions, a line each."""
+"""`positioner doctor`: checks the installation, a daemon's file, its bus, timing and permissions, a line each."""
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
 
     Check = Callable[[DaemonFile, Path], str]
 
-HELP = "check config, bus, timing and permissions, one line each; moves nothing"
+HELP = "check installation, config, bus, timing and permissions, one line each; moves nothing"
 EXAMPLE = "positioner doctor daemon.toml"
 
 LEAST_DAYS = 14
@@ -33,6 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.daemon_file import load_valves
 
     files = load_valves(arguments.config)
+    well = _told("packages", "", _packages)
     for file in files:
         print(f"{'config':12} ok    {arguments.config}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
     checks: list[tuple[str, Check, DaemonFile]] = [
@@ -41,15 +43,28 @@ def run(arguments: argparse.Namespace) -> int:
         ("priority", _priority, files[0]),
         *(("certificates", _certificates, file) for file in files),
     ]
-    well = True
     for name, check, file in checks:
         valve = f"{file.valve.name}: " if len(files) > 1 and check in (_bus, _recorder) else ""
-        try:
-            print(f"{name:12} ok    {valve}{check(file, arguments.config)}")
-        except Ailment as ailment:
-            print(f"{name:12} FAILS {valve}{ailment}")
-            well = False
+        well = _told(name, valve, partial(check, file, arguments.config)) and well
     return 0 if well else 1
+
+
+def _told(name: str, valve: str, check: "Callable[[], str]") -> bool:
+    """Make a check and print its line; return whether all is well."""
+    try:
+        print(f"{name:12} ok    {valve}{check()}")
+    except Ailment as ailment:
+        print(f"{name:12} FAILS {valve}{ailment}")
+        return False
+    return True
+
+
+def _packages() -> str:
+    from positioner.own_packages import HOME, OWN, in_the_way, sharing
+
+    if said := in_the_way() or sharing():
+        raise Ailment(said)
+    return f"{', '.join(OWN)} are positioner's own, in {HOME}"
 
 
 def _bus(file: "DaemonFile", _config: Path) -> str:

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from config.recording import Recording
-    from positioner.estimation.batch import BatchResult, BatchSettings
+    from positioner.estimation.batch import BatchResult
 
 HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
 EXAMPLE = "positioner estimate rec.csv --json estimated.json"
@@ -32,13 +31,13 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.errors import InputError
     from config.recording import Recording
-    from positioner.estimation.batch import identify
+    from positioner.cli.parts.naming import naming
+    from positioner.estimation.recording_estimates import estimate
 
-    if arguments.noise_m is not None and not arguments.noise_m > 0:
-        raise InputError("--noise-m", f"must be positive, it is {arguments.noise_m:g}")
+    held = None if arguments.pressure is None else arguments.pressure == "held"
     recording = Recording.read(arguments.recording)
-    pressure_pa, settings = _pressure(recording, arguments)
-    found = identify(recording.time_s, recording.position_m, pressure_pa, settings)
+    with naming({"noise_std_m": "--noise-m"}):
+        found = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held).found
     print("\n".join(_lines(arguments.recording, found, len(recording))))
     if arguments.json is not None:
         try:
@@ -46,21 +45,6 @@ def run(arguments: argparse.Namespace) -> int:
         except OSError as error:
             raise InputError(f"--json {arguments.json}", f"cannot be written: {error.strerror}") from None
     return 0 if found.estimates.law_ready else 1
-
-
-def _pressure(recording: "Recording", arguments: argparse.Namespace) -> tuple[Any, "BatchSettings"]:
-    """Return the measured pressure, or else the command: a row's is in force until the next row."""
-    import numpy as np
-
-    from positioner.estimation.batch import BatchSettings
-
-    measured = recording.columns.get("pressure_pa")
-    held = None if arguments.pressure is None else arguments.pressure == "held"
-    if measured is not None and np.isfinite(measured).mean() > 0.5:
-        return measured, BatchSettings(noise_std_m=arguments.noise_m, pressure_held=held)
-    command = recording.command_pa
-    ahead = np.append(command[:1], command[:-1])
-    return ahead, BatchSettings(noise_std_m=arguments.noise_m, pressure_held=True if held is None else held)
 
 
 def _lines(path: Path, found: "BatchResult", samples: int) -> list[str]:

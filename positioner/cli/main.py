@@ -11,8 +11,6 @@ import select
 import sys
 from collections.abc import Sequence
 
-from config.errors import InputError, Unfulfilled
-
 COMMANDS = (
     "demo",
     "sim",
@@ -35,12 +33,22 @@ COMMANDS = (
     "certificates",
 )
 
-EXTRAS = {"numba": "sim,plot", "scipy": "sim,plot", "matplotlib": "sim,plot", "cryptography": "tls"}
-"""Which extras of the package bring what a command may miss."""
-
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
+    from positioner.own_packages import in_the_way
+
+    if said := in_the_way():
+        print(f"positioner: {said}", file=sys.stderr)
+        return 2
+    return _done(words)
+
+
+def _done(words: Sequence[str] | None) -> int:
+    """Run one command, now that what it imports is known to be ours."""
+    from config.errors import InputError, Unfulfilled
+    from config.extras import told
+
     arguments = _parser().parse_args(words)
     try:
         status = int(arguments.run(arguments))
@@ -53,14 +61,10 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:
-        if error.name not in EXTRAS:
-            raise
-        print(
-            f"positioner {arguments.command}: needs {error.name}, which is not installed: "
-            f"pip install 'positioner[{EXTRAS[error.name]}]'",
-            file=sys.stderr,
-        )
-        return 2
+        if said := told(f"positioner {arguments.command}:", error):
+            print(said, file=sys.stderr)
+            return 2
+        raise
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:

@@ -24,31 +24,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate from rest at position 0 without pressure, and write the recording."""
-    import numpy as np
-
-    from config.loading import validated
-    from config.recording import Recording, write_recording
-    from config.slave_file import Sensor
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
-    from sim.transmitter import Transmitter
-    from sim.valve import Valve
+    from positioner.cli.parts.naming import naming
+    from sim.simulation import simulate
 
     path = find_valve(arguments.valve)
-    file = load_valve(path)
-    sensor = validated(Sensor, {"noise_std_m": arguments.noise_m, "seed": arguments.seed}, "--noise-m, --seed")
+    valve = load_valve(path)
     time_s, command_pa = read_series(arguments.input, "command_pa")
-    response = Valve.from_file(file, source=str(path)).run(command_pa[:-1], np.diff(time_s))
-    transmitter = Transmitter(sensor)
-    recording = Recording(
-        {
-            "time_s": time_s,
-            "command_pa": command_pa,
-            "position_m": np.array([transmitter.measure(position_m) for position_m in response.indicated_m]),
-            "pressure_pa": response.pressure_pa,
-        },
-        {"valve": file.valve.name, "source": "positioner simulate"},
-    )
-    write_recording(arguments.out, recording)
+    with naming({"valve file": str(path), "sensor": "--noise-m, --seed"}):
+        recording = simulate(valve, time_s, command_pa, noise_std_m=arguments.noise_m, seed=arguments.seed)
+    recording.write(arguments.out)
     print(f"{arguments.out}: {len(recording)} samples, {time_s[-1] - time_s[0]:g} s")
     return 0

@@ -6,7 +6,8 @@ is started at once, and does a small job of its own first, so that the first win
 as nice as can be and leaves the terminal's Ctrl-C to the daemon; it ends when its pipe does. If it dies, jobs are
 refused from then on and the algebraic estimates stand: one line in the log says so.
 
-    python -m positioner.daemon.refinement_process      is what it runs
+    python -P -m positioner.daemon.refinement_process      is what it runs; with -P, a `config.py` in the current
+    folder is not taken for ours
 """
 
 import logging
@@ -67,7 +68,7 @@ class RefinementProcess:
     def _started(self) -> "subprocess.Popen[bytes]":
         one_core = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
         return subprocess.Popen(
-            [sys.executable, "-m", "positioner.daemon.refinement_process"],
+            [sys.executable, "-P", "-m", "positioner.daemon.refinement_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,

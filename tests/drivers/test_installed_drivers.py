@@ -143,3 +143,8 @@ def test_a_schema_without_a_driver_is_one_line() -> None:
 
 def test_every_shipped_bus_has_both() -> None:
     assert offered(DEVICES).keys() == offered(DRIVERS).keys() >= {"modbus", "rtu", "canopen"}
+
+
+def test_the_guide_needs_nothing_but_the_library() -> None:
+    imported = re.findall(r"^(?:import|from) (\w+)", "".join(blocks("python")), re.MULTILINE)
+    assert set(imported) <= {"positioner", "acme_device"} | sys.stdlib_module_names

@@ -1,4 +1,7 @@
-"""Other positioner commands as processes of their own."""
+"""Other positioner commands as processes of their own.
+
+With -P: a `config.py` in the current folder is not taken for ours.
+"""
 
 import subprocess
 import sys
@@ -20,7 +23,7 @@ def running(command: str, config: Path, *options: str) -> Iterator[str]:
     Raises:
         InputError: it ended instead of getting ready; says why.
     """
-    words = [sys.executable, "-m", "positioner.cli", command, str(config), *options]
+    words = [sys.executable, "-P", "-m", "positioner.cli", command, str(config), *options]
     log_path = config.with_suffix(".log")
     with log_path.open("w") as log:
         process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log, text=True)

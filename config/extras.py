@@ -1,0 +1,36 @@
+"""Which extra of the package brings what is not installed, said in one line."""
+
+from importlib import import_module
+from typing import Any
+
+EXTRAS = {
+    "numba": "sim,plot",
+    "scipy": "sim,plot",
+    "matplotlib": "sim,plot",
+    "pandas": "frame",
+    "pyarrow": "parquet",
+    "plotly": "report",
+    "canopen": "canopen",
+    "can": "canopen",
+    "cryptography": "tls",
+}
+"""The extra, by the name of the module that is missing."""
+
+
+def told(who: str, error: ModuleNotFoundError) -> str:
+    """Return the line for a module that is missing: who needs it, and what to install; empty if no extra brings it."""
+    if error.name not in EXTRAS:
+        return ""
+    return f"{who} needs {error.name}, which is not installed: pip install 'positioner[{EXTRAS[error.name]}]'"
+
+
+def needed(module: str, who: str) -> Any:
+    """Import a module that an extra brings.
+
+    Raises:
+        ModuleNotFoundError: it is not installed; names who needs it and the extra.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(told(who, error) or str(error), name=error.name) from None

@@ -1,0 +1,95 @@
+"""Other people's `config`: never executed by our processes, named in one line where it is in the way."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from positioner.cli import doctor
+from positioner.cli.parts.children import running
+from positioner.daemon.refinement_process import RefinementProcess
+from positioner.estimation.batch import BatchSettings
+from positioner.estimation.refiner import RefinementJob
+from positioner.own_packages import sharing
+
+EXECUTED = "from pathlib import Path\nPath(__file__).with_name('executed').touch()\n"
+PATH = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+
+
+@pytest.fixture(params=["config.py", "config/__init__.py", "sim/__init__.py"])
+def foreign(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Stand in a folder with a foreign module; it must not be executed."""
+    file = tmp_path / str(request.param)
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(EXECUTED)
+    monkeypatch.chdir(tmp_path)
+    yield file
+    assert not file.with_name("executed").exists(), "a foreign module was executed"
+
+
+def run(*words: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=60, env=PATH)
+
+
+def told(foreign: Path) -> str:
+    name = foreign.stem if foreign.stem != "__init__" else foreign.parent.name
+    return f"{foreign.resolve()} is in the way of positioner's own package {name}: start from another folder"
+
+
+def test_the_command_does_not_see_it(foreign: Path) -> None:
+    assert run("positioner", "map").returncode == 0
+    Recording({"time_s": np.arange(9.0), "command_pa": np.zeros(9), "position_m": np.zeros(9)}).write("rec.csv")
+    estimated = run("positioner", "estimate", "rec.csv")
+    assert (estimated.returncode, estimated.stderr) == (1, "")
+    assert "9 samples" in estimated.stdout
+    Path("daemon.toml").write_text("[valve]\nstroke_m = 0.1\n[device]\nport = 1\n")
+    examined = run("positioner", "doctor", "daemon.toml").stdout
+    assert "packages     ok    config, fieldbus, drivers, sim, workbench are positioner's own" in examined
+
+
+def test_started_as_a_module_the_command_says_what_is_in_the_way(foreign: Path) -> None:
+    done = run(sys.executable, "-m", "positioner.cli", "doctor", "daemon.toml")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"positioner: {told(foreign)}")
+    assert done.stderr.count("\n") == 1
+
+
+def test_the_library_says_what_is_in_the_way(foreign: Path) -> None:
+    done = run(sys.executable, "-c", "import positioner as pos; pos.valve('seed')")
+    assert done.stderr.splitlines()[-1].startswith(f"ImportError: positioner.valve: {told(foreign)}")
+
+
+def test_a_child_does_not_see_it(foreign: Path) -> None:
+    Path("slave.toml").write_text('valve = "seed"\n')
+    with running("sim", Path("slave.toml"), "--port", "0") as ready:
+        assert "127.0.0.1:" in ready
+
+
+def test_the_refinement_process_does_not_see_it(foreign: Path) -> None:
+    process = RefinementProcess()
+    refiner = process.refiner(patient=True)
+    time_s = np.arange(0.0, 0.2, 1e-3)
+    assert refiner.submit(RefinementJob(time_s, 0.0 * time_s, 0.0 * time_s, BatchSettings(noise_std_m=1e-5)))
+    assert refiner.collect() is not None
+    assert process.alive
+    process.stop()
+
+
+def test_doctor_names_a_distribution_that_installed_over_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert sharing() == ""
+    metadata = tmp_path / "settings_for_all-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: settings-for-all\nVersion: 1.0\n")
+    (metadata / "RECORD").write_text("config/__init__.py,,\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert not doctor._told("packages", "", doctor._packages)
+    line = capsys.readouterr().out
+    assert line.startswith("packages     FAILS settings-for-all has installed its own config among positioner's: start")
+    assert line.count("\n") == 1
