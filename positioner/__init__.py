@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         Refused,
     )
     from positioner.estimation.recording_estimates import RecordingEstimates, estimate
-    from positioner.response.response_figures import Response, respond
+    from positioner.response.response_figures import ResponseFigures, respond
     from sim.simulation import simulate
     from workbench.blind.hiding import Hidden, hide
     from workbench.compare.comparison import Comparison, compare
@@ -67,7 +67,7 @@ _ROOMS = {
         "Refused",
     ),
     "positioner.estimation.recording_estimates": ("RecordingEstimates", "estimate"),
-    "positioner.response.response_figures": ("Response", "respond"),
+    "positioner.response.response_figures": ("ResponseFigures", "respond"),
     "sim.simulation": ("simulate",),
     "workbench.blind.hiding": ("Hidden", "hide"),
     "workbench.compare.comparison": ("Comparison", "compare"),
@@ -103,7 +103,7 @@ __all__ = [
     "Recording",
     "RecordingEstimates",
     "Refused",
-    "Response",
+    "ResponseFigures",
     "ValveFile",
     "compare",
     "diagnose",

@@ -104,7 +104,7 @@ class Dcs:
                 raise DcsError(f"{self._where}: {asked} was refused: {self._reason()}")
 
     def identify(
-        self, swing: Mapping[str, float], timeout_s: float, show: Callable[[float], None] = lambda _: None
+        self, excitation: Mapping[str, float], timeout_s: float, show: Callable[[float], None] = lambda _: None
     ) -> str | None:
         """Have the valve identified; return why nothing was applied, or None.
 
@@ -115,7 +115,7 @@ class Dcs:
             timeout_s: give up after this long.
             show: called with the progress, 0 to 1.
         """
-        self.set_all(swing)
+        self.set_all(excitation)
         applied_before = self.get("identifications")
         try:
             self.set_all({"eta_1": 0, "eta_2": 0, "eta_3": 0})

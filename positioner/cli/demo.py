@@ -48,7 +48,7 @@ RATIOS = ("b_over_c", "k_over_c")
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class StepOutcome:
     """One step of the reference and where the stem came to rest."""
 
     phase: str
@@ -58,7 +58,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Identified:
+class ComparedEstimate:
     """One number of one identification, against the truth."""
 
     phase: str
@@ -75,11 +75,11 @@ class Identified:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class DemoOutcome:
     """What the demo saw."""
 
-    steps: list[Step]
-    identified: list[Identified]
+    steps: list[StepOutcome]
+    identified: list[ComparedEstimate]
     cycle: dict[str, float]
 
     @property
@@ -97,7 +97,7 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
-class Wire:
+class BusSetup:
     """What a bus puts into the two files, and how its slave is started."""
 
     slave: str
@@ -111,17 +111,17 @@ class Wire:
 
 
 @contextmanager
-def _modbus() -> Iterator[Wire]:
-    yield Wire("", lambda ready: f"port = {_port_in(ready)}\n")
+def _modbus() -> Iterator[BusSetup]:
+    yield BusSetup("", lambda ready: f"port = {_port_in(ready)}\n")
 
 
 @contextmanager
-def _canopen() -> Iterator[Wire]:
-    yield Wire('[bus]\nkind = "canopen"\n', lambda ready: f'bus = "canopen"\nchannel = "{_port_in(ready)}"\n')
+def _canopen() -> Iterator[BusSetup]:
+    yield BusSetup('[bus]\nkind = "canopen"\n', lambda ready: f'bus = "canopen"\nchannel = "{_port_in(ready)}"\n')
 
 
 @contextmanager
-def _rtu() -> Iterator[Wire]:
+def _rtu() -> Iterator[BusSetup]:
     from positioner.cli.parts.pseudo_line import pseudo_line
 
     def serial(path: str) -> str:
@@ -130,10 +130,10 @@ def _rtu() -> Iterator[Wire]:
     with pseudo_line() as (end, other_end):
         slave = f'[bus]\nkind = "rtu"\n{serial(other_end)}'
         device = f'bus = "rtu"\n{serial(end)}'
-        yield Wire(slave, lambda _: device, options=(), period_s=RTU_PERIOD_S, window_s=RTU_WINDOW_S)
+        yield BusSetup(slave, lambda _: device, options=(), period_s=RTU_PERIOD_S, window_s=RTU_WINDOW_S)
 
 
-BUSES: dict[str, Callable[[], AbstractContextManager[Wire]]] = {"modbus": _modbus, "canopen": _canopen, "rtu": _rtu}
+BUSES: dict[str, Callable[[], AbstractContextManager[BusSetup]]] = {"modbus": _modbus, "canopen": _canopen, "rtu": _rtu}
 """The buses, by the name that `--bus` gives them."""
 
 
@@ -159,14 +159,14 @@ def run(arguments: argparse.Namespace) -> int:
     valve = load_valve(shipped_valve("seed")).valve
     with _folder(arguments.out) as folder:
         started_s = time.monotonic()
-        _say("starting a simulated valve and the daemon")
-        with started(arguments.bus, folder, valve) as site:
-            _say(f"slave {site.slave}; daemon {site.daemon}")
-            outcome = _play(_port_in(site.daemon), valve, site.powered_s)
+        _print_line("starting a simulated valve and the daemon")
+        with started(arguments.bus, folder, valve) as pair:
+            _print_line(f"slave {pair.slave}; daemon {pair.daemon}")
+            outcome = _play(_port_in(pair.daemon), valve, pair.powered_s)
         _report(outcome)
         picture = _picture(folder, outcome)
         if arguments.out:
-            _say(f"picture {picture}, recording {_recording(folder)}")
+            _print_line(f"picture {picture}, recording {_recording(folder)}")
         if arguments.json:
             arguments.json.write_text(json.dumps(_jsonable(outcome, time.monotonic() - started_s), indent=1) + "\n")
         for problem in outcome.problems:
@@ -176,7 +176,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class RunningPair:
     """A slave and a daemon that run: what each says, and when the slave was powered up."""
 
     slave: str
@@ -185,17 +185,17 @@ class Site:
 
 
 @contextmanager
-def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[Site]:
+def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[RunningPair]:
     """Run a slave and a daemon on a bus as processes, their files and logs in a folder."""
     from positioner.cli.parts.children import running
 
-    with BUSES[bus]() as wire:
-        slave_path = _write(folder / "slave.toml", _slave_toml(valve, wire.slave))
-        with running("sim", slave_path, *wire.options) as slave:
+    with BUSES[bus]() as setup:
+        slave_path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave))
+        with running("sim", slave_path, *setup.options) as slave:
             powered_s = time.monotonic()
-            daemon_path = _write(folder / "daemon.toml", _daemon_toml(valve, wire, slave))
+            daemon_path = _write(folder / "daemon.toml", _daemon_toml(valve, setup, slave))
             with running("run", daemon_path) as daemon:
-                yield Site(slave, daemon, powered_s)
+                yield RunningPair(slave, daemon, powered_s)
 
 
 @contextmanager
@@ -233,16 +233,16 @@ static_n = {AGEING * valve.static_n}
 """
 
 
-def _daemon_toml(valve: "ValveParameters", wire: Wire, ready: str) -> str:
+def _daemon_toml(valve: "ValveParameters", setup: BusSetup, ready: str) -> str:
     return f"""# The daemon of the demo. It knows the stroke; all else it identifies.
 [valve]
 name = "demo"
 stroke_m = {valve.stroke_m}
 [device]
-{wire.device(ready)}[cycle]
-period_s = {wire.period_s}
+{setup.device(ready)}[cycle]
+period_s = {setup.period_s}
 [identification]
-window_s = {wire.window_s}
+window_s = {setup.window_s}
 [supervisory]
 port = 0
 [recorder]
@@ -255,65 +255,65 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _play(port: int, valve: "ValveParameters", powered_s: float) -> Outcome:
+def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
     """Be the DCS."""
     from config.registers import STATISTICS
     from positioner.dcs import Dcs
 
     aged = valve.model_copy(update={"coulomb_n": AGEING * valve.coulomb_n, "static_n": AGEING * valve.static_n})
     with Dcs("127.0.0.1", port) as dcs:
-        _watch(dcs, 0.5, "S0, nothing moves")
+        _observe(dcs, 0.5, "S0, nothing moves")
         dcs.set("mode", 2)
         identified = _identify(dcs, "new", ALPHA_PA, valve)
         steps = _steps(dcs, "new", counted=True)
-        _watch(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
+        _observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
         steps += _steps(dcs, "aged", counted=False)
         identified += _identify(dcs, "aged", AGED_ALPHA_PA, aged)
         steps += _steps(dcs, "identified anew", counted=True)
         cycle = dcs.get_all(*(register.name for register in STATISTICS))
-    return Outcome(steps, identified, cycle)
+    return DemoOutcome(steps, identified, cycle)
 
 
-def _identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[Identified]:
+def _identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[ComparedEstimate]:
     from positioner.virtual.true_parameters import truth
 
     def show(progress: float) -> None:
-        _live(f"identifying ({phase}): {100 * progress:3.0f} %")
+        _show_passing(f"identifying ({phase}): {100 * progress:3.0f} %")
 
     problem = dcs.identify({"alpha": alpha_pa, "beta": BETA_PA, "omega": 1.0}, 5.0, show)
-    _say(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
-    return [_held_against(dcs, phase, name, true) for name, true in truth(valve).items()]
+    _print_line(f"identified ({phase})" if problem is None else f"identification ({phase}) failed: {problem}")
+    return [_compared(dcs, phase, name, true) for name, true in truth(valve).items()]
 
 
-def _held_against(dcs: "Dcs", phase: str, name: str, true: float) -> Identified:
+def _compared(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimate:
     from config.codes import Refusal
 
     now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
     reason = Refusal(int(now[f"{name}_reason"]))
     refusal = "" if reason is Refusal.VALID else reason.text
-    return Identified(phase, name, now[f"{name}_e"], now[f"{name}_std"], true, refusal)
+    return ComparedEstimate(phase, name, now[f"{name}_e"], now[f"{name}_std"], true, refusal)
 
 
-def _steps(dcs: "Dcs", phase: str, *, counted: bool) -> list[Step]:
+def _steps(dcs: "Dcs", phase: str, *, counted: bool) -> list[StepOutcome]:
     steps = []
     for reference_pu in STEPS:
         dcs.set("reference", reference_pu)
         label = f"{phase}: step to {reference_pu:g} p.u."
-        _watch(dcs, STEP_S - SETTLED_S, label)
-        settled_pu = _watch(dcs, SETTLED_S, label)
-        steps.append(Step(phase, reference_pu, settled_pu - reference_pu, counted))
-    _say(f"{phase}: {len(steps)} steps, worst {max(abs(step.error_pu) for step in steps):.4f} p.u.")
+        _observe(dcs, STEP_S - SETTLED_S, label)
+        settled_pu = _observe(dcs, SETTLED_S, label)
+        steps.append(StepOutcome(phase, reference_pu, settled_pu - reference_pu, counted))
+    _print_line(f"{phase}: {len(steps)} steps, worst {max(abs(step.error_pu) for step in steps):.4f} p.u.")
     return steps
 
 
-def _watch(dcs: "Dcs", duration_s: float, label: str) -> float:
+def _observe(dcs: "Dcs", duration_s: float, label: str) -> float:
     """Look on for a while; return the mean position, p.u."""
     end_s = time.monotonic() + duration_s
     positions = []
     while True:
         now = dcs.get_all("state", "position", "reference_in_force", "command")
         positions.append(now["position"])
-        _live(f"{label:36} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa")
+        _show_passing(f"{label:36} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa")
         if time.monotonic() >= end_s:
             return sum(positions) / len(positions)
         time.sleep(0.02)
@@ -327,7 +327,7 @@ def _bar(now: dict[str, float], width: int = 30) -> str:
     return f"[{''.join(cells)}] {now['position']:.3f}"
 
 
-def _live(text: str) -> None:
+def _show_passing(text: str) -> None:
     """Show a passing line on a terminal."""
     import sys
 
@@ -335,9 +335,9 @@ def _live(text: str) -> None:
         print(f"\r\033[K{text}", end="", flush=True)
 
 
-def _say(text: str) -> None:
+def _print_line(text: str) -> None:
     """Print a line that stays."""
-    _live("")
+    _show_passing("")
     print(text, flush=True)
 
 
@@ -345,7 +345,7 @@ def _percent(share: float | None) -> str:
     return "none" if share is None else f"{100 * share:+.2f} %"
 
 
-def _report(outcome: Outcome) -> None:
+def _report(outcome: DemoOutcome) -> None:
     print(f"\n{'':17}{'':10}{'identified':>13}{'std':>11}{'true':>13}{'deviation':>12}")
     for each in outcome.identified:
         print(
@@ -368,7 +368,7 @@ def _report(outcome: Outcome) -> None:
     print(", ".join(f"{name.replace('_', ' ')} {cycle[name]:.0f}" for name in counts))
 
 
-def _jsonable(outcome: Outcome, seconds: float) -> dict[str, object]:
+def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:
     return {
         "steps": [asdict(step) for step in outcome.steps],
         "identified": [_without_nan({**asdict(each), "deviation": each.deviation}) for each in outcome.identified],
@@ -387,7 +387,7 @@ def _recording(folder: Path) -> Path:
     return recording
 
 
-def _picture(folder: Path, outcome: Outcome) -> Path:
+def _picture(folder: Path, outcome: DemoOutcome) -> Path:
     from config.recording import read_recording
     from config.valve_file import load_valve, shipped_valve
     from positioner.virtual.run_picture import draw_run

@@ -15,12 +15,12 @@ HELP = "check installation, config, bus, timing and permissions, one line each; 
 EXAMPLE = "positioner doctor daemon.toml"
 
 LEAST_DAYS = 14
-"""A certificate that ends sooner than this is an ailment."""
+"""A certificate that ends sooner than this fails."""
 PERIODS = 500
 """Periods over which the machine's timing is watched."""
 
 
-class Ailment(Exception):
+class FailedCheck(Exception):
     """A check that failed, and why."""
 
 
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.daemon_file import load_valves
 
     files = load_valves(arguments.config)
-    well = _told("packages", "", _packages)
+    well = _passes("packages", "", _packages)
     for file in files:
         print(f"{'config':12} ok    {arguments.config}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
     checks: list[tuple[str, Check, DaemonFile]] = [
@@ -45,16 +45,16 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     for name, check, file in checks:
         valve = f"{file.valve.name}: " if len(files) > 1 and check in (_bus, _recorder) else ""
-        well = _told(name, valve, partial(check, file, arguments.config)) and well
+        well = _passes(name, valve, partial(check, file, arguments.config)) and well
     return 0 if well else 1
 
 
-def _told(name: str, valve: str, check: "Callable[[], str]") -> bool:
+def _passes(name: str, valve: str, check: "Callable[[], str]") -> bool:
     """Make a check and print its line; return whether all is well."""
     try:
         print(f"{name:12} ok    {valve}{check()}")
-    except Ailment as ailment:
-        print(f"{name:12} FAILS {valve}{ailment}")
+    except FailedCheck as failed:
+        print(f"{name:12} FAILS {valve}{failed}")
         return False
     return True
 
@@ -63,7 +63,7 @@ def _packages() -> str:
     from positioner.own_packages import HOME, OWN, in_the_way, sharing
 
     if said := in_the_way() or sharing():
-        raise Ailment(said)
+        raise FailedCheck(said)
     return f"{', '.join(OWN)} are positioner's own, in {HOME}"
 
 
@@ -82,14 +82,14 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
             reading = driver.read()
         took_s = (time.perf_counter() - started_s) / (PERIODS // 5)
     except DriverError as error:
-        raise Ailment(str(error)) from None
+        raise FailedCheck(str(error)) from None
     finally:
         driver.close()
     if not Settings.of(file).limits.plausible(reading.position_m):
-        raise Ailment(f"position {reading.position_m:g} m is not plausible: check device.map")
+        raise FailedCheck(f"position {reading.position_m:g} m is not plausible: check device.map")
     # A reading piece by piece, as a watcher of CANopen has it, says nothing of the cycle.
     if took_s > file.cycle.period_s and driver.capabilities.one_transaction:
-        raise Ailment(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
+        raise FailedCheck(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
     return f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"
 
 
@@ -102,7 +102,7 @@ def _supervisory(file: "DaemonFile", _config: Path) -> str:
         try:
             trial.bind((host, port))
         except OSError as error:
-            raise Ailment(f"{host}:{port}: {error.strerror} (is the daemon running already?)") from None
+            raise FailedCheck(f"{host}:{port}: {error.strerror} (is the daemon running already?)") from None
     return f"{host}:{port} is free"
 
 
@@ -120,9 +120,9 @@ def _certificates(file: "DaemonFile", _config: Path) -> str:
         try:
             end = expiry(table)
         except InputError as error:
-            raise Ailment(f"{name}: {error}") from None
+            raise FailedCheck(f"{name}: {error}") from None
         if (end - datetime.now(UTC)).days < LEAST_DAYS:
-            raise Ailment(f"{name}: {table.certificate} or its authority's ends on {end:%Y-%m-%d}: renew it")
+            raise FailedCheck(f"{name}: {table.certificate} or its authority's ends on {end:%Y-%m-%d}: renew it")
         ends.append(f"{name} until {end:%Y-%m-%d}")
     return ", ".join(ends) or "none configured"
 
@@ -135,17 +135,17 @@ def _recorder(file: "DaemonFile", config: Path) -> str:
     folder = config.parent / file.recorder.folder
     nearest = next(each for each in (folder, *folder.parents) if each.exists())
     if not os.access(nearest, os.W_OK):
-        raise Ailment(f"{folder}: cannot be written")
+        raise FailedCheck(f"{folder}: cannot be written")
     return f"{folder}, at most {file.recorder.keep_files * file.recorder.file_bytes / 1e6:.0f} MB"
 
 
 def _timing(file: "DaemonFile", _config: Path) -> str:
-    from positioner.daemon.pacing import RealTime
+    from positioner.daemon.pacing import RealTimePace
 
-    pace = RealTime(file.cycle.period_s)
+    pace = RealTimePace(file.cycle.period_s)
     missed = sum(pace.wait() for _ in range(PERIODS))
     if missed > PERIODS // 100:
-        raise Ailment(f"{missed} of {PERIODS} periods of {1e3 * file.cycle.period_s:g} ms missed without load")
+        raise FailedCheck(f"{missed} of {PERIODS} periods of {1e3 * file.cycle.period_s:g} ms missed without load")
     return f"{missed} of {PERIODS} periods of {1e3 * file.cycle.period_s:g} ms missed"
 
 
@@ -155,4 +155,4 @@ def _priority(_file: "DaemonFile", _config: Path) -> str:
 
     if os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] != 0:
         return "SCHED_FIFO permitted"
-    raise Ailment("SCHED_FIFO not permitted: give the service CAP_SYS_NICE or LimitRTPRIO for punctual cycles")
+    raise FailedCheck("SCHED_FIFO not permitted: give the service CAP_SYS_NICE or LimitRTPRIO for punctual cycles")

@@ -34,8 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     with connected(arguments) as dcs:
         if dcs.get("mode") != Mode.AUTOMATIC:
             raise Unfulfilled("the mode is not automatic, so nothing may move the valve: positioner set mode automatic")
-        swing = {name: value for name, value in asked.items() if value is not None}
-        return _report(dcs, dcs.identify(swing, arguments.timeout_s))
+        excitation = {name: value for name, value in asked.items() if value is not None}
+        return _report(dcs, dcs.identify(excitation, arguments.timeout_s))
 
 
 def _report(dcs: "Dcs", problem: str | None) -> int:

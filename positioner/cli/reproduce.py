@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from positioner.paper.findings import Findings
+    from positioner.paper.findings import SeedFindings
     from positioner.paper.formulas import Erratum
     from positioner.paper.noise_table import Cell
 
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.paper.findings import findings
     from positioner.paper.formulas import errata, refusal_of_printed_static_friction
     from positioner.paper.noise_table import lines, table
-    from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, course
+    from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, SEED_PERIOD_S, WHITE, run_scenario
 
     if arguments.seeds < 2:
         raise InputError("--seeds", f"must be at least 2, it is {arguments.seeds}")
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     cases = [(noise, SEED_PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE, FIELDBUS_PERIOD_S)]
     courses = []
     for noise, period_s in cases:
-        courses.append(course(file, noise, period_s))
+        courses.append(run_scenario(file, noise, period_s))
         print(f"S3, S1, S2 at {_period(period_s)}, noise {noise.name}: {len(courses[-1].time_s)} cycles", flush=True)
     wrong = errata(courses[0], file)
     refusal = refusal_of_printed_static_friction(file.valve)
@@ -97,7 +97,7 @@ def _write_json(path: Path, values: dict[str, object]) -> None:
         raise InputError(f"--json {path}", f"cannot be written: {error.strerror}") from None
 
 
-def _problems(wrong: list["Erratum"], refusal: str, found: list["Findings"]) -> list[str]:
+def _problems(wrong: list["Erratum"], refusal: str, found: list["SeedFindings"]) -> list[str]:
     """Return what is not as docs/seed.md says it is."""
     problems = [
         f"{each.where}, {each.quantity}: as printed {each.printed:g}, corrected {each.corrected:g}, true {each.true:g}"
@@ -132,7 +132,7 @@ def _errata_lines(wrong: list["Erratum"], refusal: str) -> list[str]:
     ]
 
 
-def _estimate_lines(found: list["Findings"]) -> list[str]:
+def _estimate_lines(found: list["SeedFindings"]) -> list[str]:
     columns = ("a_e", "b_e", "c_e", "worst", "k_e mean", "std", "last")
     lines = [
         "",
@@ -151,12 +151,12 @@ def _estimate_lines(found: list["Findings"]) -> list[str]:
         f"{'noise':20}{'sample':>8}" + "".join(f"{name:>11}" for name in ("a", "b", "c", "k", "b/c", "k/c")),
     ]
     for each in found:
-        errors_said = (_said(one.value / one.true - 1, one.reason) for one in each.identified)
+        errors_said = (_shown(one.value / one.true - 1, one.reason) for one in each.identified)
         lines.append(_head(each) + "".join(f"{text:>11}" for text in errors_said))
     return lines + list(_refusal_lines(found))
 
 
-def _refusal_lines(found: list["Findings"]) -> Iterable[str]:
+def _refusal_lines(found: list["SeedFindings"]) -> Iterable[str]:
     from config.codes import Refusal
 
     for each in found:
@@ -165,7 +165,7 @@ def _refusal_lines(found: list["Findings"]) -> Iterable[str]:
             yield f"  {each.noise}, {_period(each.period_s)}: {names} refused: {Refusal[reason].text}"
 
 
-def _law_lines(found: list["Findings"]) -> list[str]:
+def _law_lines(found: list["SeedFindings"]) -> list[str]:
     lines = [
         "",
         "largest error of the true stem over the last 0.2 s, p.u. of stroke",
@@ -180,7 +180,7 @@ def _law_lines(found: list["Findings"]) -> list[str]:
     return lines
 
 
-def _kept_lines(each: "Findings") -> list[str]:
+def _kept_lines(each: "SeedFindings") -> list[str]:
     return [
         "",
         f"error, p.u., that a single k_e leaves under the {each.noise}, by each reading of the text; plainest first",
@@ -192,7 +192,7 @@ def _kept_lines(each: "Findings") -> list[str]:
     ]
 
 
-def _claim_lines(found: list["Findings"]) -> list[str]:
+def _claim_lines(found: list["SeedFindings"]) -> list[str]:
     from positioner.paper.findings import CLAIMS
 
     lines = ["", "the seed's claims", *(f"  {claim:9} {text}" for claim, text in CLAIMS.items())]
@@ -204,7 +204,7 @@ def _claim_lines(found: list["Findings"]) -> list[str]:
     return [*lines, f"limits: {limits}", ""]
 
 
-def _head(each: "Findings") -> str:
+def _head(each: "SeedFindings") -> str:
     return f"{each.noise:20}{_period(each.period_s):>8}"
 
 
@@ -223,7 +223,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2f} %" if share < 1 else "lost"
 
 
-def _said(error: float, reason: str) -> str:
+def _shown(error: float, reason: str) -> str:
     return _deviation(error) if reason == "VALID" else f"({_deviation(error)})"
 
 
@@ -232,7 +232,7 @@ def _figure(figure: float) -> str:
 
 
 def _jsonable(
-    wrong: list["Erratum"], refusal: str, found: list["Findings"], cells: list["Cell"], seconds: float
+    wrong: list["Erratum"], refusal: str, found: list["SeedFindings"], cells: list["Cell"], seconds: float
 ) -> dict[str, object]:
     return {
         "errata": [asdict(each) for each in wrong],
@@ -243,7 +243,7 @@ def _jsonable(
     }
 
 
-def _case(each: "Findings") -> dict[str, object]:
+def _case(each: "SeedFindings") -> dict[str, object]:
     return {
         **asdict(each),
         "solved": [{**asdict(one), "error": one.error} for one in each.solved],

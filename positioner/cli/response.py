@@ -8,7 +8,7 @@ from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
     from config.recording import Recording
-    from positioner.response import Figure, Response, StepFigures
+    from positioner.response import Figure, ResponseFigures, StepFigures
 
 HELP = "step-response figures of a recording by their trade names; exit status 1 if it holds no step"
 EXAMPLE = "positioner response rec.csv --json figures.json"
@@ -58,7 +58,7 @@ def _recording(arguments: argparse.Namespace) -> "Recording":
     return recording or Recording.read(arguments.recording)
 
 
-def _lines(path: Path, response: "Response") -> list[str]:
+def _lines(path: Path, response: "ResponseFigures") -> list[str]:
     notes = [f"  note: {note}" for note in response.notes]
     if not response.steps:
         return [f"{path}: no step", *notes]
@@ -71,10 +71,10 @@ def _lines(path: Path, response: "Response") -> list[str]:
         _named("dead band", response.dead_band, scale, unit),
         _named("resolution", response.resolution, scale, unit),
     ]
-    return [*lines, *_untold(response), *notes]
+    return [*lines, *_undetermined(response), *notes]
 
 
-def _table(response: "Response", scale: float, unit: str) -> list[str]:
+def _table(response: "ResponseFigures", scale: float, unit: str) -> list[str]:
     head = "".join(f"{f'{name} {unit}'.strip():>13}" for name, unit, _, _ in COLUMNS)
     lines = [f"  {'step':>6}{'time s':>10}{f'from {unit}':>12}{f'to {unit}':>12}{head}"]
     for number, step in enumerate(response.steps, start=1):
@@ -83,7 +83,10 @@ def _table(response: "Response", scale: float, unit: str) -> list[str]:
         lines.append(f"  {number:>6}{step.time_s:>10.4g}{ends}{figures}")
     for which in ("smallest", "median", "largest"):
         cells = [(response.summary(name), factor) for _, _, name, factor in COLUMNS]
-        values = (f"{'-' if told is None else f'{factor * getattr(told, which):.4g}':>13}" for told, factor in cells)
+        values = (
+            f"{'-' if determined is None else f'{factor * getattr(determined, which):.4g}':>13}"
+            for determined, factor in cells
+        )
         lines.append(f"  {which:<40}{''.join(values)}")
     return lines
 
@@ -94,11 +97,11 @@ def _cell(figure: "Figure", factor: float) -> str:
 
 def _named(name: str, figure: "Figure", factor: float, unit: str) -> str:
     if figure.value is None:
-        return f"  {name:<12} cannot be told: {figure.reason}"
+        return f"  {name:<12} cannot be determined: {figure.reason}"
     return f"  {name:<12} {factor * figure.value:.4g} ± {factor * (figure.plus_minus or 0.0):.2g} {unit}"
 
 
-def _untold(response: "Response") -> list[str]:
+def _undetermined(response: "ResponseFigures") -> list[str]:
     """Return why figures are missing, each reason once, with its steps and figures."""
     reasons: dict[str, dict[str, list[int]]] = {}
     for number, step in enumerate(response.steps, start=1):
@@ -112,7 +115,7 @@ def _untold(response: "Response") -> list[str]:
 
 
 def _missing(step: "StepFigures", input_: str) -> list[tuple[str, str]]:
-    """Return what is not told and why, but for the error of a pressure, which never is."""
+    """Return what is not determined and why, but for the error of a pressure, which never is."""
     figures = [
         (heading, getattr(step, name))
         for heading, _, name, _ in COLUMNS

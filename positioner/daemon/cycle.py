@@ -20,7 +20,7 @@ from positioner.control.sample import Sample
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.health import Health
 from positioner.daemon.link import Link
-from positioner.daemon.logs import about, say
+from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.pacing import Pace
 from positioner.daemon.recorder import Recorder, Row
 from positioner.daemon.snapshot import Snapshot
@@ -56,12 +56,12 @@ class Cycle:
 
     def prepare(self) -> None:
         """Make the calling thread, which takes the turns, as punctual as can be."""
-        with about(self._valve):
+        with logging_valve(self._valve):
             self._pace.prepare()
 
     def turn(self) -> None:
         """Wait until the next cycle is due and run it."""
-        with about(self._valve):
+        with logging_valve(self._valve):
             missed = self._pace.wait()
             started_s = time.monotonic()
             self.once()
@@ -70,8 +70,8 @@ class Cycle:
     def once(self) -> None:
         """Run one cycle."""
         before, self.snapshot = self.snapshot, self._decide()
-        if _told(before.decision) != _told(self.snapshot.decision):
-            _tell(self.snapshot.decision)
+        if _logged_fields(before.decision) != _logged_fields(self.snapshot.decision):
+            _log_decision(self.snapshot.decision)
 
     def _decide(self) -> Snapshot:
         sent_pa = self._controller.command_pa
@@ -94,12 +94,12 @@ def run_in_turn(cycles: Sequence[Cycle], stop: Event) -> None:
             cycle.turn()
 
 
-def _told(decision: Decision) -> tuple[object, ...]:
+def _logged_fields(decision: Decision) -> tuple[object, ...]:
     return decision.state, decision.mode, decision.fault, decision.inhibit_reason, decision.applied
 
 
-def _tell(decision: Decision) -> None:
-    say(
+def _log_decision(decision: Decision) -> None:
+    log_event(
         log,
         logging.WARNING if decision.fault else logging.INFO,
         "decision",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from config.codes import Quality
 from drivers.boundary import Driver, DriverError, Reading
 from positioner.control.sample import Sample
-from positioner.daemon.logs import say
+from positioner.daemon.logs import log_event
 from positioner.daemon.pacing import Pace
 
 log = logging.getLogger(__name__)
@@ -68,7 +68,7 @@ class Link:
         try:
             self._driver.write(command_pa)
         except DriverError as error:
-            say(log, logging.ERROR, "device not left as configured", reason=str(error), command_pa=command_pa)
+            log_event(log, logging.ERROR, "device not left as configured", reason=str(error), command_pa=command_pa)
 
     def release(self) -> None:
         """Close the connection."""
@@ -78,12 +78,12 @@ class Link:
         self._held_pa = self._driver.open()
         self._connected = True
         self._reading = None
-        say(log, logging.WARNING, "device is back", held_pa=self._held_pa)
+        log_event(log, logging.WARNING, "device is back", held_pa=self._held_pa)
 
     def _lose(self, error: DriverError) -> None:
         self.counts.lost_replies += 1
         if self._connected:
-            say(log, logging.WARNING, "no good reply", reason=str(error))
+            log_event(log, logging.WARNING, "no good reply", reason=str(error))
         self._driver.close()
         self._connected = False
         self._sample = replace(self._sample, now_s=self._pace.now_s(None), quality=Quality.LOST, held_pa=None)

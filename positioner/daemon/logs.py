@@ -17,7 +17,7 @@ _VALVE: ContextVar[str | None] = ContextVar("valve", default=None)
 
 
 @contextmanager
-def about(valve: str | None) -> Iterator[None]:
+def logging_valve(valve: str | None) -> Iterator[None]:
     """Have every line that this thread logs in the meantime name a valve."""
     token = _VALVE.set(valve)
     try:
@@ -26,7 +26,7 @@ def about(valve: str | None) -> Iterator[None]:
         _VALVE.reset(token)
 
 
-def say(log: logging.Logger, level: int, event: str, **fields: object) -> None:
+def log_event(log: logging.Logger, level: int, event: str, **fields: object) -> None:
     """Log an event with its fields, as data."""
     if log.isEnabledFor(level):
         log.log(level, event, extra={"fields": fields})

@@ -13,7 +13,7 @@ import sys
 import time
 from typing import Protocol
 
-from positioner.daemon.logs import say
+from positioner.daemon.logs import log_event
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +48,7 @@ class Pace(Protocol):
         ...
 
 
-class RealTime:
+class RealTimePace:
     """Absolute deadlines on the gateway's monotonic clock.
 
     Args:
@@ -135,7 +135,7 @@ def raise_priority() -> bool:
     libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
     locked = libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0
     fifo = _take_fifo()
-    say(log, logging.INFO, "cycle thread", fifo=fifo, memory_locked=locked)
+    log_event(log, logging.INFO, "cycle thread", fifo=fifo, memory_locked=locked)
     return fifo
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 from config.errors import InputError
-from positioner.daemon.logs import say
+from positioner.daemon.logs import log_event
 
 log = logging.getLogger(__name__)
 
@@ -95,7 +95,7 @@ class Recorder:
                 failed = False
             except OSError as error:
                 if not failed:
-                    say(log, logging.ERROR, "recording fails", folder=str(self._folder), reason=error.strerror)
+                    log_event(log, logging.ERROR, "recording fails", folder=str(self._folder), reason=error.strerror)
                 failed = True
                 if self._stopping.is_set():
                     break
@@ -134,7 +134,7 @@ class Recorder:
         mine = re.compile(re.escape(self._stem) + r"-\d{8}T\d{6}Z-\d+\.csv")
         for old in sorted(each for each in self._folder.iterdir() if mine.fullmatch(each.name))[: -self._keep_files]:
             old.unlink()
-        say(log, logging.INFO, "recording", file=str(path))
+        log_event(log, logging.INFO, "recording", file=str(path))
 
 
 def _line(row: Row, unrecorded: int) -> str:

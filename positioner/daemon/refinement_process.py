@@ -22,7 +22,7 @@ from typing import IO, cast
 
 import numpy as np
 
-from positioner.daemon.logs import say
+from positioner.daemon.logs import log_event
 from positioner.estimation.batch import BatchResult, BatchSettings
 from positioner.estimation.refiner import RefinementJob
 
@@ -90,7 +90,7 @@ class RefinementProcess:
                 except (OSError, EOFError, pickle.UnpicklingError) as error:
                     self.alive = False
                     result = None
-                    say(log, logging.ERROR, "the refinement process is gone", reason=str(error))
+                    log_event(log, logging.ERROR, "the refinement process is gone", reason=str(error))
                 refiner.deliver(result)
                 task = self._jobs.get()
 

@@ -24,22 +24,22 @@ from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle, run_in_turn
-from positioner.daemon.health import Health, HealthKeeper, HealthSettings, Kept
+from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth
 from positioner.daemon.link import Link
-from positioner.daemon.logs import about, say, start_logging
-from positioner.daemon.pacing import DevicePace, Pace, RealTime
+from positioner.daemon.logs import log_event, logging_valve, start_logging
+from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 
 log = logging.getLogger(__name__)
 
-LOOK_EVERY_S = 0.05
+SIGNAL_CHECK_S = 0.05
 """How often the main thread looks whether a signal came."""
 
 
 @dataclass(frozen=True, slots=True)
-class Valve:
+class ServedValve:
     """One valve of the daemon, put together from its file."""
 
     file: DaemonFile
@@ -49,7 +49,7 @@ class Valve:
     cycle: Cycle
     recorder: Recorder | None
     keeper: HealthKeeper
-    absence: str | None
+    unreachable_reason: str | None
     """Why its device could not be reached at the start; the cycle goes on asking."""
 
     @property
@@ -66,7 +66,7 @@ class Valve:
 
     def leave(self) -> None:
         """Give the device the command of the safe action."""
-        with about(self.name):
+        with logging_valve(self.name):
             self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.command_pa))
 
 
@@ -101,45 +101,49 @@ def serve(files: Sequence[DaemonFile], source: Path) -> int:
         status = _run(valves, ended)
         for valve in valves:
             valve.leave()
-        say(log, logging.INFO, "stopped", status=status)
+        log_event(log, logging.INFO, "stopped", status=status)
     return status
 
 
 def _assembled(
     file: DaemonFile, pace: Pace, source: Path, is_alone: bool, on_exit: ExitStack, refinement: RefinementProcess
-) -> Valve:
+) -> ServedValve:
     settings = Settings.of(file)
     link = Link(driver_for(file.device), pace)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
-    absence = None
+    unreachable_reason = None
     try:
         held_pa, reading = link.open()
     except DriverError as error:
         if is_alone:
             raise InputError(where, f"device: {error}") from None
-        held_pa, absence = settings.minimum_pa, str(error)
+        held_pa, unreachable_reason = settings.minimum_pa, str(error)
     else:
         _require_plausible(reading, held_pa, settings, where)
     recorder = _recorder(file, source)
     controller = Controller(settings, held_pa, refinement.refiner(blocking=file.cycle.pace == "device"))
-    kept = None if file.health.folder is None else Kept.in_folder(source.parent / file.health.folder, file.valve.name)
-    health = Health(HealthSettings.of(file.health, file.valve.stroke_m), kept.record if kept else None)
-    with about(file.valve.name):
+    stored = (
+        None
+        if file.health.folder is None
+        else StoredHealth.in_folder(source.parent / file.health.folder, file.valve.name)
+    )
+    health = Health(HealthSettings.of(file.health, file.valve.stroke_m), stored.record if stored else None)
+    with logging_valve(file.valve.name):
         cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health)
-    keeper = HealthKeeper(health, lambda: cycle.snapshot.decision, file.valve.name, kept)
-    return Valve(file, settings, link, controller, cycle, recorder, keeper, absence)
+    keeper = HealthKeeper(health, lambda: cycle.snapshot.decision, file.valve.name, stored)
+    return ServedValve(file, settings, link, controller, cycle, recorder, keeper, unreachable_reason)
 
 
-def _announce(valve: Valve, port: int) -> None:
-    with about(valve.name):
+def _announce(valve: ServedValve, port: int) -> None:
+    with logging_valve(valve.name):
         where = valve.file.supervisory
-        say(log, logging.INFO, "serving", host=where.host, port=port, unit=where.unit)
-        if valve.absence is not None:
-            say(log, logging.WARNING, "device is not there", reason=valve.absence)
+        log_event(log, logging.INFO, "serving", host=where.host, port=port, unit=where.unit)
+        if valve.unreachable_reason is not None:
+            log_event(log, logging.WARNING, "device is not there", reason=valve.unreachable_reason)
 
 
-def _run(valves: Sequence[Valve], ended: list[int]) -> int:
+def _run(valves: Sequence[ServedValve], ended: list[int]) -> int:
     """Run the cycles until a signal ends them, or until one fails; return the exit status.
 
     Each has a thread of its own, save that valves on one line share that line's.
@@ -160,16 +164,16 @@ def _run(valves: Sequence[Valve], ended: list[int]) -> int:
     for thread in threads:
         thread.start()
     while not (ended or failures):
-        threads[0].join(LOOK_EVERY_S)
+        threads[0].join(SIGNAL_CHECK_S)
     stop.set()
     for thread in threads:
         thread.join()
     return 1 if failures else 0
 
 
-def _by_line(valves: Sequence[Valve]) -> list[list[Valve]]:
+def _by_line(valves: Sequence[ServedValve]) -> list[list[ServedValve]]:
     """Return the valves of each line together, each valve with a connection of its own alone."""
-    lines: dict[object, list[Valve]] = {}
+    lines: dict[object, list[ServedValve]] = {}
     for valve in valves:
         lines.setdefault(valve.file.device.line or valve.name, []).append(valve)
     return list(lines.values())
@@ -183,19 +187,19 @@ def _paces(files: Sequence[DaemonFile]) -> list[Pace]:
     """
     if len(files) == 1:
         (file,) = files
-        return [DevicePace() if file.cycle.pace == "device" else RealTime(file.cycle.period_s)]
+        return [DevicePace() if file.cycle.pace == "device" else RealTimePace(file.cycle.period_s)]
     lines = [file.device.line for file in files]
     return [
         DevicePace()
         if file.cycle.pace == "device"
-        else RealTime(
+        else RealTimePace(
             file.cycle.period_s, file.cycle.period_s * lines[:index].count(line) / lines.count(line), may_spin=False
         )
         for index, (file, line) in enumerate(zip(files, lines, strict=True))
     ]
 
 
-def _server(valves: Sequence[Valve]) -> RegisterServer:
+def _server(valves: Sequence[ServedValve]) -> RegisterServer:
     first, *others = valves
     where = first.file.supervisory
     return RegisterServer(

@@ -32,8 +32,8 @@ from config.registers import (
 from fieldbus.modbus.server import ExceptionCode, RegisterError, Table
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
-from positioner.daemon.health import Health, condition
-from positioner.daemon.logs import about, say
+from positioner.daemon.health import Health, ne107_condition
+from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
@@ -82,15 +82,15 @@ class SupervisoryRegisters:
         Raises:
             RegisterError: see the head of this module.
         """
-        with about(self._valve):
+        with logging_valve(self._valve):
             try:
                 values = self._decoded(address, words)
-                self._cycle.requests = self._asked(values)
-            except _Refusal as refusal:
-                say(log, logging.WARNING, "write refused", peer=peer, address=address, reason=refusal.reason)
-                raise RegisterError(refusal.code) from None
+                self._cycle.requests = self._requested(values)
+            except WriteRejected as rejected:
+                log_event(log, logging.WARNING, "write refused", peer=peer, address=address, reason=rejected.reason)
+                raise RegisterError(rejected.code) from None
             level = logging.DEBUG if values.keys() <= {"reference", "reference_scaled", "heartbeat"} else logging.INFO
-            say(log, level, "write", peer=peer, **values)
+            log_event(log, level, "write", peer=peer, **values)
 
     def _encoded(self, register: Register, snapshot: Snapshot, requests: Requests) -> list[int]:
         if register.name == "heartbeat":
@@ -108,19 +108,21 @@ class SupervisoryRegisters:
         while at < end:
             register = AT.get(at)
             if register is None or register.access == "r":
-                raise _Refusal(
+                raise WriteRejected(
                     ExceptionCode.ILLEGAL_ADDRESS, f"{register.name if register else at}: nothing to write there"
                 )
             if register.address != at or register.end > end:
-                raise _Refusal(ExceptionCode.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words")
+                raise WriteRejected(
+                    ExceptionCode.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words"
+                )
             value = register.format.decode(words[at - address : register.end - address])
             if problem := register.problem_with(value):
-                raise _Refusal(ExceptionCode.ILLEGAL_VALUE, problem)
+                raise WriteRejected(ExceptionCode.ILLEGAL_VALUE, problem)
             values[register.name] = value
             at = register.end
         return values
 
-    def _asked(self, values: Mapping[str, float]) -> Requests:
+    def _requested(self, values: Mapping[str, float]) -> Requests:
         """Return what is asked for after these writes."""
         requests = self._cycle.requests
         if {"reference", "reference_scaled"} & values.keys():
@@ -161,27 +163,29 @@ class SupervisoryRegisters:
         scaled = values.get("reference_scaled", math.nan) / SCALE
         reference = values.get("reference", scaled)
         if abs(reference - scaled) > 1 / SCALE:
-            raise _Refusal(ExceptionCode.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
+            raise WriteRejected(ExceptionCode.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
         return reference * self._stroke_m
 
     def _mode(self, value: float) -> Mode:
         mode, fault = Mode(int(value)), self._cycle.snapshot.decision.fault
         if mode is not Mode.HOLD and fault is not Fault.NONE:
-            raise _Refusal(ExceptionCode.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
+            raise WriteRejected(ExceptionCode.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
         return mode
 
     def _require_friction(self) -> None:
         if self._cycle.snapshot.decision.applied.ratios is None:
-            raise _Refusal(ExceptionCode.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
+            raise WriteRejected(ExceptionCode.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
 
     def _manual_pa(self, value: float) -> float:
         if not self._minimum_pa <= value <= self._maximum_pa:
             allowed = f"{self._minimum_pa:g} to {self._maximum_pa:g} Pa"
-            raise _Refusal(ExceptionCode.ILLEGAL_VALUE, f"manual_pressure: allowed is {allowed}, got {value:g}")
+            raise WriteRejected(ExceptionCode.ILLEGAL_VALUE, f"manual_pressure: allowed is {allowed}, got {value:g}")
         return value
 
 
-class _Refusal(Exception):
+class WriteRejected(Exception):
+    """A write that is not taken: the Modbus exception that answers it, and the reason for the log."""
+
     def __init__(self, code: ExceptionCode, reason: str) -> None:
         self.code = code
         self.reason = reason
@@ -285,9 +289,9 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     return {
         "health_baseline": lambda _s, _r: 0,
         "health_reset": lambda _s, _r: 0,
-        "ne107": lambda s, _: condition(s.decision, health).status,
-        "ne107_cause": lambda s, _: condition(s.decision, health).cause,
-        "ne107_causes": lambda s, _: condition(s.decision, health).bits,
+        "ne107": lambda s, _: ne107_condition(s.decision, health).status,
+        "ne107_cause": lambda s, _: ne107_condition(s.decision, health).cause,
+        "ne107_causes": lambda s, _: ne107_condition(s.decision, health).bits,
         "friction": lambda _s, _r: health.friction_pa,
         "friction_baseline": lambda _s, _r: health.baseline_pa,
         "friction_ratio": lambda _s, _r: health.friction_ratio,

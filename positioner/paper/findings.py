@@ -1,4 +1,4 @@
-"""What a course of the seed's scenario says about the seed's claims.
+"""What a run of the seed's scenario shows of the seed's claims.
 
 Two ways stand side by side: the seed's own (its solve and filters, corrected; k_e of the last instant kept), and the
 daemon's (exact on the samples, friction from the means of the motion). The law is the same: it needs b/c and k/c.
@@ -15,14 +15,14 @@ from positioner.estimation import Ratios
 from positioner.estimation.array import Array
 from positioner.paper.formulas import (
     QUANTITIES,
-    Tracks,
+    ParameterTracks,
     corrected_filters,
     exact_filters,
     fir_length,
     friction,
     tracks,
 )
-from positioner.paper.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, Course
+from positioner.paper.scenario import DOWN_PU, S1_FROM_S, S2_FROM_S, UNTIL_S, UP_PU, ScenarioRun
 from positioner.virtual.true_parameters import truth
 from sim.valve import Valve
 
@@ -42,7 +42,7 @@ CLAIMS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class SolvedParameter:
     """a, b or c by the seed's solve: at 0.8 s, and the worst relative error from 0.4 s on."""
 
     name: str
@@ -73,7 +73,7 @@ class Scatter:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptFrictionError:
     """What keeping a single k_e would leave of error, p.u.: the last one, and the worst from 0.4 s on.
 
     The seed's text leaves open whether 500 samples are 500 periods, and what x_e is; `filters` are the trapezoidal
@@ -88,8 +88,8 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class Identified:
-    """What the daemon says of one number, SI units; NaN when it says nothing."""
+class DaemonEstimate:
+    """The daemon's estimate of one number against the truth, SI units; NaN when it gives none."""
 
     name: str
     value: float
@@ -99,7 +99,7 @@ class Identified:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class SteadyStateError:
     """The largest distance of the true stem from the reference in the steady state, p.u., by either way."""
 
     state: str
@@ -123,45 +123,45 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Findings:
-    """All that is said of one course."""
+class SeedFindings:
+    """All findings of one run."""
 
     noise: str
     period_s: float
-    solved: tuple[Solved, ...]
+    solved: tuple[SolvedParameter, ...]
     k: Scatter
     k_over_c: Scatter
-    kept: tuple[Kept, ...]
-    identified: tuple[Identified, ...]
-    steps: tuple[Step, ...]
+    kept: tuple[KeptFrictionError, ...]
+    identified: tuple[DaemonEstimate, ...]
+    steps: tuple[SteadyStateError, ...]
     claims: tuple[Claim, ...]
 
 
-def findings(course: Course, file: ValveFile) -> Findings:
-    """Return what a course says."""
+def findings(run: ScenarioRun, file: ValveFile) -> SeedFindings:
+    """Return the findings of a run."""
     valve = file.valve
-    true, seen = truth(valve), tracks(course)
+    true, seed_tracks = truth(valve), tracks(run)
     by_solve = tuple(
-        Solved(name, float(row[-1]), true[name], float(np.abs(row / true[name] - 1).max()))
-        for name, row in zip(QUANTITIES, seen.theta, strict=True)
+        SolvedParameter(name, float(row[-1]), true[name], float(np.abs(row / true[name] - 1).max()))
+        for name, row in zip(QUANTITIES, seed_tracks.theta, strict=True)
     )
-    k = seed_friction(course, seen)
-    kept = _kept(course, seen, valve)
-    steps = _steps(course, file, seed_ratios(course, seen))
+    k = seed_friction(run, seed_tracks)
+    kept = _kept_friction_errors(run, seed_tracks, valve)
+    steps = _steps(run, file, seed_ratios(run, seed_tracks))
     figures = {
         "a": max(each.worst_error for each in by_solve),
         "b": kept[0].worst_error_pu,
         "c": max(step.seed_error_pu for step in steps),
         "c daemon": max(step.daemon_error_pu for step in steps),
     }
-    return Findings(
-        noise=course.noise.name,
-        period_s=course.period_s,
+    return SeedFindings(
+        noise=run.noise.name,
+        period_s=run.period_s,
         solved=by_solve,
         k=Scatter.of(k, true["k"]),
-        k_over_c=Scatter.of(k / seen.theta[2], true["k_over_c"]),
+        k_over_c=Scatter.of(k / seed_tracks.theta[2], true["k_over_c"]),
         kept=kept,
-        identified=_identified(course, true),
+        identified=_identified(run, true),
         steps=steps,
         claims=tuple(
             Claim(claim, figure, LARGEST_MISMATCH if claim == "a" else LARGEST_ERROR_PU)
@@ -170,37 +170,43 @@ def findings(course: Course, file: ValveFile) -> Findings:
     )
 
 
-def seed_friction(course: Course, seen: Tracks) -> Array:
+def seed_friction(run: ScenarioRun, seed_tracks: ParameterTracks) -> Array:
     """Return k_e as the seed says: 500 samples, the trapezoidal rule, the measured position."""
-    return friction(course, seen, corrected_filters(fir_length(course), course.period_s), course.measured_m)
+    return friction(run, seed_tracks, corrected_filters(fir_length(run), run.period_s), run.measured_m)
 
 
-def seed_ratios(course: Course, seen: Tracks) -> Ratios:
+def seed_ratios(run: ScenarioRun, seed_tracks: ParameterTracks) -> Ratios:
     """Return what the seed's law goes by: its solve and the friction of the last instant of S3."""
-    _, b, c = seen.theta[:, -1].tolist()
-    return Ratios(b / c, float(seed_friction(course, seen)[-1]) / c)
+    _, b, c = seed_tracks.theta[:, -1].tolist()
+    return Ratios(b / c, float(seed_friction(run, seed_tracks)[-1]) / c)
 
 
-def _kept(course: Course, seen: Tracks, valve: ValveParameters) -> tuple[Kept, ...]:
+def _kept_friction_errors(
+    run: ScenarioRun, seed_tracks: ParameterTracks, valve: ValveParameters
+) -> tuple[KeptFrictionError, ...]:
     """Return the errors by every reading of the seed's text, its plainest first."""
     friction_pu = valve.coulomb_n / (valve.spring_n_per_m * valve.stroke_m)
     true = truth(valve)["k_over_c"]
     kept = []
-    for samples in (fir_length(course), fir_length(course) + 1):
+    for samples in (fir_length(run), fir_length(run) + 1):
         for name, filters in (("trapezoidal", corrected_filters), ("exact", exact_filters)):
-            for position, position_m in (("measured", course.measured_m), ("true", course.true_m)):
-                k = friction(course, seen, filters(samples, course.period_s), position_m)
-                errors = Scatter.of(k / seen.theta[2], true)
-                kept.append(Kept(name, samples, position, abs(errors.last) * friction_pu, errors.worst * friction_pu))
+            for position, position_m in (("measured", run.measured_m), ("true", run.true_m)):
+                k = friction(run, seed_tracks, filters(samples, run.period_s), position_m)
+                errors = Scatter.of(k / seed_tracks.theta[2], true)
+                kept.append(
+                    KeptFrictionError(
+                        name, samples, position, abs(errors.last) * friction_pu, errors.worst * friction_pu
+                    )
+                )
     return tuple(kept)
 
 
-def by_the_seeds_law(course: Course, file: ValveFile, ratios: Ratios) -> tuple[Array, Array]:
+def by_the_seeds_law(run: ScenarioRun, file: ValveFile, ratios: Ratios) -> tuple[Array, Array]:
     """Return time, s, and true position, m, of the same valve after the same S3, under the law with other ratios."""
     stroke_m = file.valve.stroke_m
-    excitation_pa = course.command_pa[course.identifying]
+    excitation_pa = run.command_pa[run.identifying]
     steps = [(S2_FROM_S - S1_FROM_S, UP_PU, 1), (UNTIL_S - S2_FROM_S, DOWN_PU, -1)]
-    commands, periods = [excitation_pa], [np.full(len(excitation_pa), course.period_s)]
+    commands, periods = [excitation_pa], [np.full(len(excitation_pa), run.period_s)]
     for duration_s, reference_pu, direction in steps:
         count = round(duration_s / SEED_LAW_GRID_S)
         commands.append(np.full(count, max(0.0, balance_pa(reference_pu * stroke_m, direction, ratios))))
@@ -209,12 +215,12 @@ def by_the_seeds_law(course: Course, file: ValveFile, ratios: Ratios) -> tuple[A
     return response.time_s, response.position_m
 
 
-def _steps(course: Course, file: ValveFile, ratios: Ratios) -> tuple[Step, ...]:
+def _steps(run: ScenarioRun, file: ValveFile, ratios: Ratios) -> tuple[SteadyStateError, ...]:
     stroke_m = file.valve.stroke_m
-    by_law = by_the_seeds_law(course, file, ratios)
-    by_daemon = course.time_s, course.true_m
+    by_law = by_the_seeds_law(run, file, ratios)
+    by_daemon = run.time_s, run.true_m
     return tuple(
-        Step(
+        SteadyStateError(
             state,
             reference_pu,
             *(_largest_distance_m(*path, end_s, reference_pu * stroke_m) / stroke_m for path in (by_law, by_daemon)),
@@ -229,10 +235,10 @@ def _largest_distance_m(time_s: Array, position_m: Array, end_s: float, referenc
     return float(np.abs(position_m[settled] - reference_m).max())
 
 
-def _identified(course: Course, true: dict[str, float]) -> tuple[Identified, ...]:
-    last = course.readings[-1]
+def _identified(run: ScenarioRun, true: dict[str, float]) -> tuple[DaemonEstimate, ...]:
+    last = run.readings[-1]
     found = []
     for name, value in true.items():
         estimate = getattr(last, name)
-        found.append(Identified(name, estimate.value, estimate.std, value, estimate.reason.name))
+        found.append(DaemonEstimate(name, estimate.value, estimate.std, value, estimate.reason.name))
     return tuple(found)

@@ -1,11 +1,11 @@
-"""The seed's formulas evaluated on a course: as printed, and corrected. The printed ones live here and nowhere else.
+"""The seed's formulas evaluated on a run of its scenario: as printed (here and nowhere else), and corrected.
 
     (13)        a, b, c from running integrals by the trapezoidal rule, as its section 5.1 has it
     (19), (21)  velocity and acceleration by FIR filters over the last window, as its section 5.2 has it
     (22)        friction k_e from these, instant by instant
     (1)-(3), (23), (24), 4.2, 5    a number each, where the printed form and the corrected one differ
 
-What the daemon does instead is exact on the samples (`estimation.identifier`, `estimation.derivatives`).
+What the daemon does instead is exact on the samples (`estimation.algebraic`, `estimation.derivatives`).
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ from positioner.paper.scenario import (
     S1_FROM_S,
     S2_FROM_S,
     UNTIL_S,
-    Course,
     Noise,
+    ScenarioRun,
     derivative_window_s,
 )
 from positioner.virtual.true_parameters import truth
@@ -42,19 +42,21 @@ QUANTITIES = ("a", "b", "c")
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
+class AlgebraicIdentity:
     """The two coefficients in which printed and corrected forms of (8) differ: 6 in (10), 3 in (11) and (12)."""
 
     of_10: float = 6.0
     of_11_12: float = 3.0
 
 
-CORRECTED = Identity()
-PRINTED_7 = Identity(of_11_12=1.0)
-PRINTED_10 = Identity(of_10=-6.0)
+CORRECTED = AlgebraicIdentity()
+PRINTED_7 = AlgebraicIdentity(of_11_12=1.0)
+PRINTED_10 = AlgebraicIdentity(of_10=-6.0)
 
 
-def solved(time_s: Array, position_m: Array, pressure_pa: Array, at: Array, identity: Identity = CORRECTED) -> Array:
+def solved(
+    time_s: Array, position_m: Array, pressure_pa: Array, at: Array, identity: AlgebraicIdentity = CORRECTED
+) -> Array:
     """Return a, b, c (3, len(at)) by (13) at some rows of evenly sampled motion from rest; SI units.
 
     Args:
@@ -102,23 +104,23 @@ def exact_filters(samples: int, period_s: float) -> Array:
     return weights(period_s * np.arange(samples, dtype=np.float64))[:2]
 
 
-def derivatives(course: Course, filters: Array) -> Array:
+def derivatives(run: ScenarioRun, filters: Array) -> Array:
     """Return velocity and acceleration (2, rows) from the window that ends at each row; NaN before the first."""
     empty = np.full(filters.shape[1] - 1, np.nan)
-    return np.array([np.concatenate((empty, np.correlate(course.measured_m, each, "valid"))) for each in filters])
+    return np.array([np.concatenate((empty, np.correlate(run.measured_m, each, "valid"))) for each in filters])
 
 
-def fir_length(course: Course) -> int:
+def fir_length(run: ScenarioRun) -> int:
     """Return the number of samples in the derivative filters, the seed's 500 at its period."""
-    return round(derivative_window_s(course.period_s) / course.period_s)
+    return round(derivative_window_s(run.period_s) / run.period_s)
 
 
 @dataclass(frozen=True, slots=True)
-class Tracks:
+class ParameterTracks:
     """What the seed's figures 3 to 5 show, sample by sample from 0.4 to 0.8 s: a, b, c by (13), SI units.
 
     Attributes:
-        rows: of the course.
+        rows: of the run.
         theta: a, b, c (3, samples).
     """
 
@@ -126,27 +128,28 @@ class Tracks:
     theta: Array
 
 
-def tracks(course: Course) -> Tracks:
-    """Return the seed's a, b, c over the stretch its graphs show."""
-    seen = course.identifying
-    rows = np.arange(course.row_at(GRAPHS_FROM_S), seen.stop)
-    theta = solved(course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], rows)
-    return Tracks(rows, theta)
+def tracks(run: ScenarioRun) -> ParameterTracks:
+    """Return the seed's a, b, c over the span its graphs show."""
+    excited = run.identifying
+    rows = np.arange(run.row_at(GRAPHS_FROM_S), excited.stop)
+    theta = solved(run.time_s[excited], run.measured_m[excited], run.pressure_pa[excited], rows)
+    return ParameterTracks(rows, theta)
 
 
-def friction(course: Course, seen: Tracks, filters: Array, position_m: Array) -> Array:
-    """Return k_e by (22), corrected, over that stretch, with a, b, c of the same time; figure 6.
+def friction(run: ScenarioRun, seed_tracks: ParameterTracks, filters: Array, position_m: Array) -> Array:
+    """Return k_e by (22), corrected, over that span, with a, b, c of the same time; figure 6.
 
     Args:
-        course: the course.
-        seen: its a, b, c.
+        run: of the scenario.
+        seed_tracks: its a, b, c.
         filters: of the derivatives.
-        position_m: taken for x_e, for which the seed gives no estimator; a row per sample of the course.
+        position_m: taken for x_e, for which the seed gives no estimator; a row per sample of the run.
     """
-    a, b, c = seen.theta
-    velocity, acceleration = derivatives(course, filters)[:, seen.rows]
+    a, b, c = seed_tracks.theta
+    velocity, acceleration = derivatives(run, filters)[:, seed_tracks.rows]
     return np.asarray(
-        acceleration - a * velocity - b * position_m[seen.rows] - c * course.pressure_pa[seen.rows], dtype=np.float64
+        acceleration - a * velocity - b * position_m[seed_tracks.rows] - c * run.pressure_pa[seed_tracks.rows],
+        dtype=np.float64,
     )
 
 
@@ -168,29 +171,29 @@ class Erratum:
         return off > abs(self.corrected - self.true) and off > 0.1 * abs(self.true)
 
 
-def errata(course: Course, file: ValveFile) -> list[Erratum]:
-    """Return where printed and corrected forms differ; the course is one without noise."""
+def errata(run: ScenarioRun, file: ValveFile) -> list[Erratum]:
+    """Return where printed and corrected forms differ; the run is one without noise."""
     valve = file.valve
     breakaway_n = _breakaway_force_n(file)
     return [
-        *_model(course, file, breakaway_n),
-        *_identifier(course, valve),
-        *_filters(course),
-        *_control(course, valve),
+        *_model(run, file, breakaway_n),
+        *_identifier(run, valve),
+        *_filters(run),
+        *_control(run, valve),
         Erratum("5", "F_s", "N", PRINTED_STATIC_N, valve.static_n, breakaway_n),
-        _sampled_sine(course),
+        _sampled_sine(run),
     ]
 
 
-def _model(course: Course, file: ValveFile, breakaway_n: float) -> list[Erratum]:
+def _model(run: ScenarioRun, file: ValveFile, breakaway_n: float) -> list[Erratum]:
     """(1), (2) at rest under the first pressure of S3, (3) in the middle of the graphs."""
     valve = file.valve
     m, static_n, coulomb_n = valve.mass_kg, valve.static_n, valve.coulomb_n
-    start_pa = float(course.command_pa[0])
+    start_pa = float(run.command_pa[0])
     force_n = valve.diaphragm_area_m2 * start_pa
-    row = course.row_at((GRAPHS_FROM_S + S1_FROM_S) / 2)
-    x, v, u = (float(each[row]) for each in (course.true_m, course.true_m_per_s, course.pressure_pa))
-    acceleration = float(np.gradient(course.true_m_per_s, course.time_s)[row])
+    row = run.row_at((GRAPHS_FROM_S + S1_FROM_S) / 2)
+    x, v, u = (float(each[row]) for each in (run.true_m, run.true_m_per_s, run.pressure_pa))
+    acceleration = float(np.gradient(run.true_m_per_s, run.time_s)[row])
     numbers = truth(valve)
     a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
     stribeck = -(static_n - coulomb_n) / m * exp(-((v / valve.stribeck_velocity_m_per_s) ** 2))
@@ -230,11 +233,11 @@ def _breakaway_force_n(file: ValveFile) -> float:
     return file.valve.diaphragm_area_m2 * float(ramp.pressure_pa[moved])
 
 
-def _identifier(course: Course, valve: ValveParameters) -> list[Erratum]:
+def _identifier(run: ScenarioRun, valve: ValveParameters) -> list[Erratum]:
     """(7) and (10) by a, b, c at 0.8 s."""
-    seen = course.identifying
-    at = np.array([seen.stop - 1])
-    rows = course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], at
+    excited = run.identifying
+    at = np.array([excited.stop - 1])
+    rows = run.time_s[excited], run.measured_m[excited], run.pressure_pa[excited], at
     units = {"a": "1/s", "b": "1/s^2", "c": "m/(s^2 Pa)"}
     corrected, true = solved(*rows)[:, 0], truth(valve)
     return [
@@ -244,42 +247,42 @@ def _identifier(course: Course, valve: ValveParameters) -> list[Erratum]:
     ]
 
 
-def _filters(course: Course) -> list[Erratum]:
+def _filters(run: ScenarioRun) -> list[Erratum]:
     """(19) and (21) by their delay: the one with which they fit the true motion of the first jerk best."""
-    n, h = fir_length(course), course.period_s
-    printed, corrected = (derivatives(course, filters(n, h)) for filters in (printed_filters, corrected_filters))
-    true = course.true_m_per_s, np.gradient(course.true_m_per_s, course.time_s)
+    n, h = fir_length(run), run.period_s
+    printed, corrected = (derivatives(run, filters(n, h)) for filters in (printed_filters, corrected_filters))
+    true = run.true_m_per_s, np.gradient(run.true_m_per_s, run.time_s)
     return [
         Erratum(
             where,
             f"delay of {name}",
             "ms",
-            1e3 * _delay_s(course, printed[i], true[i]),
-            1e3 * _delay_s(course, corrected[i], true[i]),
+            1e3 * _delay_s(run, printed[i], true[i]),
+            1e3 * _delay_s(run, corrected[i], true[i]),
             0.0,
         )
         for i, (where, name) in enumerate((("(19)", "x'"), ("(21)", "x''")))
     ]
 
 
-def _delay_s(course: Course, estimate: Array, true: Array) -> float:
-    n = fir_length(course)
+def _delay_s(run: ScenarioRun, estimate: Array, true: Array) -> float:
+    n = fir_length(run)
     rows = slice(3 * n, 20 * n)
     lags = np.arange(2 * n)
     misfits = [float(np.mean((estimate[rows] - true[rows.start - lag : rows.stop - lag]) ** 2)) for lag in lags]
-    return float(lags[int(np.argmin(misfits))]) * course.period_s
+    return float(lags[int(np.argmin(misfits))]) * run.period_s
 
 
-def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
+def _control(run: ScenarioRun, valve: ValveParameters) -> list[Erratum]:
     """(22) at 0.8 s; (23), (24) and the coordinate of 4.2 at the ends of S1 and S2, where the stem stands at r."""
-    last = course.identifying.stop - 1
+    last = run.identifying.stop - 1
     numbers = truth(valve)
     a, b, c, k = (numbers[name] for name in ("a", "b", "c", "k"))
-    filters = corrected_filters(fir_length(course), course.period_s)
-    velocity, acceleration = derivatives(course, filters)[:, last].tolist()
-    x, u = float(course.measured_m[last]), float(course.pressure_pa[last])
-    up, down = course.row_at(S2_FROM_S), course.row_at(UNTIL_S)
-    r_up, r_down = float(course.reference_m[up]), float(course.reference_m[down])
+    filters = corrected_filters(fir_length(run), run.period_s)
+    velocity, acceleration = derivatives(run, filters)[:, last].tolist()
+    x, u = float(run.measured_m[last]), float(run.pressure_pa[last])
+    up, down = run.row_at(S2_FROM_S), run.row_at(UNTIL_S)
+    r_up, r_down = float(run.reference_m[up]), float(run.reference_m[down])
     ratios = Ratios(numbers["b_over_c"], numbers["k_over_c"])
     return [
         Erratum(
@@ -290,36 +293,34 @@ def _control(course: Course, valve: ValveParameters) -> list[Erratum]:
             acceleration - a * velocity - b * x - c * u,
             k,
         ),
-        Erratum(
-            "(23)", "u in S1", "Pa", (r_up - b * k) / c, balance_pa(r_up, 1, ratios), float(course.pressure_pa[up])
-        ),
+        Erratum("(23)", "u in S1", "Pa", (r_up - b * k) / c, balance_pa(r_up, 1, ratios), float(run.pressure_pa[up])),
         Erratum(
             "(24)",
             "u in S2",
             "Pa",
             (r_down + b * k) / c,
             balance_pa(r_down, -1, ratios),
-            float(course.pressure_pa[down]),
+            float(run.pressure_pa[down]),
         ),
-        Erratum("4.2", "y when x = r", "m", float(course.true_m[up]) + r_up, float(course.true_m[up]) - r_up, 0.0),
+        Erratum("4.2", "y when x = r", "m", float(run.true_m[up]) + r_up, float(run.true_m[up]) - r_up, 0.0),
     ]
 
 
-def _sampled_sine(course: Course) -> Erratum:
+def _sampled_sine(run: ScenarioRun) -> Erratum:
     """The largest sample of the seed's noise: as printed, in rad/s, and what its amplitude says."""
     return Erratum(
         "5",
         "largest noise sample",
         "p.u.",
-        largest_sample_pu(LITERAL, course),
-        largest_sample_pu(HONEST_SINE, course),
+        largest_sample_pu(LITERAL, run),
+        largest_sample_pu(HONEST_SINE, run),
         AMPLITUDE_PU,
     )
 
 
-def largest_sample_pu(noise: Noise, course: Course) -> float:
-    """Return the largest absolute sample of a sine on the grid of a course."""
-    return max(abs(noise.sine_pu(time_s)) for time_s in course.time_s.tolist())
+def largest_sample_pu(noise: Noise, run: ScenarioRun) -> float:
+    """Return the largest absolute sample of a sine on the grid of a run."""
+    return max(abs(noise.sine_pu(time_s)) for time_s in run.time_s.tolist())
 
 
 def refusal_of_printed_static_friction(valve: ValveParameters) -> str:

@@ -21,7 +21,7 @@ import numpy as np
 from config.valve_file import ValveFile
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchSettings, identify
-from positioner.paper.noise_table import NAMES, Motion, bound, motion_at, true_values
+from positioner.paper.noise_table import NAMES, SampledMotion, bound, motion_at, true_values
 
 PERIOD_S, REST, ROWS = 1e-3, 100, 800
 JITTER = 0.1
@@ -113,13 +113,13 @@ def _even_s() -> Array:
     return PERIOD_S * np.arange(-REST, ROWS + 1, dtype=np.float64)
 
 
-def _maker(file: ValveFile, kind: _Kind) -> Callable[[np.random.Generator], Motion]:
+def _maker(file: ValveFile, kind: _Kind) -> Callable[[np.random.Generator], SampledMotion]:
     """Return what gives the motion of a run, without noise; the same one where nothing of it is random."""
     if kind.stribeck:
         slower = file.valve.stribeck_velocity_m_per_s * STRIBECK
         file = file.model_copy(update={"valve": file.valve.model_copy(update={"stribeck_velocity_m_per_s": slower})})
 
-    def moved(rng: np.random.Generator | None) -> Motion:
+    def moved(rng: np.random.Generator | None) -> SampledMotion:
         time_s = _even_s()
         if rng is not None and kind.uneven:
             time_s += PERIOD_S * JITTER * rng.uniform(-1, 1, len(time_s))
@@ -130,7 +130,7 @@ def _maker(file: ValveFile, kind: _Kind) -> Callable[[np.random.Generator], Moti
             keep[kind.first] = True
         keep[: kind.first] = False
         start = max(kind.first, REST)
-        return Motion(
+        return SampledMotion(
             time_s=whole.time_s[keep],
             position_m=whole.position_m[keep],
             pressure_pa=whole.pressure_pa[keep],

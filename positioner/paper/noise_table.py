@@ -61,7 +61,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class SampledMotion:
     """Time, true position and the pressure held up to each sample, SI units; `start` is the row at which it begins.
 
     `known` says what is known of that beginning: 2 where and how fast, 1 how fast, 0 nothing.
@@ -83,18 +83,18 @@ def table(file: ValveFile, seeds: int) -> Iterator[Cell]:
             yield cell(file, moved, period_s, noise_pu, seeds)
 
 
-def motion(file: ValveFile, period_s: float) -> Motion:
+def motion(file: ValveFile, period_s: float) -> SampledMotion:
     """Return the motion without noise."""
     rest, rows = round(REST_S / period_s), round(WINDOW_S / period_s)
     return motion_at(file, period_s * np.arange(-rest, rows + 1, dtype=np.float64), rest)
 
 
-def motion_at(file: ValveFile, time_s: Array, start: int) -> Motion:
+def motion_at(file: ValveFile, time_s: Array, start: int) -> SampledMotion:
     """Return the motion sampled, and commanded, at these instants; it begins at row `start`."""
-    swing = ALPHA_PA + BETA_PA * np.sin(OMEGA_RAD_PER_S * time_s[start:-1])
-    held = np.concatenate((np.zeros(start), swing))
+    excitation = ALPHA_PA + BETA_PA * np.sin(OMEGA_RAD_PER_S * time_s[start:-1])
+    held = np.concatenate((np.zeros(start), excitation))
     response = Valve.from_file(file).run(held, np.diff(time_s))
-    return Motion(time_s, response.position_m, np.append(0.0, held), start, response.velocity_m_per_s)
+    return SampledMotion(time_s, response.position_m, np.append(0.0, held), start, response.velocity_m_per_s)
 
 
 def true_values(file: ValveFile) -> Array:
@@ -106,7 +106,7 @@ def true_values(file: ValveFile) -> Array:
     )
 
 
-def bound(file: ValveFile, moved: Motion, noise_m: float) -> Array:
+def bound(file: ValveFile, moved: SampledMotion, noise_m: float) -> Array:
     """Return the Cramér-Rao bounds, shares of the true values, six of them."""
     true = true_values(file)
     rows = slice(moved.start, None)
@@ -125,7 +125,7 @@ def bound(file: ValveFile, moved: Motion, noise_m: float) -> Array:
     return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients)))
 
 
-def cell(file: ValveFile, moved: Motion, period_s: float, noise_pu: float, seeds: int) -> Cell:
+def cell(file: ValveFile, moved: SampledMotion, period_s: float, noise_pu: float, seeds: int) -> Cell:
     """Return what so many runs of one sample time and noise give."""
     noise_m, true = noise_pu * file.valve.stroke_m, true_values(file)
     ours, reported, valid, theirs = [], [], [], []

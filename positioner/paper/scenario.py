@@ -62,7 +62,7 @@ WHITE = Noise("white, 1e-4 p.u.", white_std_pu=1e-4)
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class ScenarioRun:
     """One run of the scenario, a row per sample, SI units; what is true is known to the simulator alone.
 
     Attributes:
@@ -96,7 +96,7 @@ class Course:
         return round(time_s / self.period_s) - 1
 
 
-class Transmitted:
+class NoisyTransmitter:
     """A device between valve and driver: its transmitter adds the sine, and the truth beside it is noted."""
 
     def __init__(self, device: Device, valve: Valve, noise: Noise, stroke_m: float) -> None:
@@ -140,13 +140,13 @@ class Transmitted:
         self.pressure_pa = self._device.pressure_pa
 
 
-def course(file: ValveFile, noise: Noise, period_s: float) -> Course:
+def run_scenario(file: ValveFile, noise: Noise, period_s: float) -> ScenarioRun:
     """Run the scenario on a valve."""
     parameters = file.valve
     stroke_m = parameters.stroke_m
     slave = _slave(noise, period_s, stroke_m)
     valve = Valve.from_file(file)
-    plant = Transmitted(Device(valve, slave, parameters.model_dump(exclude={"name"})), valve, noise, stroke_m)
+    plant = NoisyTransmitter(Device(valve, slave, parameters.model_dump(exclude={"name"})), valve, noise, stroke_m)
     first, *then = _phases(stroke_m)
     cycle = virtual_cycle(_daemon(period_s, stroke_m), plant, first[1])
 
@@ -164,7 +164,7 @@ def course(file: ValveFile, noise: Noise, period_s: float) -> Course:
             readings.append(decision.estimates)
     columns = np.hstack((np.array(plant.rows), np.array(decided))).T
     time_s, measured_m, pressure_pa, true_m, true_m_per_s, command_pa, reference_m = columns
-    return Course(
+    return ScenarioRun(
         noise=noise,
         period_s=period_s,
         time_s=time_s,

@@ -12,7 +12,7 @@ from config.valve_file import ValveFile
 from positioner.paper.findings import LARGEST_ERROR_PU, by_the_seeds_law, seed_friction, seed_ratios
 from positioner.paper.formulas import (
     PRINTED_10,
-    Tracks,
+    ParameterTracks,
     corrected_filters,
     derivatives,
     fir_length,
@@ -20,7 +20,7 @@ from positioner.paper.formulas import (
     solved,
     tracks,
 )
-from positioner.paper.scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, Course
+from positioner.paper.scenario import S1_FROM_S, S2_FROM_S, UNTIL_S, ScenarioRun
 from positioner.virtual.run_picture import STATE_COLOURS
 from positioner.virtual.true_parameters import truth
 
@@ -40,43 +40,43 @@ SLOW_S = (0.7, 0.7005)
 """Half a millisecond: long enough to see the sine."""
 
 
-def draw_all(folder: Path, quiet: Course, noisy: Sequence[Course], file: ValveFile) -> list[Path]:
+def draw_all(folder: Path, quiet: ScenarioRun, noisy: Sequence[ScenarioRun], file: ValveFile) -> list[Path]:
     """Draw every figure; return where they are.
 
     Args:
         folder: where to.
-        quiet: the course without noise.
+        quiet: the run without noise.
         noisy: that with the sine of 1e5 rad/s, and that with white noise.
         file: the valve.
     """
     true = truth(file.valve)
-    seen = [(course, tracks(course)) for course in (quiet, *noisy)]
+    seed_tracks = [(run, tracks(run)) for run in (quiet, *noisy)]
     printed = _by_printed_10(quiet)
     names = {3: ("a", "1/s"), 4: ("b", "1/s$^2$"), 5: ("c", "m/(s$^2$ Pa)")}
     paths = []
     for i, (number, (name, unit)) in enumerate(names.items()):
         paths.append(folder / f"seed-fig{number}.png")
         title = f"by (13), corrected; with (10) as printed ${name}_e$ = {printed[i]:.3g} at 0.8 s, off the scale"
-        _draw_estimate(paths[-1], name, unit, true[name], [(course, each.theta[i]) for course, each in seen], title)
+        _draw_estimate(paths[-1], name, unit, true[name], [(run, each.theta[i]) for run, each in seed_tracks], title)
     paths.append(folder / "seed-derivatives.png")
     _draw_derivatives(paths[-1], quiet, noisy[0])
     paths.append(folder / "seed-fig6.png")
-    friction = [(course, seed_friction(course, each)) for course, each in seen]
+    friction = [(run, seed_friction(run, each)) for run, each in seed_tracks]
     _draw_estimate(paths[-1], "k", "m/s$^2$", true["k"], friction, "by (22), corrected, instant by instant")
     paths.append(folder / "seed-fig7.png")
-    _draw_tracking(paths[-1], seen, file)
+    _draw_tracking(paths[-1], seed_tracks, file)
     return paths
 
 
-def _by_printed_10(course: Course) -> list[float]:
-    seen = course.identifying
-    at = np.array([seen.stop - 1])
-    theta = solved(course.time_s[seen], course.measured_m[seen], course.pressure_pa[seen], at, PRINTED_10)
+def _by_printed_10(run: ScenarioRun) -> list[float]:
+    excited = run.identifying
+    at = np.array([excited.stop - 1])
+    theta = solved(run.time_s[excited], run.measured_m[excited], run.pressure_pa[excited], at, PRINTED_10)
     return [float(value) for value in theta[:, 0]]
 
 
-def _label(course: Course) -> str:
-    return "no noise, or 1e5 Hz (the same)" if course.noise.name == "none" else course.noise.name
+def _label(run: ScenarioRun) -> str:
+    return "no noise, or 1e5 Hz (the same)" if run.noise.name == "none" else run.noise.name
 
 
 def _save(figure: "Figure", path: Path) -> None:
@@ -87,17 +87,17 @@ def _save(figure: "Figure", path: Path) -> None:
 
 
 def _draw_estimate(
-    path: Path, name: str, unit: str, true: float, curves: Sequence[tuple[Course, "Array"]], title: str
+    path: Path, name: str, unit: str, true: float, curves: Sequence[tuple[ScenarioRun, "Array"]], title: str
 ) -> None:
-    """Draw an estimate over the stretch of the seed's graphs, up to 0.8 s, sample by sample."""
+    """Draw an estimate over the span of the seed's graphs, up to 0.8 s, sample by sample."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(figsize=(8, 3.8), layout="constrained")
-    for colour, (course, values) in zip(COLOURS, curves, strict=True):
+    for colour, (run, values) in zip(COLOURS, curves, strict=True):
         hectic = float(np.std(np.diff(values))) > 1e-3 * abs(true)
-        time_s = course.time_s[course.identifying][-len(values) :]
+        time_s = run.time_s[run.identifying][-len(values) :]
         width, alpha, order = (0.3, 0.5, 1) if hectic else (1.4, 1.0, 3)
-        axes.plot(time_s, values, color=colour, lw=width, alpha=alpha, zorder=order, label=_label(course))
+        axes.plot(time_s, values, color=colour, lw=width, alpha=alpha, zorder=order, label=_label(run))
     axes.axhline(true, color="black", lw=1.4, ls="--", zorder=5, label="true")
     axes.set_xlabel("time, s")
     axes.set_ylabel(f"${name}_e$, {unit}")
@@ -110,18 +110,18 @@ def _draw_estimate(
     _save(figure, path)
 
 
-def _draw_derivatives(path: Path, quiet: Course, noisy: Course) -> None:
+def _draw_derivatives(path: Path, quiet: ScenarioRun, noisy: ScenarioRun) -> None:
     """Draw velocity and acceleration: the first jerk without noise, and the slow motion with the sine."""
     from matplotlib import pyplot as plt
 
     figure, grid = plt.subplots(2, 2, sharex="col", figsize=(10, 5.2), layout="constrained")
     columns = ((quiet, JERK_S, "first jerk, no noise"), (noisy, SLOW_S, f"slow motion, {noisy.noise.name}"))
-    for column, (course, (begin_s, end_s), title) in enumerate(columns):
-        rows = (course.time_s >= begin_s) & (course.time_s < end_s)
-        time_ms = 1e3 * course.time_s[rows]
-        true = course.true_m_per_s, np.gradient(course.true_m_per_s, course.time_s)
-        n, h = fir_length(course), course.period_s
-        corrected, printed = (derivatives(course, each(n, h)) for each in (corrected_filters, printed_filters))
+    for column, (run, (begin_s, end_s), title) in enumerate(columns):
+        rows = (run.time_s >= begin_s) & (run.time_s < end_s)
+        time_ms = 1e3 * run.time_s[rows]
+        true = run.true_m_per_s, np.gradient(run.true_m_per_s, run.time_s)
+        n, h = fir_length(run), run.period_s
+        corrected, printed = (derivatives(run, each(n, h)) for each in (corrected_filters, printed_filters))
         for row, (unit, name) in enumerate((("m/s", "velocity (19)"), ("m/s$^2$", "acceleration (21)"))):
             axes = grid[row, column]
             axes.plot(time_ms, printed[row][rows], color=COLOURS[2], lw=1.2, label="as printed: a window late")
@@ -137,7 +137,7 @@ def _draw_derivatives(path: Path, quiet: Course, noisy: Course) -> None:
     _save(figure, path)
 
 
-def _draw_tracking(path: Path, seen: Sequence[tuple[Course, Tracks]], file: ValveFile) -> None:
+def _draw_tracking(path: Path, seed_tracks: Sequence[tuple[ScenarioRun, ParameterTracks]], file: ValveFile) -> None:
     """Draw stem and reference under the sine, and the errors under every noise."""
     from matplotlib import pyplot as plt
 
@@ -145,7 +145,7 @@ def _draw_tracking(path: Path, seen: Sequence[tuple[Course, Tracks]], file: Valv
     figure, (above, below) = plt.subplots(
         2, 1, sharex=True, figsize=(9, 5.6), height_ratios=(3, 2), layout="constrained"
     )
-    noisy, noisy_tracks = seen[1]
+    noisy, noisy_tracks = seed_tracks[1]
     _paint_states(above)
     _paint_states(below)
     in_law = noisy.time_s > S1_FROM_S
@@ -167,11 +167,9 @@ def _draw_tracking(path: Path, seen: Sequence[tuple[Course, Tracks]], file: Valv
         label="the seed's ±0.01",
     )
     below.plot(law_s[drawn], error / stroke_m, color=COLOURS[2], lw=1.4, label=f"last $k_e$ kept, {noisy.noise.name}")
-    for i, (course, _) in enumerate(seen):
-        error = (course.true_m - course.reference_m)[in_law] / stroke_m
-        below.plot(
-            course.time_s[in_law], error, color=COLOURS[1], lw=1.4, label="daemon, each noise" if i == 0 else None
-        )
+    for i, (run, _) in enumerate(seed_tracks):
+        error = (run.true_m - run.reference_m)[in_law] / stroke_m
+        below.plot(run.time_s[in_law], error, color=COLOURS[1], lw=1.4, label="daemon, each noise" if i == 0 else None)
     above.set_ylim(0, 0.8)
     below.set_ylim(-0.03, 0.03)
     above.set_xlim(0, UNTIL_S)

@@ -12,18 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from positioner.response.figure import Figure, untold
+from positioner.response.figure import Figure, undetermined
 from positioner.response.step_figures import StepFigures
 
-ANSWERED = 0.1
+RESPONDED = 0.1
 """Least part of the expected travel that is a response."""
 
 COARSE = 0.5
-"""Bounds farther apart than this part of the upper one tell nothing."""
+"""Bounds farther apart than this part of the upper one determine nothing."""
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class InputBounds:
     """The figure lies between: `low` did not move the stem (0: nothing smaller was tried), `high` did."""
 
     low: float
@@ -39,37 +39,39 @@ def dead_band_and_resolution(steps: Sequence[StepFigures], gain: float, unit: st
     )
 
 
-def _bounds(steps: Sequence[StepFigures], gain: float) -> tuple[list[Bounds], list[Bounds]]:
-    reversed_: list[Bounds] = []
-    onward: list[Bounds] = []
+def _bounds(steps: Sequence[StepFigures], gain: float) -> tuple[list[InputBounds], list[InputBounds]]:
+    reversed_: list[InputBounds] = []
+    onward: list[InputBounds] = []
     direction, since = 0, 0.0  # of the last move; change of the input since
     reached = {1: 0.0, -1: 0.0}  # how far the input has been either way since, without a move
     for step in steps:
         since += step.size
         way = 1 if step.size > 0 else -1
-        if not answered(step, gain):
+        if not responded(step, gain):
             reached[way] = max(reached[way], way * since)
             continue
         if direction and way * since > reached[way]:
-            (onward if way == direction else reversed_).append(Bounds(reached[way], way * since))
+            (onward if way == direction else reversed_).append(InputBounds(reached[way], way * since))
         direction, since, reached = way, 0.0, {1: 0.0, -1: 0.0}
     return reversed_, onward
 
 
-def answered(step: StepFigures, gain: float) -> bool:
+def responded(step: StepFigures, gain: float) -> bool:
     """Return whether the stem followed a step, the right way and by a tenth at least of what the gain calls for."""
     travel_m = step.travel_m.value
-    return step.moved and travel_m is not None and travel_m / (gain * step.size) > ANSWERED
+    return step.moved and travel_m is not None and travel_m / (gain * step.size) > RESPONDED
 
 
-def _figure(bounds: Sequence[Bounds], wanted: str, unit: str) -> Figure:
+def _figure(bounds: Sequence[InputBounds], wanted: str, unit: str) -> Figure:
     lacks = "this recording does not hold a series of small steps"
     if not bounds:
-        return untold(f"{lacks}: it lacks {wanted}")
-    told = [each for each in bounds if each.low > 0]
-    if not told:
-        return untold(f"{lacks}: the smallest tried, {min(each.high for each in bounds):.4g} {unit}, moved the stem")
-    low, high = median(each.low for each in told), median(each.high for each in told)
+        return undetermined(f"{lacks}: it lacks {wanted}")
+    determined = [each for each in bounds if each.low > 0]
+    if not determined:
+        return undetermined(
+            f"{lacks}: the smallest tried, {min(each.high for each in bounds):.4g} {unit}, moved the stem"
+        )
+    low, high = median(each.low for each in determined), median(each.high for each in determined)
     if high - low > COARSE * high:
-        return untold(f"{lacks}: {low:.4g} {unit} did not move the stem, {high:.4g} {unit} did")
+        return undetermined(f"{lacks}: {low:.4g} {unit} did not move the stem, {high:.4g} {unit} did")
     return Figure((low + high) / 2, (high - low) / 2)

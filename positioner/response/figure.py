@@ -1,4 +1,4 @@
-"""A figure with what it is worth, or why there is none; and the moment at which a noisy response passes a level.
+"""A figure with its uncertainty, or the reason why there is none; and the moment a noisy response crosses a level.
 
 A response y(t) that rises through a level L with noise of standard deviation σ passes it many times. Let t_a be the
 last sample at or below L - 3σ before the first, t_b, at or above L + 3σ. Where few samples lie between them, hardly any
@@ -18,35 +18,35 @@ import numpy as np
 from config.recording import Column
 
 MANY = 8
-"""Samples between, from which the parabola tells more than the gaps."""
+"""Samples between, from which the parabola is more certain than the gaps."""
 BAND = 3.0
-"""Half width, in standard deviations of the noise, of what counts as passing a level."""
+"""Half width, in standard deviations of the noise, of what counts as crossing a level."""
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A value and its uncertainty (both None when it cannot be told, and then `reason` says why)."""
+    """A value and its uncertainty (both None when it cannot be determined, and then `reason` says why)."""
 
     value: float | None
     plus_minus: float | None = None
     reason: str | None = None
 
 
-def untold(reason: str) -> Figure:
-    """Return the figure of which only is known why it cannot be told."""
+def undetermined(reason: str) -> Figure:
+    """Return a figure without a value, for a reason."""
     return Figure(None, None, reason)
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
-    """When a level was passed, s; `gap_s` is the widest gap between the samples that tell it."""
+class LevelCrossing:
+    """When a level was crossed, s; `gap_s` is the widest gap between the samples about the crossing."""
 
     time_s: float
     plus_minus_s: float
     gap_s: float
 
 
-def passage(time_s: Column, rising: Column, level: float, noise: float) -> Passage | None:
+def level_crossing(time_s: Column, rising: Column, level: float, noise: float) -> LevelCrossing | None:
     """Return when a response, (n,), first rises through a level; None when it does not."""
     above = rising >= level + BAND * noise
     if not above.any():
@@ -59,10 +59,10 @@ def passage(time_s: Column, rising: Column, level: float, noise: float) -> Passa
     t, y = time_s[start : end + 1], rising[start : end + 1]
     steps_s = np.diff(t)
     gap_s = float(steps_s.max())
-    passed_s = float(t[0] + np.sum(steps_s * _share_below(y, level)))
-    fitted = _by_parabola(t[1:-1], y[1:-1], level, noise, passed_s) if len(t) >= MANY + 2 else None
-    passed_s, plus_minus_s = fitted or (passed_s, gap_s / 2)
-    return Passage(passed_s, plus_minus_s, gap_s)
+    crossing_s = float(t[0] + np.sum(steps_s * _share_below(y, level)))
+    fitted = _by_parabola(t[1:-1], y[1:-1], level, noise, crossing_s) if len(t) >= MANY + 2 else None
+    crossing_s, plus_minus_s = fitted or (crossing_s, gap_s / 2)
+    return LevelCrossing(crossing_s, plus_minus_s, gap_s)
 
 
 def _by_parabola(t: Column, y: Column, level: float, noise: float, near_s: float) -> tuple[float, float] | None:

@@ -1,8 +1,8 @@
-"""All figures of a recording: its steps, and what they say together.
+"""All figures of a recording: its steps, and what they show together.
 
 Steps are looked for in `reference_m`; where that column is not there, never steps, or merely follows the stem (as the
 daemon's does outside automatic), in `command_pa`. The recording is cut where its clock is set back and where the daemon
-excites the valve (state 3), and rows without a position are left out; each is told.
+excites the valve (state 3), and rows without a position are left out; each is noted.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column, Recording
-from positioner.response.dead_band import answered, dead_band_and_resolution
-from positioner.response.figure import Figure, untold
+from positioner.response.dead_band import dead_band_and_resolution, responded
+from positioner.response.figure import Figure, undetermined
 from positioner.response.rest_level import quantum
-from positioner.response.step_detection import Step, find_steps
+from positioner.response.step_detection import StepChange, find_steps
 from positioner.response.step_figures import FIGURES, StepFigures, figures_of
 
 EXCITED = 3
@@ -25,7 +25,7 @@ EXCITED = 3
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """One figure over all steps that tell it."""
+    """One figure over all steps that determine it."""
 
     count: int
     smallest: float
@@ -34,7 +34,7 @@ class Summary:
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class ResponseFigures:
     """What a recording says of a valve's response, SI units."""
 
     input: str
@@ -48,15 +48,15 @@ class Response:
     notes: tuple[str, ...]
 
     def summary(self, name: str) -> Summary | None:
-        """Return one of `FIGURES` over the steps that the stem answered; None when no step tells it."""
+        """Return one of `FIGURES` over the steps that the stem responded to; None when no step determines it."""
         gain = self.static_gain.value
-        asked = [each for each in self.steps if gain and answered(each, gain)]
-        told = [figure.value for each in asked if (figure := getattr(each, name)).value is not None]
-        return Summary(len(told), min(told), median(told), max(told)) if told else None
+        asked = [each for each in self.steps if gain and responded(each, gain)]
+        determined = [figure.value for each in asked if (figure := getattr(each, name)).value is not None]
+        return Summary(len(determined), min(determined), median(determined), max(determined)) if determined else None
 
 
 @dataclass(frozen=True, slots=True)
-class _Stretch:
+class _InputSegment:
     """Rows without a break of the clock; positions and input finite."""
 
     time_s: Column
@@ -64,20 +64,20 @@ class _Stretch:
     input: Column
 
 
-def respond(recording: Recording) -> Response:
+def respond(recording: Recording) -> ResponseFigures:
     """Return the response figures of a recording; without steps it has none, and says so."""
     notes: list[str] = []
     whole = _usable(recording, notes)
     for name in ("reference_m", "command_pa"):
         if name not in recording.columns:
             continue
-        stretches = list(_stretches(recording, name, whole))
-        found = [(stretch, _steps(stretch, follows=name == "reference_m")) for stretch in stretches]
+        segments = list(_input_segments(recording, name, whole))
+        found = [(segment, _steps(segment, follows=name == "reference_m")) for segment in segments]
         if any(steps for _, steps in found):
             return _response(name, found, notes)
         notes.append(f"{name} does not step from one held value to another")
-    nothing = untold("the recording holds no step")
-    return Response("none", (), None, nothing, nothing, nothing, tuple(notes))
+    nothing = undetermined("the recording holds no step")
+    return ResponseFigures("none", (), None, nothing, nothing, nothing, tuple(notes))
 
 
 def _usable(recording: Recording, notes: list[str]) -> NDArray[np.bool_]:
@@ -95,7 +95,7 @@ def _usable(recording: Recording, notes: list[str]) -> NDArray[np.bool_]:
     return usable
 
 
-def _stretches(recording: Recording, name: str, whole: NDArray[np.bool_]) -> Iterator[_Stretch]:
+def _input_segments(recording: Recording, name: str, whole: NDArray[np.bool_]) -> Iterator[_InputSegment]:
     held = recording.columns[name]
     rows = np.flatnonzero(whole & np.isfinite(held))
     state = recording.columns.get("state", np.zeros(len(held)))
@@ -103,24 +103,24 @@ def _stretches(recording: Recording, name: str, whole: NDArray[np.bool_]) -> Ite
     breaks = (np.diff(recording.time_s[rows]) <= 0) | (np.diff(excitations[rows]) > 0)
     for part in np.split(rows, np.flatnonzero(breaks) + 1):
         if part.size:
-            yield _Stretch(recording.time_s[part], recording.position_m[part], held[part])
+            yield _InputSegment(recording.time_s[part], recording.position_m[part], held[part])
 
 
-def _steps(stretch: _Stretch, *, follows: bool) -> list[Step]:
+def _steps(segment: _InputSegment, *, follows: bool) -> list[StepChange]:
     """Return the steps; a reference that is the very position when it changes only follows the stem."""
-    steps = find_steps(stretch.time_s, stretch.input)
-    same = stretch.input == stretch.position_m
+    steps = find_steps(segment.time_s, segment.input)
+    same = segment.input == segment.position_m
     return [step for step in steps if not (follows and same[step.first])]
 
 
-def _response(name: str, found: list[tuple[_Stretch, list[Step]]], notes: list[str]) -> Response:
+def _response(name: str, found: list[tuple[_InputSegment, list[StepChange]]], notes: list[str]) -> ResponseFigures:
     is_reference = name == "reference_m"
-    quantum_m = quantum(np.concatenate([stretch.position_m for stretch, _ in found]))
+    quantum_m = quantum(np.concatenate([segment.position_m for segment, _ in found]))
     if quantum_m:
         notes.append(f"positions are whole multiples of {quantum_m:.3g} m")
     steps = tuple(
-        figures_of(stretch.time_s, stretch.position_m, step, quantum_m, is_reference=is_reference)
-        for stretch, steps in found
+        figures_of(segment.time_s, segment.position_m, step, quantum_m, is_reference=is_reference)
+        for segment, steps in found
         for step in steps
     )
     noises = [each.noise_m for each in steps if each.noise_m is not None]
@@ -128,26 +128,29 @@ def _response(name: str, found: list[tuple[_Stretch, list[Step]]], notes: list[s
     dead_band, resolution = (
         dead_band_and_resolution(steps, gain.value, "m" if is_reference else "Pa")
         if gain.value
-        else (untold("the stem did not answer any step"), untold("the stem did not answer any step"))
+        else (
+            undetermined("the stem did not respond to any step"),
+            undetermined("the stem did not respond to any step"),
+        )
     )
-    return Response(name, steps, median(noises) if noises else None, gain, dead_band, resolution, tuple(notes))
+    return ResponseFigures(name, steps, median(noises) if noises else None, gain, dead_band, resolution, tuple(notes))
 
 
 def _static_gain(steps: tuple[StepFigures, ...]) -> Figure:
     """Return position over input between the outermost levels stepped to; of a single level, the step's own."""
-    told = [each for each in steps if each.level_m is not None and each.travel_m.value is not None]
-    if not told:
-        return untold("no step has enough samples")
-    points = [(each.input_to, each.level_m or 0.0) for each in told]
+    determined = [each for each in steps if each.level_m is not None and each.travel_m.value is not None]
+    if not determined:
+        return undetermined("no step has enough samples")
+    points = [(each.input_to, each.level_m or 0.0) for each in determined]
     low, high = min(points), max(points)
     if low[0] == high[0]:
-        return told[0].static_gain
-    error = max(each.travel_m.plus_minus or 0.0 for each in told)
+        return determined[0].static_gain
+    error = max(each.travel_m.plus_minus or 0.0 for each in determined)
     return Figure((high[1] - low[1]) / (high[0] - low[0]), error / (high[0] - low[0]))
 
 
-def as_json(response: Response) -> Mapping[str, object]:
-    """Return everything as plain values, None for what cannot be told."""
+def as_json(response: ResponseFigures) -> Mapping[str, object]:
+    """Return everything as plain values, None for what cannot be determined."""
     steps = [asdict(each) for each in response.steps]
     summaries = {name: response.summary(name) for name in FIGURES}
     return {

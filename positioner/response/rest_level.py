@@ -24,7 +24,7 @@ FEWEST = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class RestLevel:
     """Where a stem rests, m: level, standard deviation of the level and of a sample, and how far it still drifts."""
 
     level_m: float
@@ -33,7 +33,7 @@ class Rest:
     drift_m: float
 
 
-def rest_at_the_end(time_s: Column, position_m: Column, quantum_m: float) -> Rest | None:
+def rest_at_the_end(time_s: Column, position_m: Column, quantum_m: float) -> RestLevel | None:
     """Return where the stem rests in the last part of a hold; None with too few samples."""
     late = time_s >= time_s[-1] - REST_SHARE * (time_s[-1] - time_s[0])
     count = max(int(late.sum()), FEWEST)
@@ -43,7 +43,7 @@ def rest_at_the_end(time_s: Column, position_m: Column, quantum_m: float) -> Res
     noise_m = _noise(t, x, quantum_m)
     half = count // 2
     drift_m = float(np.median(x[-half:]) - np.median(x[:half]))
-    return Rest(float(np.median(x)), _OF_MEDIAN * noise_m / sqrt(count), noise_m, drift_m)
+    return RestLevel(float(np.median(x)), _OF_MEDIAN * noise_m / sqrt(count), noise_m, drift_m)
 
 
 def _noise(t: Column, x: Column, quantum_m: float) -> float:

@@ -18,7 +18,7 @@ QUICK = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class StepChange:
     """Samples [before, first) hold `from_`, [first, end) begin with the change and hold `to`."""
 
     before: int
@@ -33,7 +33,7 @@ class Step:
         return self.to - self.from_
 
 
-def find_steps(time_s: Column, held: Column) -> list[Step]:
+def find_steps(time_s: Column, held: Column) -> list[StepChange]:
     """Return the steps of an input, (n,), in order of time."""
     if len(held) < 2 * FEWEST_HELD:
         return []
@@ -44,7 +44,7 @@ def find_steps(time_s: Column, held: Column) -> list[Step]:
         before, after = float(np.median(held[a:b])), float(np.median(held[c:d]))
         quick = time_s[c] - time_s[b] <= QUICK * (time_s[d - 1] - time_s[c])
         if quick and abs(after - before) > tolerance:
-            steps.append(Step(a, b, d, before, after))
+            steps.append(StepChange(a, b, d, before, after))
     return steps
 
 

@@ -10,8 +10,8 @@ With x_0 where the stem rests before the step, x_1 where it rests at the end, y 
     static gain      travel over the step of the input (travel gain)
     final error      x_1 less the reference, where the input is one
 
-Times cannot be told of a move below 25 σ (T86 then drowns in noise), of a stem that was not at rest before or at the
-end, or across a gap of the recording.
+Times cannot be determined of a move below 25 σ (T86 then drowns in noise), of a stem that was not at rest before or at
+the end, or across a gap of the recording.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from math import hypot, sqrt
 import numpy as np
 
 from config.recording import Column
-from positioner.response.figure import Figure, Passage, passage, untold
-from positioner.response.rest_level import Rest, rest_at_the_end
-from positioner.response.step_detection import Step
+from positioner.response.figure import Figure, LevelCrossing, level_crossing, undetermined
+from positioner.response.rest_level import RestLevel, rest_at_the_end
+from positioner.response.step_detection import StepChange
 
 T63, T86 = 0.632, 0.865
 OBSERVABLE_SIGMA = 5.0
@@ -64,17 +64,21 @@ TIMED = ("dead_time_s", "t63_s", "t86_s", "overshoot_percent")
 FIGURES = ("travel_m", "static_gain", *TIMED, "final_error_m")
 
 
-def figures_of(time_s: Column, position_m: Column, step: Step, quantum_m: float, *, is_reference: bool) -> StepFigures:
+def figures_of(
+    time_s: Column, position_m: Column, step: StepChange, quantum_m: float, *, is_reference: bool
+) -> StepFigures:
     """Return the figures of one step; positions are finite."""
     start_s = float(time_s[step.first])
     before = rest_at_the_end(time_s[step.before : step.first], position_m[step.before : step.first], quantum_m)
     after = rest_at_the_end(time_s[step.first : step.end], position_m[step.first : step.end], quantum_m)
     if before is None or after is None:
-        return _nothing(start_s, step, "too few samples before or after the step")
+        return _undetermined_step(start_s, step, "too few samples before or after the step")
     std_m = hypot(before.level_std_m, after.level_std_m)
     travel_m = after.level_m - before.level_m
     moved = abs(travel_m) > max(OBSERVABLE_SIGMA * std_m, 1.5 * quantum_m)
-    error = Figure(after.level_m - step.to, after.level_std_m) if is_reference else untold("the input is a pressure")
+    error = (
+        Figure(after.level_m - step.to, after.level_std_m) if is_reference else undetermined("the input is a pressure")
+    )
     timed = _timed(time_s, position_m, step, before, after) if moved else _all(TIMED, "the stem did not move")
     return StepFigures(
         time_s=start_s,
@@ -90,35 +94,37 @@ def figures_of(time_s: Column, position_m: Column, step: Step, quantum_m: float,
     )
 
 
-def _nothing(start_s: float, step: Step, reason: str) -> StepFigures:
+def _undetermined_step(start_s: float, step: StepChange, reason: str) -> StepFigures:
     return StepFigures(start_s, step.from_, step.to, False, None, None, **_all(FIGURES, reason))
 
 
 def _all(names: tuple[str, ...], reason: str) -> dict[str, Figure]:
-    return dict.fromkeys(names, untold(reason))
+    return dict.fromkeys(names, undetermined(reason))
 
 
-def _timed(time_s: Column, position_m: Column, step: Step, before: Rest, after: Rest) -> dict[str, Figure]:
+def _timed(
+    time_s: Column, position_m: Column, step: StepChange, before: RestLevel, after: RestLevel
+) -> dict[str, Figure]:
     """Return the times and the overshoot."""
     travel_m = after.level_m - before.level_m
     noise = max(before.noise_m, after.noise_m) / abs(travel_m)
-    if reason := _why_not(time_s, step, before, after, noise):
+    if reason := _reason_untimed(time_s, step, before, after, noise):
         return _all(TIMED, reason)
     t = time_s[step.first : step.end] - time_s[step.first]
     y = (position_m[step.first : step.end] - before.level_m) / travel_m
     period_s = float(np.median(np.diff(t)))
     observable = max(OBSERVABLE_SIGMA * noise, OBSERVABLE_PERCENT / 100)
     times = {
-        name: _time(passage(t, y, level, noise), period_s)
+        name: _time(level_crossing(t, y, level, noise), period_s)
         for name, level in (("dead_time_s", observable), ("t63_s", T63), ("t86_s", T86))
     }
     return times | {"overshoot_percent": _overshoot(t, y, noise)}
 
 
-def _why_not(time_s: Column, step: Step, before: Rest, after: Rest, noise: float) -> str | None:
-    """Return why no time can be told of a step whose stem moved."""
+def _reason_untimed(time_s: Column, step: StepChange, before: RestLevel, after: RestLevel, noise: float) -> str | None:
+    """Return why no time can be determined of a step whose stem moved; None when it can."""
     if noise * SMALLEST_SIGMA > 1:
-        return f"the move is {1 / noise:.0f} times the noise, told from {SMALLEST_SIGMA:.0f} times up"
+        return f"the move is {1 / noise:.0f} times the noise, determined from {SMALLEST_SIGMA:.0f} times up"
     for rest, when in ((before, "at rest before the step"), (after, "settled before the hold ended")):
         allowed_m = max(6 * rest.level_std_m, DRIFT * abs(after.level_m - before.level_m))
         if abs(rest.drift_m) > allowed_m:
@@ -130,13 +136,13 @@ def _why_not(time_s: Column, step: Step, before: Rest, after: Rest, noise: float
     return None
 
 
-def _time(passed: Passage | None, period_s: float) -> Figure:
-    if passed is None:
-        return untold("the samples are too far apart: the stem was past it at the first")
-    early_s, late_s = max(passed.time_s - passed.gap_s, 0.0), passed.time_s + passed.gap_s
-    if passed.gap_s > GAP_PERIODS * period_s and passed.plus_minus_s > 0.1 * passed.time_s:
-        return untold(f"a gap of {passed.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s")
-    return Figure(passed.time_s, passed.plus_minus_s)
+def _time(crossing: LevelCrossing | None, period_s: float) -> Figure:
+    if crossing is None:
+        return undetermined("the samples are too far apart: the stem was past it at the first")
+    early_s, late_s = max(crossing.time_s - crossing.gap_s, 0.0), crossing.time_s + crossing.gap_s
+    if crossing.gap_s > GAP_PERIODS * period_s and crossing.plus_minus_s > 0.1 * crossing.time_s:
+        return undetermined(f"a gap of {crossing.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s")
+    return Figure(crossing.time_s, crossing.plus_minus_s)
 
 
 def _overshoot(t: Column, y: Column, noise: float) -> Figure:

@@ -8,7 +8,7 @@ import pytest
 from config.codes import Fault, Mode
 from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
-from positioner.cli.demo import LARGEST_ERROR_PU, Identified, Outcome, Step, started
+from positioner.cli.demo import LARGEST_ERROR_PU, ComparedEstimate, DemoOutcome, StepOutcome, started
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
@@ -17,9 +17,9 @@ from tests.cli.test_daemon_process import until
 pytestmark = pytest.mark.real_time
 
 
-def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True) -> Outcome:
-    identified = [Identified("new", "b_over_c", -800e3 * ratio, 1.0, -800e3, "")]
-    return Outcome([Step("new", 0.5, error_pu, counted)], identified, {})
+def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True) -> DemoOutcome:
+    identified = [ComparedEstimate("new", "b_over_c", -800e3 * ratio, 1.0, -800e3, "")]
+    return DemoOutcome([StepOutcome("new", 0.5, error_pu, counted)], identified, {})
 
 
 @pytest.mark.parametrize(
@@ -34,8 +34,8 @@ def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True
         (outcome(ratio=float("nan")), False),
     ],
 )
-def test_what_does_not_hold_is_a_problem(seen: Outcome, holds: bool) -> None:
-    assert (not seen.problems) == holds
+def test_what_does_not_hold_is_a_problem(outcome: DemoOutcome, holds: bool) -> None:
+    assert (not outcome.problems) == holds
 
 
 def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
@@ -58,9 +58,9 @@ def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
 )
 def test_on_the_other_buses_the_same_files_bring_up_a_valve_that_obeys(bus: str, where: str, tmp_path: Path) -> None:
     """What the command does on every bus alike, playing the DCS, is shown by the test above."""
-    with started(bus, tmp_path, load_valve(shipped_valve("seed")).valve) as site:
-        assert site.slave.startswith(where)
-        with Dcs("127.0.0.1", port_in(site.daemon)) as dcs:
+    with started(bus, tmp_path, load_valve(shipped_valve("seed")).valve) as pair:
+        assert pair.slave.startswith(where)
+        with Dcs("127.0.0.1", port_in(pair.daemon)) as dcs:
             assert dcs.get_all("fault", "position_m") == pytest.approx({"fault": Fault.NONE, "position_m": 0}, abs=1e-3)
             dcs.set_all({"mode": Mode.MANUAL, "manual_pressure": 60e3})
             until(lambda: dcs.get("position") > 0.3, "the stem's motion")

@@ -11,9 +11,9 @@ from config.codes import Refusal
 from config.valve_file import load_valve, shipped_valve
 from positioner.cli.main import main
 from positioner.paper import noise_table, scenario
-from positioner.paper.findings import CLAIMS, Findings, findings
+from positioner.paper.findings import CLAIMS, SeedFindings, findings
 from positioner.paper.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
-from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Course, course
+from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE, ScenarioRun, run_scenario
 
 PERIOD_S = 1e-4
 FILE = load_valve(shipped_valve("seed"))
@@ -21,22 +21,22 @@ STROKE_M = FILE.valve.stroke_m
 
 
 @pytest.fixture(scope="module")
-def quiet() -> Course:
-    return course(FILE, NONE, PERIOD_S)
+def quiet() -> ScenarioRun:
+    return run_scenario(FILE, NONE, PERIOD_S)
 
 
 @pytest.fixture(scope="module")
-def wrong(quiet: Course) -> dict[tuple[str, str], Erratum]:
+def wrong(quiet: ScenarioRun) -> dict[tuple[str, str], Erratum]:
     return {(each.where, each.quantity): each for each in errata(quiet, FILE)}
 
 
 @pytest.fixture(scope="module")
-def slow() -> Findings:
+def slow() -> SeedFindings:
     """What a fieldbus's sample time and white noise leave."""
-    return findings(course(FILE, WHITE, 1e-3), FILE)
+    return findings(run_scenario(FILE, WHITE, 1e-3), FILE)
 
 
-def holds(found: Findings) -> dict[str, bool]:
+def holds(found: SeedFindings) -> dict[str, bool]:
     return {claim.claim: claim.holds for claim in found.claims}
 
 
@@ -95,22 +95,22 @@ def test_static_friction_as_printed_is_refused_in_a_valve_file() -> None:
     )
 
 
-def test_a_sine_of_its_own_sample_rate_vanishes_and_one_in_rad_per_s_does_not(quiet: Course) -> None:
+def test_a_sine_of_its_own_sample_rate_vanishes_and_one_in_rad_per_s_does_not(quiet: ScenarioRun) -> None:
     assert largest_sample_pu(LITERAL, quiet) < 1e-10
     assert largest_sample_pu(HONEST_SINE, quiet) == pytest.approx(0.01, rel=1e-3)
-    literal = course(FILE, LITERAL, PERIOD_S)
+    literal = run_scenario(FILE, LITERAL, PERIOD_S)
     np.testing.assert_allclose(literal.measured_m, quiet.measured_m, rtol=0, atol=1e-9)
     np.testing.assert_allclose(literal.command_pa, quiet.command_pa, rtol=1e-6)
 
 
-def test_the_sine_is_measured_and_not_true(quiet: Course) -> None:
-    noisy = course(FILE, HONEST_SINE, PERIOD_S)
+def test_the_sine_is_measured_and_not_true(quiet: ScenarioRun) -> None:
+    noisy = run_scenario(FILE, HONEST_SINE, PERIOD_S)
     sine_m = 0.01 * STROKE_M * np.sin(1e5 * noisy.time_s)
     np.testing.assert_allclose(noisy.measured_m - noisy.true_m, sine_m, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(quiet.measured_m, quiet.true_m)
 
 
-def test_without_noise_the_law_brings_the_stem_to_both_references(quiet: Course) -> None:
+def test_without_noise_the_law_brings_the_stem_to_both_references(quiet: ScenarioRun) -> None:
     found = findings(quiet, FILE)
     assert {one.name: one.reason for one in found.identified} == dict.fromkeys(
         ("a", "b", "c", "k", "b_over_c", "k_over_c"), Refusal.VALID.name
@@ -122,14 +122,14 @@ def test_without_noise_the_law_brings_the_stem_to_both_references(quiet: Course)
     assert all(solved.worst_error < 0.03 for solved in found.solved)
 
 
-def test_at_a_fieldbus_sample_time_white_noise_spoils_the_seeds_a_b_c_but_not_ours(slow: Findings) -> None:
+def test_at_a_fieldbus_sample_time_white_noise_spoils_the_seeds_a_b_c_but_not_ours(slow: SeedFindings) -> None:
     assert all(solved.worst_error > 1 for solved in slow.solved)
     assert {one.reason for one in slow.identified} == {Refusal.VALID.name}
     assert all(abs(one.value / one.true - 1) < 0.02 for one in slow.identified)
     assert holds(slow) == {"a": False, "b": True, "c": True, "c daemon": True}
 
 
-def test_the_worst_reading_of_a_single_friction_value_is_no_better_than_the_last(slow: Findings) -> None:
+def test_the_worst_reading_of_a_single_friction_value_is_no_better_than_the_last(slow: SeedFindings) -> None:
     assert len(slow.kept) == 8
     assert all(kept.worst_error_pu >= kept.last_error_pu >= 0 for kept in slow.kept)
     seed = slow.kept[0]

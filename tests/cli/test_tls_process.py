@@ -168,11 +168,11 @@ def test_doctor_watches_the_certificates(site: Site, tmp_path: Path) -> None:
     assert file.supervisory.tls is not None
     tls = file.supervisory.tls.model_copy(update=short)
     changed = file.model_copy(update={"supervisory": file.supervisory.model_copy(update={"tls": tls})})
-    with pytest.raises(doctor.Ailment, match=r"daemon\.pem or its authority's ends on 20"):
+    with pytest.raises(doctor.FailedCheck, match=r"daemon\.pem or its authority's ends on 20"):
         doctor._certificates(changed, tmp_path)
     gone = tls.model_copy(update={"key": tmp_path / "gone.key"})
     changed = file.model_copy(update={"supervisory": file.supervisory.model_copy(update={"tls": gone})})
-    with pytest.raises(doctor.Ailment, match=r"gone\.key: cannot be read"):
+    with pytest.raises(doctor.FailedCheck, match=r"gone\.key: cannot be read"):
         doctor._certificates(changed, tmp_path)
 
 

@@ -11,7 +11,7 @@ from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
-from positioner.daemon.pacing import DevicePace, Pace, RealTime
+from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Row
 
 DAEMON = DaemonFile.model_validate(
@@ -85,5 +85,5 @@ def test_a_rows_command_acts_from_its_sample_on() -> None:
     in_lockstep, sent_pa = run([1, 2, 3, 4, 5], DevicePace())
     assert sent_pa == [40e3, 40e3, 40e3, 60e3, 60e3]
     assert [row[1] for row in in_lockstep] == [40e3, 40e3, 60e3, 60e3, 60e3]
-    in_real_time, sent_pa = run([1, 2, 3, 4, 5], RealTime(1e-3))
+    in_real_time, sent_pa = run([1, 2, 3, 4, 5], RealTimePace(1e-3))
     assert [row[1] for row in in_real_time] == sent_pa

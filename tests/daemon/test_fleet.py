@@ -31,8 +31,8 @@ from positioner.daemon import cycle as cycle_module
 from positioner.daemon import pacing
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.link import Link
-from positioner.daemon.logs import about, say, start_logging
-from positioner.daemon.pacing import DevicePace, RealTime
+from positioner.daemon.logs import log_event, logging_valve, start_logging
+from positioner.daemon.pacing import DevicePace, RealTimePace
 from positioner.daemon.recorder import Recorder
 from positioner.dcs import Dcs, DcsError
 from sim.slave.clocks import Lockstep
@@ -105,7 +105,7 @@ def line(monkeypatch: pytest.MonkeyPatch, dies: bool) -> tuple[list[OnTheLine], 
     file = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "cycle": {"period_s": 0.25}})
     devices, cycles, stop = [OnTheLine(clock) for _ in range(4)], [], Event()
     for index, device in enumerate(devices):
-        pace = RealTime(0.25, 0.25 * index / 4, may_spin=False)
+        pace = RealTimePace(0.25, 0.25 * index / 4, may_spin=False)
         link = Link(device, pace)
         held_pa, _ = link.open()
         cycles.append(Cycle(link, Controller(Settings.of(file), held_pa), pace, Requests(), None))
@@ -395,9 +395,9 @@ def port_of(path: Path, valve: int) -> int:
 def test_a_line_of_the_log_names_the_valve_it_is_about(capsys: pytest.CaptureFixture[str]) -> None:
     log = logging.getLogger("test_fleet")
     listener = start_logging("info")
-    with about("FV-1"):
-        say(log, logging.INFO, "one")
-    say(log, logging.INFO, "two")
+    with logging_valve("FV-1"):
+        log_event(log, logging.INFO, "one")
+    log_event(log, logging.INFO, "two")
     listener.stop()
     logging.basicConfig(force=True)
     one, two = (json.loads(line) for line in capsys.readouterr().err.splitlines())

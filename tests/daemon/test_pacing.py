@@ -3,7 +3,7 @@
 import pytest
 
 from positioner.daemon import pacing
-from positioner.daemon.pacing import DevicePace, RealTime
+from positioner.daemon.pacing import DevicePace, RealTimePace
 
 
 class Clock:
@@ -28,7 +28,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def test_a_late_cycle_does_not_shift_the_deadlines(clock: Clock) -> None:
-    pace = RealTime(1e-3)
+    pace = RealTimePace(1e-3)
     pace.wait()
     first_s = clock.now_s
     for busy_s in (0.2e-3, 0.9e-3, 0.0, 0.5e-3):
@@ -38,7 +38,7 @@ def test_a_late_cycle_does_not_shift_the_deadlines(clock: Clock) -> None:
 
 
 def test_missed_periods_are_counted_and_not_made_up_for(clock: Clock) -> None:
-    pace = RealTime(1e-3)
+    pace = RealTimePace(1e-3)
     pace.wait()
     first_s = clock.now_s
     clock.now_s += 3.5e-3
@@ -50,7 +50,7 @@ def test_missed_periods_are_counted_and_not_made_up_for(clock: Clock) -> None:
 
 def test_which_command_acts_from_a_sample_on() -> None:
     """In real time the one that travelled with it; in lockstep the device waits for the one decided on it."""
-    assert RealTime(1e-3).in_force_pa(sent_pa=1.0, decided_pa=2.0) == 1.0
+    assert RealTimePace(1e-3).in_force_pa(sent_pa=1.0, decided_pa=2.0) == 1.0
     assert DevicePace().in_force_pa(sent_pa=1.0, decided_pa=2.0) == 2.0
 
 
@@ -70,7 +70,7 @@ def test_a_device_in_lockstep_that_does_not_answer_is_not_asked_without_a_pause(
 
 def test_with_a_phase_the_deadlines_are_those_of_the_clock(clock: Clock) -> None:
     """So cycles that begin at different times keep their places in the period."""
-    pace = RealTime(0.25, 0.0625)
+    pace = RealTimePace(0.25, 0.0625)
     for _ in range(3):
         assert pace.wait() == 0
         assert clock.now_s % 0.25 == pytest.approx(0.0625, abs=2e-6)

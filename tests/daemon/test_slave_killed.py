@@ -26,7 +26,7 @@ from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
-from positioner.daemon.pacing import DevicePace, RealTime
+from positioner.daemon.pacing import DevicePace, RealTimePace
 from tests.certificates import folder, tls
 
 pytestmark = pytest.mark.real_time
@@ -166,7 +166,7 @@ def test_a_slave_killed_in_s1_is_a_fault_within_3_cycles_and_is_taken_up_again(b
             process,
             ready,
         ):
-            pace = RealTime(file.cycle.period_s)
+            pace = RealTimePace(file.cycle.period_s)
             link = Link(driver_for(wire.device(ready)), pace)
             held_pa, _ = link.open()
             cycle = Cycle(link, Controller(Settings.of(file), held_pa), pace, Requests(), None)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from config.recording import Column, Recording
-from positioner.response import Figure, Response, as_json, respond
+from positioner.response import Figure, ResponseFigures, as_json, respond
 
 T63, T86 = 0.632, 0.865
 
@@ -47,7 +47,7 @@ def close(figure: Figure, true: float, floor: float = 0.0) -> bool:
     return abs(figure.value - true) <= 3 * figure.plus_minus + floor
 
 
-def the_step(response: Response) -> tuple[Figure, Figure, Figure, Figure]:
+def the_step(response: ResponseFigures) -> tuple[Figure, Figure, Figure, Figure]:
     assert len(response.steps) == 1, response
     step = response.steps[0]
     return step.dead_time_s, step.t63_s, step.t86_s, step.overshoot_percent
@@ -84,9 +84,9 @@ def test_uncertainties_cover_the_errors_under_noise(noise: float) -> None:
     for _ in range(60):
         time_s = np.sort(np.append(uneven(rng, 8.0, 0.005), 3.0))
         recording = noisy(first_order(time_s, 3.0, 0.25, 0.4, 0.01), rng, noise * 0.01)
-        _, *told, overshoot = the_step(respond(recording))
+        _, *determined, overshoot = the_step(respond(recording))
         assert overshoot.value == 0.0, "noise is no overshoot"
-        for figure, truth in zip(told, true, strict=True):
+        for figure, truth in zip(determined, true, strict=True):
             assert figure.value is not None
             assert figure.plus_minus is not None
             errors.append((figure.value - truth) / figure.plus_minus)
@@ -212,6 +212,6 @@ def test_everything_is_plain_json() -> None:
 
     rng = np.random.default_rng(7)
     response = respond(noisy(first_order(np.arange(0, 8, 0.01), 3.0, 0.1, 0.3, 0.01), rng, 1e-3))
-    told = json.loads(json.dumps(as_json(response), allow_nan=False))
-    assert told["steps"][0]["t63_s"]["value"] is None
-    assert told["summary"]["travel_m"]["count"] == 1
+    determined = json.loads(json.dumps(as_json(response), allow_nan=False))
+    assert determined["steps"][0]["t63_s"]["value"] is None
+    assert determined["summary"]["travel_m"]["count"] == 1

@@ -62,19 +62,19 @@ def write_record(path: Path, valve: str, record: HealthRecord) -> None:
 
 def _parsed(text: bytes, valve: str) -> HealthRecord:
     try:
-        said = json.loads(text)
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise _Unreadable(f"is not JSON: {error}") from None
     names = {field.name for field in fields(HealthRecord)}
-    if not isinstance(said, dict) or said.keys() != names | {"version", "valve"}:
+    if not isinstance(content, dict) or content.keys() != names | {"version", "valve"}:
         raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))} and nothing else")
     for key, allowed in (("version", VERSION), ("valve", valve)):
-        if said[key] != allowed:
-            raise _Unreadable(f"{key}: allowed is {allowed!r}, got {said[key]!r}")
+        if content[key] != allowed:
+            raise _Unreadable(f"{key}: allowed is {allowed!r}, got {content[key]!r}")
     for name in names:
-        if problem := _problem(name, said[name]):
-            raise _Unreadable(f"{name}: {problem}, got {said[name]!r}")
-    return HealthRecord(**{name: said[name] for name in names})
+        if problem := _problem(name, content[name]):
+            raise _Unreadable(f"{name}: {problem}, got {content[name]!r}")
+    return HealthRecord(**{name: content[name] for name in names})
 
 
 def _problem(name: str, value: object) -> str | None:

@@ -15,18 +15,18 @@ from config.codes import Ne107Status
 from config.errors import InputError
 from positioner.control.controller import Decision
 from positioner.daemon.health.health_file import HealthRecord, read_record, write_record
-from positioner.daemon.health.ne107 import Condition, condition
+from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health
-from positioner.daemon.logs import about, say
+from positioner.daemon.logs import log_event, logging_valve
 
 log = logging.getLogger(__name__)
 
-LOOK_EVERY_S = 1.0
-WRITE_EVERY_LOOKS = 60
+CHECK_EVERY_S = 1.0
+WRITE_EVERY_CHECKS = 60
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class StoredHealth:
     """A valve's file, and what was in it at the start; `problem` says why that could not be read."""
 
     path: Path
@@ -34,7 +34,7 @@ class Kept:
     problem: str | None
 
     @classmethod
-    def in_folder(cls, folder: Path, valve: str) -> "Kept":
+    def in_folder(cls, folder: Path, valve: str) -> "StoredHealth":
         """Read what is kept of a valve, and make sure that it can be kept again.
 
         Raises:
@@ -53,24 +53,26 @@ class Kept:
 class HealthKeeper:
     """A thread from `start` to `stop`. Without a file it only says when the status changes."""
 
-    def __init__(self, health: Health, decided: Callable[[], Decision], valve: str, kept: Kept | None) -> None:
+    def __init__(
+        self, health: Health, decided: Callable[[], Decision], valve: str, stored: StoredHealth | None
+    ) -> None:
         self._health = health
         self._decided = decided
         self._valve = valve
-        self._file = kept
-        self._kept = health.record
-        self._told = Condition(())
+        self._file = stored
+        self._written = health.record
+        self._logged = Ne107Condition(())
         self._failed = False
-        self._looks = 0
+        self._checks = 0
         self._stopping = Event()
         self._thread = Thread(target=self._work, name=f"health of {valve}", daemon=True)
 
     def start(self) -> None:
         """Begin to look; say first if what was kept cannot be read."""
         if self._file is not None and self._file.problem is not None:
-            said = {"file": str(self._file.path), "reason": self._file.problem, "put_aside_as": ".unreadable"}
-            with about(self._valve):
-                say(log, logging.WARNING, "health record unreadable, counts start anew", **said)
+            fields = {"file": str(self._file.path), "reason": self._file.problem, "put_aside_as": ".unreadable"}
+            with logging_valve(self._valve):
+                log_event(log, logging.WARNING, "health record unreadable, counts start anew", **fields)
         self._thread.start()
 
     def stop(self) -> None:
@@ -78,35 +80,37 @@ class HealthKeeper:
         self._stopping.set()
         self._thread.join()
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Look once: tell a new status, and write when it is time."""
-        now = condition(self._decided(), self._health)
-        if now != self._told:
-            self._told = now
+        now = ne107_condition(self._decided(), self._health)
+        if now != self._logged:
+            self._logged = now
             level = logging.INFO if now.status in (Ne107Status.GOOD, Ne107Status.FUNCTION_CHECK) else logging.WARNING
             causes = [cause.name for cause in now.causes]
-            say(log, level, "health", status=now.status.name, causes=causes, friction_ratio=self._health.friction_ratio)
-        self._looks += 1
+            log_event(
+                log, level, "health", status=now.status.name, causes=causes, friction_ratio=self._health.friction_ratio
+            )
+        self._checks += 1
         record = self._health.record
-        if self._looks % WRITE_EVERY_LOOKS == 0 or record.baseline_pa != self._kept.baseline_pa:
-            self.keep(record)
+        if self._checks % WRITE_EVERY_CHECKS == 0 or record.baseline_pa != self._written.baseline_pa:
+            self.store(record)
 
-    def keep(self, record: HealthRecord) -> None:
+    def store(self, record: HealthRecord) -> None:
         """Write a record if it is not the one last written; one line tells when that fails."""
-        if self._file is None or record == self._kept:
+        if self._file is None or record == self._written:
             return
         try:
             write_record(self._file.path, self._valve, record)
         except OSError as error:
             if not self._failed:
-                said = {"file": str(self._file.path), "reason": error.strerror}
-                say(log, logging.ERROR, "health record cannot be written", **said)
+                fields = {"file": str(self._file.path), "reason": error.strerror}
+                log_event(log, logging.ERROR, "health record cannot be written", **fields)
             self._failed = True
             return
-        self._kept, self._failed = record, False
+        self._written, self._failed = record, False
 
     def _work(self) -> None:
-        with about(self._valve):
-            while not self._stopping.wait(LOOK_EVERY_S):
-                self.look()
-            self.keep(self._health.record)
+        with logging_valve(self._valve):
+            while not self._stopping.wait(CHECK_EVERY_S):
+                self.check()
+            self.store(self._health.record)

@@ -37,7 +37,7 @@ FEWEST_MOVES = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class Ne107Condition:
     """A status and what it rests on, the first cause deciding."""
 
     causes: tuple[Ne107Cause, ...]
@@ -58,7 +58,7 @@ class Condition:
         return sum(1 << (cause - 1) for cause in self.causes)
 
 
-def condition(decision: Decision, health: Health) -> Condition:
+def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
     """Return the condition of a valve."""
     silent = decision.fault is Fault.DCS_SILENT
     holds = {
@@ -71,7 +71,7 @@ def condition(decision: Decision, health: Health) -> Condition:
         Ne107Cause.STUCK: decision.inhibit_reason is InhibitReason.STUCK,
     }
     worn = set(_wear(health))
-    return Condition(tuple(cause for cause in CLASS if cause in worn or holds.get(cause, False)))
+    return Ne107Condition(tuple(cause for cause in CLASS if cause in worn or holds.get(cause, False)))
 
 
 def _wear(health: Health) -> Iterator[Ne107Cause]:

@@ -52,14 +52,14 @@ class HealthSettings:
 class Health:
     """The counts of one valve, from what was kept of it."""
 
-    def __init__(self, settings: HealthSettings, kept: HealthRecord | None = None) -> None:
-        kept = kept or HealthRecord()
+    def __init__(self, settings: HealthSettings, stored: HealthRecord | None = None) -> None:
+        stored = stored or HealthRecord()
         self.settings = settings
-        self._baseline_pa = nan if kept.baseline_pa is None else kept.baseline_pa
+        self._baseline_pa = nan if stored.baseline_pa is None else stored.baseline_pa
         self._travel = TravelAccumulator(settings.stroke_m, settings.dead_band_m)
-        self._travel.travel_m, self._travel.reversals = kept.travel_m, kept.reversals
+        self._travel.travel_m, self._travel.reversals = stored.travel_m, stored.reversals
         self._stiction = StictionIndex(settings.settle_s, lambda: self._travel.band_m)
-        self._stiction.index, self._stiction.judged = kept.stiction_index, kept.moves_judged
+        self._stiction.index, self._stiction.judged = stored.stiction_index, stored.moves_judged
         self._applied: Applied | None = None
         self._friction_pa = nan
         self._requests = Requests()

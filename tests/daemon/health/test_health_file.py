@@ -8,7 +8,7 @@ import pytest
 
 from config.errors import InputError
 from positioner.control.controller import Decision
-from positioner.daemon.health import Health, HealthKeeper, HealthRecord, Kept
+from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
 from positioner.daemon.health.health_file import read_record, write_record
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)
@@ -67,14 +67,14 @@ def test_garbage_is_put_aside_and_told_in_one_line(tmp_path: Path, text: bytes) 
 def test_two_valves_whatever_their_names_have_a_file_each(tmp_path: Path) -> None:
     names = ["a/b", "a-b", "a b", "..", "é"]
     for name in names:
-        Kept.in_folder(tmp_path / "health", name)
+        StoredHealth.in_folder(tmp_path / "health", name)
     assert len(list((tmp_path / "health").iterdir())) == len(names)
 
 
 def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="the health record cannot be kept there"):
-        Kept.in_folder(tmp_path / "file", "FV-1")
+        StoredHealth.in_folder(tmp_path / "file", "FV-1")
 
 
 def undecided() -> Decision:
@@ -84,27 +84,27 @@ def undecided() -> Decision:
 def test_the_keeper_tells_what_it_could_not_read_and_keeps_the_counts_at_the_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    Kept.in_folder(tmp_path, "FV-1")
+    StoredHealth.in_folder(tmp_path, "FV-1")
     (file,) = tmp_path.iterdir()
     file.write_text("{")
-    kept = Kept.in_folder(tmp_path, "FV-1")
+    stored = StoredHealth.in_folder(tmp_path, "FV-1")
     health = Health.idle(0.1)
-    keeper = HealthKeeper(health, undecided, "FV-1", kept)
+    keeper = HealthKeeper(health, undecided, "FV-1", stored)
     with caplog.at_level(logging.WARNING):
         keeper.start()
         keeper.stop()
     assert [record.getMessage() for record in caplog.records] == ["health record unreadable, counts start anew"]
     restarted = Health(health.settings, KEPT)
     assert restarted.record == KEPT
-    keeper = HealthKeeper(restarted, undecided, "FV-1", kept)
-    keeper.keep(HealthRecord(13.0, 341, 0.25, 17, 22e3))
-    assert Kept.in_folder(tmp_path, "FV-1").record.reversals == 341
+    keeper = HealthKeeper(restarted, undecided, "FV-1", stored)
+    keeper.store(HealthRecord(13.0, 341, 0.25, 17, 22e3))
+    assert StoredHealth.in_folder(tmp_path, "FV-1").record.reversals == 341
 
 
 def test_a_disk_that_fails_is_told_once_and_control_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    kept = Kept(tmp_path / "gone" / "valve.json", HealthRecord(), None)
-    keeper = HealthKeeper(Health.idle(0.1), undecided, "FV-1", kept)
+    stored = StoredHealth(tmp_path / "gone" / "valve.json", HealthRecord(), None)
+    keeper = HealthKeeper(Health.idle(0.1), undecided, "FV-1", stored)
     with caplog.at_level(logging.ERROR):
-        keeper.keep(KEPT)
-        keeper.keep(KEPT)
+        keeper.store(KEPT)
+        keeper.store(KEPT)
     assert [record.getMessage() for record in caplog.records] == ["health record cannot be written"]

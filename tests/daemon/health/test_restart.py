@@ -59,9 +59,9 @@ def test_baseline_and_counts_outlive_the_daemon(tmp_path: Path, slave_port: int)
     with daemon(tmp_path, slave_port) as dcs:
         dcs.set("health_baseline", 1)
         until_it_is(dcs, "friction_ratio", 1.0)
-    kept = json.loads(record.read_text())
-    assert kept["baseline_pa"] == 22068.2
-    record.write_text(json.dumps(kept | {"travel_m": 0.5 * 0.1016, "reversals": 7, "baseline_pa": 11034.1}))
+    stored = json.loads(record.read_text())
+    assert stored["baseline_pa"] == 22068.2
+    record.write_text(json.dumps(stored | {"travel_m": 0.5 * 0.1016, "reversals": 7, "baseline_pa": 11034.1}))
     with daemon(tmp_path, slave_port) as dcs:
         assert [dcs.get(name) for name in ("travel", "reversals", "friction_ratio")] == [0.5, 7, 2.0]
     assert json.loads(record.read_text())["reversals"] == 7

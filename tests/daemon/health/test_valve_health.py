@@ -12,7 +12,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.server import ExceptionCode, RegisterError
 from positioner.control.requests import Requests
-from positioner.daemon.health import Health, condition
+from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.virtual.virtual_cycle import virtual_cycle
@@ -181,7 +181,7 @@ def test_friction_far_from_its_baseline_asks_for_maintenance(ratio: float, cause
     panel.set("mode", Mode.AUTOMATIC)
     panel.run(0.01)
     decision = replace(panel.cycle.snapshot.decision, inhibit_reason=InhibitReason.NO_MOVE_ASKED)
-    assert condition(decision, with_friction(panel, ratio)).causes == causes
+    assert ne107_condition(decision, with_friction(panel, ratio)).causes == causes
 
 
 def test_the_worst_class_decides_and_every_cause_is_told() -> None:
@@ -190,7 +190,7 @@ def test_the_worst_class_decides_and_every_cause_is_told() -> None:
     decision = replace(
         panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, inhibit_reason=InhibitReason.NOT_AUTOMATIC
     )
-    now = condition(decision, health)
+    now = ne107_condition(decision, health)
     assert (now.status, now.cause) == (Ne107Status.FAILURE, Ne107Cause.FAULT)
     assert now.causes == (Ne107Cause.FAULT, Ne107Cause.NOT_AUTOMATIC, Ne107Cause.FRICTION_HIGH)
     assert now.bits == 0b10000011
@@ -211,7 +211,7 @@ def test_the_class_of_each_fault(
     panel = Panel(LAW)
     mode = Mode.HOLD if fault else Mode.AUTOMATIC
     decision = replace(panel.cycle.snapshot.decision, mode=mode, fault=fault, inhibit_reason=inhibit_reason)
-    now = condition(decision, Health.idle(STROKE_M))
+    now = ne107_condition(decision, Health.idle(STROKE_M))
     assert (now.status, now.cause) == (status, cause)
 
 
@@ -223,6 +223,6 @@ def test_limits_of_travel_and_reversals_of_0_are_none() -> None:
         panel.set("reference", reference)
         panel.run(0.3)
     decision = panel.cycle.snapshot.decision
-    assert condition(decision, panel.health).causes == (Ne107Cause.TRAVEL, Ne107Cause.REVERSALS)
+    assert ne107_condition(decision, panel.health).causes == (Ne107Cause.TRAVEL, Ne107Cause.REVERSALS)
     free = Health(replace(panel.health.settings, travel_limit_m=0.0, reversal_limit=0), panel.health.record)
-    assert condition(decision, free).causes == ()
+    assert ne107_condition(decision, free).causes == ()
