@@ -23,7 +23,7 @@ def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True
 
 
 @pytest.mark.parametrize(
-    ("seen", "holds"),
+    ("result", "holds"),
     [
         (outcome(), True),
         (outcome(error_pu=-1.01 * LARGEST_ERROR_PU), False),
@@ -34,8 +34,8 @@ def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True
         (outcome(ratio=float("nan")), False),
     ],
 )
-def test_what_does_not_hold_is_a_problem(outcome: DemoOutcome, holds: bool) -> None:
-    assert (not outcome.problems) == holds
+def test_what_does_not_hold_is_a_problem(result: DemoOutcome, holds: bool) -> None:
+    assert (not result.problems) == holds
 
 
 def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
