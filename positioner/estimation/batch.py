@@ -30,7 +30,9 @@ from config.codes import Refusal
 from positioner.estimation.array import Array
 from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
 from positioner.estimation.estimates import Estimate, Estimates, no_estimate, no_estimates
-from positioner.estimation.likelihood import CLEAR, LikelihoodFit, Prior, fit_motions
+from positioner.estimation.likelihood import LikelihoodFit, fit_motions
+from positioner.estimation.linear_problem import Prior
+from positioner.estimation.motion_preparation import CLEAR
 from positioner.estimation.motion_segment import MotionSegment
 from positioner.estimation.running_noise import PositionNoise
 from positioner.estimation.segmentation import Segmentation, find_motions
@@ -300,9 +302,7 @@ def _mass_identifiable_later(best: _Hypothesis, fit: LikelihoodFit, largest: flo
         if len(each.time_s) - first >= FEWEST_LATER:
             rows = slice(first, None)
             time_s, position_m, pressure_pa = each.time_s[rows], each.position_m[rows], each.pressure_pa[rows]
-            later.append(
-                MotionSegment(each.direction, time_s, position_m, pressure_pa, begins=0, earliest=0, rests_from=0)
-            )
+            later.append(MotionSegment(each.direction, time_s, position_m, pressure_pa, begins=0, earliest=0))
     again = fit_motions(later, held=best.interpolation != "linear", guess=fit.p[:2]) if later else None
     return again is not None and float(again.covariance[1, 1]) ** 0.5 <= largest
 

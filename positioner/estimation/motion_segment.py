@@ -16,7 +16,6 @@ class MotionSegment:
         pressure_pa: held: of the interval before each sample; else at each sample.
         begins: the last sample before the stem measurably moves; 0: it moved already.
         earliest: the first sample after which it may have begun; from it to `begins` the stem rests or has hardly left.
-        rests_from: the first sample of that rest.
     """
 
     direction: int
@@ -25,4 +24,3 @@ class MotionSegment:
     pressure_pa: Array
     begins: int
     earliest: int
-    rests_from: int

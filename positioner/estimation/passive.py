@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from positioner.estimation.likelihood import LikelihoodFit, Prior
+from positioner.estimation.likelihood import LikelihoodFit
+from positioner.estimation.linear_problem import Prior
 
 WALK_PER_SQRT_S = np.array([5e-3, 5e-3, 1e-4, 3e-3])
 """Of ln τ and ln μ; of g and q as shares."""

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchResult, BatchSettings, identify
-from positioner.estimation.likelihood import Prior
+from positioner.estimation.linear_problem import Prior
 
 
 @dataclass(frozen=True, slots=True)

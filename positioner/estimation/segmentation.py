@@ -157,7 +157,6 @@ def _trimmed(
             pressure_pa=pressure_pa[first:stop],
             begins=starts - first if from_rest else 0,
             earliest=max(0, starts - first - max(window, 3)) if from_rest else 0,
-            rests_from=0,
         ),
         (starts, stop),
     )

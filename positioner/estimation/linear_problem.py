@@ -1,0 +1,124 @@
+"""The linear least-squares problem at fixed (ln τ, ln μ), and the sensitivities of its residuals.
+
+For given p = (ln τ, ln μ, starts) the model y_i = g X_g + q X_q + x_0 X_0 + v_0 X_1 (`stem_response`) is linear in g, q
+and in every motion's beginning. The columns of all motions stand in one matrix, g and q shared; a prior is four more
+rows. The derivatives by p are differences.
+"""
+
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+
+from positioner.estimation.array import Array
+from positioner.estimation.motion_preparation import PreparedMotion
+from positioner.estimation.stem_response import responses
+
+DEGENERATE = 1e-8
+"""Share of the largest singular value below which a direction is unknown, as g and q are apart after a single jump: of
+all that explain the motion equally well the smallest is taken, whose g and q share it."""
+DIFFERENCE = 1e-6
+"""Step of the differences by p."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known beforehand of (ln τ, ln μ, g, q): a mean (4), and a root R (4, 4) of the information R'R / σ_x^2.
+
+    R may be singular: what it does not know, it does not pull at.
+    """
+
+    mean: Array
+    root: Array
+
+
+@dataclass(frozen=True, slots=True)
+class LinearProblem:
+    """The linear problem at some p, R rows and C columns.
+
+    Attributes:
+        columns: (R, C), of g, q and the beginnings; the rows of the motions, of their starts and of the prior.
+        measured: (R,), what the columns should give, m times the root of each row's samples.
+        scale: (C,), norms of the columns.
+    """
+
+    columns: Array
+    measured: Array
+    scale: Array
+
+    def solved(self) -> tuple[Array, float]:
+        """Return the most likely linear parameters (C,), g in m/Pa, q in m and the beginnings, and S in m^2."""
+        whole = np.column_stack((self.columns / self.scale, self.measured))
+        R: Array = np.asarray(np.linalg.qr(whole, mode="r"))
+        found = np.linalg.lstsq(R[:-1, :-1], R[:-1, -1], rcond=DEGENERATE)[0]
+        left = R[:, -1] - R[:, :-1] @ found
+        return found / self.scale, float(left @ left)
+
+
+def linear_problem(motions: list[PreparedMotion], p: Array, prior: Prior | None) -> LinearProblem:
+    """Return the linear problem at p = (ln τ, ln μ, shares of the start intervals), τ in s and μ in s^2."""
+    blocks = [_columns(each, p) for each in started(motions, p)]
+    starts = [each.start_interval for each in motions if each.start_interval is not None]
+    rows = sum(len(each) for each in blocks) + len(starts) + (4 if prior is not None else 0)
+    columns: Array = np.zeros((rows, 2 + sum(each.shape[1] - 2 for each in blocks)))
+    measured: Array = np.zeros(rows)
+    row, column = 0, 2
+    for motion, block in zip(motions, blocks, strict=True):
+        height, width = len(block), block.shape[1]
+        columns[row : row + height, :2] = block[..., :2]
+        columns[row : row + height, column : column + width - 2] = block[..., 2:]
+        measured[row : row + height] = _measured_rows(motion)
+        row, column = row + height, column + width - 2
+    for start, share in zip(starts, p[2:].tolist(), strict=True):
+        measured[row] = start.weight * (start.expected - share)
+        row += 1
+    if prior is not None:
+        columns[row:, :2] = prior.root[:, 2:]
+        measured[row:] = prior.root @ prior.mean - prior.root[:, :2] @ p[:2]
+    scale = np.sqrt((columns**2).sum(axis=0))
+    return LinearProblem(columns, measured, np.where(scale > 0, scale, 1.0))
+
+
+def sensitivities(
+    motions: list[PreparedMotion], p: Array, problem: LinearProblem, linear: Array, prior: Prior | None
+) -> Array:
+    """Return [scaled columns, derivatives of the model by p, residuals] (R, C + len(p) + 1), a row per sample.
+
+    Args:
+        motions: that the problem was made of.
+        p: at which it was made.
+        problem: that of `linear_problem`.
+        linear: (C,), its solution.
+        prior: as there.
+    """
+    modelled = problem.columns @ linear - problem.measured
+    slopes = np.empty((len(modelled), len(p)))
+    for number in range(len(p)):
+        moved = p.copy()
+        moved[number] += DIFFERENCE
+        near = linear_problem(motions, moved, prior)
+        slopes[:, number] = (near.columns @ linear - near.measured - modelled) / DIFFERENCE
+    return np.column_stack((problem.columns / problem.scale, slopes, -modelled))
+
+
+def started(motions: list[PreparedMotion], p: Array) -> list[PreparedMotion]:
+    """Return the motions, each that has a start interval begun at its share of it, p[2:]."""
+    shares = iter(p[2:].tolist())
+    return [each if each.start_interval is None else each.start_interval.begin(each, next(shares)) for each in motions]
+
+
+def _columns(motion: PreparedMotion, p: Array) -> Array:
+    """Return X_g, X_q, X_0 and, if free, X_1 (N + 1, 3 or 4), weighted; the last row is the rest's."""
+    X_g, X_q, X_0, X_1 = responses(
+        motion.time_s, motion.pressure_pa, motion.direction, exp(p[0]), exp(p[1]), held=motion.held
+    )
+    free = (X_g, X_q, X_0, X_1) if motion.free_velocity else (X_g, X_q, X_0)
+    rows: Array = np.zeros((len(motion.position_m) + 1, len(free)))
+    for number, column in enumerate(free):
+        rows[:-1, number] = column[1:] * motion.weight
+    rows[-1, 2] = motion.rest_count**0.5
+    return rows
+
+
+def _measured_rows(motion: PreparedMotion) -> Array:
+    return np.append(motion.position_m * motion.weight, motion.rest_m * motion.rest_count**0.5)
