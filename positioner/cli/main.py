@@ -49,7 +49,7 @@ def _done(words: Sequence[str] | None) -> int:
     from config.errors import InputError, Unfulfilled
     from config.extras import told
 
-    arguments = _parser().parse_args(words)
+    arguments = command_parser().parse_args(words)
     try:
         status = int(arguments.run(arguments))
         sys.stdout.flush()
@@ -83,7 +83,8 @@ def _unread() -> bool:
     return True
 
 
-def _parser() -> argparse.ArgumentParser:
+def command_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands, which are imported for it."""
     parser = argparse.ArgumentParser(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",

@@ -62,8 +62,9 @@ def test_help_of_each_command_ends_with_an_example(command: str, capsys: Capture
 
 def test_help_needs_nothing_but_the_standard_library() -> None:
     """Instant help, and a gateway without the model side still has it."""
+    parsing = "import sys; from positioner.cli.main import command_parser; command_parser(); print(*sys.modules)"
     loaded = subprocess.run(
-        [sys.executable, "-c", "import sys; from positioner.cli.main import _parser; _parser(); print(*sys.modules)"],
+        [sys.executable, "-c", parsing],
         capture_output=True,
         text=True,
         check=True,
