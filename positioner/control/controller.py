@@ -129,7 +129,7 @@ def step(
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
         wanted_pa = requests.manual_pa
     else:
-        wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, breakaway_memory)
+        wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, breakaway_memory)
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
 
     inhibit_reason = (
@@ -293,6 +293,7 @@ def _pressure_pa(
     now_s: float,
     reference: Reference,
     applied: Applied,
+    settings: Settings,
     breakaway_memory: BreakawayMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
@@ -301,5 +302,5 @@ def _pressure_pa(
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
         if breakaway_memory is not None:
             return breakaway_memory.level_pa
-        return balance_pa(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
+        return settings.law(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
     return held_pa

@@ -1,13 +1,20 @@
 """What the controller is told once, from the daemon's file."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from config.daemon_file import DaemonFile, Law
 from config.device import ActionName
+from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_law import BreakawaySettings
 from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.online import IdentificationSettings
+
+
+LAWS: dict[str, Callable[[float, int, Ratios], float]] = {"seed": balance_pa}
+"""The laws without a memory, by name: the pressure, Pa, for a reference, m, a direction (+1 up, -1 down) and the ratios.
+The law for small moves has a memory and is not among them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +29,10 @@ class Settings:
     identification: IdentificationSettings
     applied: Applied
     """What the law may use before anything was identified."""
+    law: Callable[[float, int, Ratios], float]
+    """Without a memory, see `LAWS`; what commands unless `breakaway` does."""
     breakaway: BreakawaySettings | None
-    """Of the law for small moves; None: the seed's law."""
+    """Of the law for small moves; None: `law` commands."""
 
     @classmethod
     def of(cls, file: DaemonFile) -> "Settings":
@@ -55,6 +64,7 @@ class Settings:
                 derivative_window_s=identification.derivative_window_s,
             ),
             applied=Applied(_ratios(file.law) if file.law else None),
+            law=LAWS.get(file.control.law, balance_pa),
             breakaway=_breakaway(file) if file.control.law == "breakaway" else None,
         )
 

@@ -1,0 +1,73 @@
+"""The recipes of `docs/architecture.md`, each followed block by block in a copy of the tree."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("config", "docs", "drivers", "fieldbus", "positioner", "sim", "tests", "workbench")
+GUIDE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").partition("\n## How to add\n")[2]
+RECIPES = dict(re.findall(r"^### (.+)\n((?:(?!^##).*\n)+)", GUIDE, re.MULTILINE))
+BLOCK = re.compile(r"^```(\w+) ?([\w/.]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+WANTED = {"A bus", "An effect", "A register", "A fault", "A command", "An estimator", "A law", "A report section"}
+
+
+def test_there_is_a_recipe_for_all_that_is_added_often() -> None:
+    assert set(RECIPES) == WANTED
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_a_recipe_can_be_followed(name: str, tmp_path: Path) -> None:
+    tree = tmp_path / "tree"
+    for room in ROOMS:
+        shutil.copytree(ROOT / room, tree / room, ignore=shutil.ignore_patterns("__pycache__", "img"))
+    shutil.copy(ROOT / "pyproject.toml", tree)
+    commands = []
+    for language, file, text in BLOCK.findall(RECIPES[name]):
+        if language == "sh":
+            commands += text.splitlines()
+        elif language == "diff":
+            change(tree / file, text)
+        else:
+            assert not (tree / file).exists(), f"{file} is no new file"
+            (tree / file).write_text(text, encoding="utf-8")
+    install(tree)
+    assert commands
+    for command in commands:
+        run(command, tree)
+
+
+def change(path: Path, diff: str) -> None:
+    """Change a file: the lines that stay or go must stand in it once, as they are."""
+    lines = diff.splitlines(keepends=True)
+    old, new = ("".join(line[1:] or "\n" for line in lines if line[0] != sign) for sign in "+-")
+    text = path.read_text(encoding="utf-8")
+    assert text.count(old) == 1, f"{path.name} has {text.count(old)} times:\n{old}"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def install(tree: Path) -> None:
+    """Leave what `make venv` leaves of the tree's entry points."""
+    project = tomllib.loads((tree / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    metadata = tree / "positioner-0.1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: positioner\nVersion: {project['version']}\n")
+    groups = project["entry-points"].items()
+    lines = [line for group, each in groups for line in (f"[{group}]", *(f"{k} = {v}" for k, v in each.items()))]
+    (metadata / "entry_points.txt").write_text("\n".join(lines) + "\n")
+
+
+def run(command: str, tree: Path) -> None:
+    """Run a command line in the tree, with the tree's own packages."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PYTHONPATH": str(tree), "PATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(
+        ["sh", "-c", command], cwd=tree, env=environment, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
