@@ -129,7 +129,9 @@ def step(
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
         wanted_pa = requests.manual_pa
     else:
-        wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, breakaway_memory)
+        wanted_pa = _pressure_pa(
+            state, held_pa, excitation, sample.now_s, reference, applied, settings, breakaway_memory
+        )
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
 
     inhibit_reason = (

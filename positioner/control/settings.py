@@ -11,9 +11,8 @@ from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.online import IdentificationSettings
 
-
 LAWS: dict[str, Callable[[float, int, Ratios], float]] = {"seed": balance_pa}
-"""The laws without a memory, by name: the pressure, Pa, for a reference, m, a direction (+1 up, -1 down) and the ratios.
+"""The laws without a memory, by name: reference, m, direction, +1 up or -1 down, and ratios in; pressure, Pa, out.
 The law for small moves has a memory and is not among them."""
 
 
