@@ -15,6 +15,7 @@ a fault of its own is reset once a cycle.
 
 import logging
 import math
+import random
 import struct
 import time
 from collections.abc import Mapping
@@ -41,9 +42,13 @@ OPERATIONAL, BOOT_UP = 5, 0
 START, ENTER_PRE_OPERATIONAL = 1, 128
 SYNC, IDENTITY, HEARTBEAT_MS = 0x1005, 0x1018, 0x1017
 VENDOR, PRODUCT = 1, 2
+RESERVED = range(0x0400, 0x1000)
+"""Indices at which CiA 301 lets no node have an object."""
 RPDO, TPDO, MAPPING = 0x1400, 0x1800, 0x200
 INVALID = 1 << 31
 EACH_SYNC = 1
+UNNAMED = bytes(3)
+"""What some nodes say for the object that they refuse."""
 SDO_ABORTED, SDO_UPLOAD, SDO_DOWNLOAD = 0x80, 0x40, 0x60
 CAN_ERROR_BUS_OFF = 0x40
 """Of an error frame's id, as SocketCAN has them."""
@@ -203,14 +208,26 @@ class _Node:
             said = " ".join(str(error).split())
             raise NoConnection(f"{self._who}: {NodeEvent.BUS_OFF}: the bus cannot be opened: {said}") from None
 
+    def _pass_over_late_answers(self) -> None:
+        """Wait until the node has answered what was asked before: a node answers in turn.
+
+        It is asked for an object that it cannot have, chosen by lot; what comes before the refusal of that object
+        answers somebody's earlier requests, and is dropped.
+        """
+        multiplexer = struct.pack("<HB", random.choice(RESERVED), random.randrange(256))
+        self._send(0x600 + self._number, bytes((SDO_UPLOAD,)) + multiplexer + bytes(4))
+        end_s = time.monotonic() + self._config.reply_timeout_s
+        while (rest_s := end_s - time.monotonic()) > 0:
+            message = self._receive(rest_s)
+            if message is None or message.arbitration_id != 0x580 + self._number:
+                self._heed_emergency(message)
+            elif message.data[:1] == bytes((SDO_ABORTED,)) and message.data[1:4] in (multiplexer, UNNAMED):
+                return
+        raise NoConnection(f"{self._who}: {NodeEvent.NO_NODE} within {1e3 * self._config.reply_timeout_s:g} ms")
+
     def _identify(self) -> None:
         """Hold the node against its data sheet."""
-        try:
-            found = [self._upload(IDENTITY, part) for part in (VENDOR, PRODUCT)]
-        except NoReply:
-            raise NoConnection(
-                f"{self._who}: {NodeEvent.NO_NODE} within {1e3 * self._config.reply_timeout_s:g} ms"
-            ) from None
+        found = [self._upload(IDENTITY, part) for part in (VENDOR, PRODUCT)]
         for part, name, is_there in zip((VENDOR, PRODUCT), ("vendor", "product"), found, strict=True):
             variable = self._sheet.get_variable(IDENTITY, part)
             expected = variable.default if variable is not None else None
@@ -331,6 +348,7 @@ class CanopenDriver(_Node):
         try:
             self._connect(self._identities())
             self._send(0, bytes((ENTER_PRE_OPERATIONAL, self._number)))
+            self._pass_over_late_answers()
             self._identify()
             held_pa = self._held_command_pa()
             self._configure()
@@ -570,6 +588,7 @@ class CanopenWatcher(_Node):
         self.close()
         try:
             self._connect({0x580 + self._number: 0x7FF})
+            self._pass_over_late_answers()
             self._identify()
             return self._held_command_pa()
         except BaseException:

@@ -10,6 +10,7 @@ ports are taken, says hello to each, and may send at once; by the hello the othe
     frame   arbitration id with flags, up to 8 data bytes
     ack     nothing more; sent when `ACK_EVERY` frames were taken and none went the other way
     bye     the sender is gone
+    wake    from a sender's thread to its own end: take what came before this
 
 Each also carries which end sent it, the number of the last frame sent to that end, and of the last taken from it.
 
@@ -29,7 +30,7 @@ import struct
 import time
 from collections import deque
 from contextlib import suppress
-from threading import Lock, RLock
+from threading import Event, Lock, RLock
 from typing import Any
 
 import can
@@ -44,7 +45,7 @@ DEAF_S = 0.05
 BLOCK_S = 0.005
 """The longest wait in the kernel; a reader waits again and again."""
 LOOK_S = 0.001
-"""A sender that has not read for as long looks whether a hello is waiting."""
+"""A sender whose end has not begun to read for as long looks whether a hello is waiting."""
 RECEIVE_BUFFER_BYTES = 1 << 20
 FIRST_CHANNEL, LAST_CHANNEL = 20000, 32000
 """Where `free_channel` looks: below the ports that the system hands out by itself."""
@@ -56,7 +57,7 @@ IDENTITY = struct.Struct("<I")
 FILTER = struct.Struct("<II")
 TIMEOUT = struct.Struct("@ll")
 MAGIC = b"pCAN"
-HELLO, DATA, ACK, BYE = range(4)
+HELLO, DATA, ACK, BYE, WAKE = range(5)
 LONGEST = HEAD.size + ENDS * FILTER.size
 EXTENDED, REMOTE, ERROR = 1 << 31, 1 << 30, 1 << 29
 ID_BITS = ERROR - 1
@@ -106,6 +107,7 @@ class LoopbackBus(can.BusABC):
         self._frames: deque[can.Message] = deque()
         self._peers: dict[int, _Peer] = {}
         self._taking, self._sending = Lock(), RLock()
+        self._wakes, self._woken = 0, Event()
         self._looked_s = -math.inf
         self.lost_frames = 0
         self._socket, self.port = self._bound()
@@ -224,13 +226,19 @@ class LoopbackBus(can.BusABC):
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}") from None
 
     def _take_all(self) -> None:
-        """Take what came, unless a reader is at it."""
-        if self._taking.acquire(blocking=False):
-            try:
-                while self._take(0.0):
-                    pass
-            finally:
-                self._taking.release()
+        """Take what came, or have the thread that reads take it."""
+        self._wakes += 1
+        self._woken.clear()
+        while not self._taking.acquire(blocking=False):
+            with suppress(OSError):  # closed meanwhile: the reader ends, and lets go
+                self._socket.sendto(HEAD.pack(MAGIC, WAKE, self._end, self._wakes, 0), (HOST, self.port))
+            if self._woken.wait(BLOCK_S):
+                return
+        try:
+            while self._take(0.0):
+                pass
+        finally:
+            self._taking.release()
 
     def _take(self, wait_s: float) -> bool:
         """Take one datagram from the socket; return whether there was one. The caller holds `_taking`."""
@@ -247,7 +255,10 @@ class LoopbackBus(can.BusABC):
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}") from None
         if HEAD.size <= len(datagram) <= LONGEST:
             magic, kind, end, number, taken = HEAD.unpack_from(datagram)
-            if magic == MAGIC and end < ENDS:
+            if end == self._end:
+                if magic == MAGIC and kind == WAKE and number == self._wakes:
+                    self._woken.set()
+            elif magic == MAGIC and end < ENDS:
                 port = self._base + end
                 self._heed(self._peers.get(port) or self._newcomer(port), kind, number, taken, datagram)
         return True
@@ -278,7 +289,7 @@ class LoopbackBus(can.BusABC):
 
     def _receive(self, peer: _Peer, number: int, datagram: bytes) -> None:
         missed = number - peer.received - 1
-        if missed > 0:
+        if missed > 0 and peer.received:  # the first may be for the one who had this port before
             self.lost_frames += missed
             log.warning("%s: %d frames from end %d lost: nobody read here", self.channel_info, missed, peer.port)
         elif missed < 0:  # it begins anew since our last hello

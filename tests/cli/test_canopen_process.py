@@ -178,7 +178,7 @@ def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(tmp_path: Path)
     with slave(first):
         for (command, config), line in said.items():
             words = [sys.executable, "-m", "positioner.cli", command, str(config)]
-            ended = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+            ended = subprocess.run(words, capture_output=True, text=True, timeout=100, check=False)
             assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1), ended.stderr
             assert line in ended.stderr
 
@@ -198,6 +198,6 @@ def test_without_the_packages_a_gateway_runs_and_says_in_one_line_what_is_missin
     }
     for (command, name), line in said.items():
         words = [sys.executable, "-c", code, command, str(tmp_path / name)]
-        ended = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+        ended = subprocess.run(words, capture_output=True, text=True, timeout=100, check=False)
         assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1), ended.stderr
         assert line in ended.stderr

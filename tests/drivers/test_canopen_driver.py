@@ -26,6 +26,8 @@ def serve(device: Device, channel: str) -> NodeServer:
 
 
 class TestCanopen(WireContract):
+    reply_timeout_s = 2.0
+
     @pytest.fixture
     def make(self) -> Iterator[Callable[[], Bench]]:
         benches: list[WireBench] = []
@@ -38,7 +40,7 @@ class TestCanopen(WireContract):
                 channel=channel,
                 node=NODE,
                 reply_timeout_s=self.reply_timeout_s,
-                heartbeat_s=1.0,
+                heartbeat_s=2.0,
                 communication_timeout_s=1.5,
                 communication_action="vent",
             )

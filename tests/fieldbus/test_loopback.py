@@ -5,7 +5,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from threading import Thread
+from threading import Event, Thread
+from typing import Any
 
 import can
 import pytest
@@ -89,6 +90,32 @@ def test_a_newcomer_is_heard_at_once_and_one_who_left_is_forgotten(join: Join) -
     assert received(first, 1) == [5]
     first.send(frame(6))
     assert received(again, 1) == [6], "and nothing from before it came"
+
+
+def test_a_frame_sent_while_a_reader_has_a_hello_in_hand_goes_to_the_newcomer(
+    join: Join, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    end = join()
+    in_hand, go_on, newcomer_at = Event(), Event(), end._newcomer
+
+    def slowly(port: int) -> Any:
+        in_hand.set()
+        assert go_on.wait(10)
+        return newcomer_at(port)
+
+    monkeypatch.setattr(end, "_newcomer", slowly)
+    monkeypatch.setattr(can_bus, "LOOK_S", 0.0)
+    reader = Thread(target=end.recv, args=(0.5,))
+    reader.start()
+    newcomer = join()
+    assert in_hand.wait(10)
+    sender = Thread(target=end.send, args=(frame(1),))
+    sender.start()
+    sender.join(0.05)  # it must wait; long enough for one that does not
+    go_on.set()
+    for each in (sender, reader):
+        each.join()
+    assert received(newcomer, 1) == [1]
 
 
 def test_nothing_is_lost_in_a_burst_of_all_to_all(join: Join, monkeypatch: pytest.MonkeyPatch) -> None:
