@@ -30,8 +30,8 @@ With a memory it also defines
 A function names among its arguments only what it needs of: t (s), x (m), v (m/s), p (actuator pressure, Pa), q (the
 parameters), z (the memory, an array), and what its place adds. The pressure path sees the stem of the start of the
 step, all others that of its end; t is the time of the call, and middle, in the pressure path, that of the middle of the
-step: what jumps there chooses its side by it. It may use what numba compiles: floats, math, numpy and functions of its
-own file.
+step: what jumps there chooses its side by it. It may use what numba compiles: floats, math, numpy, functions of its
+own file and of `sim.first_order_lag`.
 """
 
 import inspect

@@ -21,7 +21,8 @@ every change of mode is found to h / 2^30, and the motion is integrated by Bogac
 The Stribeck slope near v_s grows deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the
 sub-steps are some 0.1 us; away from it one sub-step is one step.
 
-Sliding over more than LEAP / sqrt(k_s / m) goes by leaps: with lambda = F_v / m and kappa = k_s / m,
+Sliding over more than EXPONENTIAL_ANGLE / sqrt(k_s / m) goes by exponential-integrator steps. With
+lambda = F_v / m and kappa = k_s / m,
 
     x'' + lambda x' + kappa x = n,      n = v' + lambda v + kappa x,  a quadratic in time through start, middle and end
 
@@ -31,7 +32,7 @@ is solved exactly, however stiff, by the response g to an impulse (g(0) = 0, g'(
     x(s) = h x + g v + I_0 n_0 + I_1 n_1 + I_2 n_2,     v(s) = -kappa g x + g' v + g n_0 + (I_0 n_1 + 2 I_1 n_2) / s
 
 for n = n_0 + n_1 tau / s + n_2 (tau / s)^2. On the bare valve beyond the Stribeck range n is a straight line: there a
-leap has no error. The error told is what the quadratic term changes of v.
+step has no error. The error estimate is what the quadratic term changes of v.
 
 The file is plain Python and runs as it stands: the bare valve. `sim.kernel` compiles this text after putting the
 effects of a valve file into the places at its end, which stand empty here. All that is compiled must stand in
@@ -53,17 +54,18 @@ SLIP = 2
 
 TOLERANCE = 1e-5
 """Of one sub-step on the velocity, relative to |v| + v_s, where nothing else is asked for."""
-SHORTEST = 2.0**-20
+SHORTEST_SUBSTEP = 2.0**-20
 """Sub-step, in steps, that is taken whatever its error: a kink of a force is passed there."""
-LEAP = 0.15
-"""Angle, rad, of the undamped stem from which a sub-step is a leap: below it the pair is cheaper, and leaps cancel."""
-FIRST = 0.2
+EXPONENTIAL_ANGLE = 0.15
+"""Angle, rad, of the undamped stem from which a sub-step is exponential: below it the pair is cheaper, and the closed
+form cancels."""
+FIRST_CHANGE = 0.2
 """Change of v, in |v| + v_s, that the first sub-step in the Stribeck range is made for: longer ones are refused."""
 BISECTIONS = 30
 NINTH = 1.0 / 9.0
 NEGLIGIBLE = 40.0
 """(v / v_s)^2 beyond which exp(-(v / v_s)^2) < 5e-18 is lost in the rounding of F_c."""
-HOLDS = 1.0 + 1e-10
+BREAKAWAY_FACTOR = 1.0 + 1e-10
 """F_s at break-away, in F_s at the end of a creep. Were they one, a stem pressed on a stop would creep for ever."""
 DIFFERENCE_M = 1e-7
 """Half-width of the central difference that gives the stiffness -dF_e/dx."""
@@ -132,11 +134,11 @@ def external_force(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
 
 
 def excess(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
-    """|F_e| - F_s, N, but for HOLDS: positive when the stuck stem breaks away."""
+    """|F_e| - F_s, N, but for BREAKAWAY_FACTOR: positive when the stuck stem breaks away."""
     F_e = external_force(valve, stem, q, z)
     direction = 1.0 if F_e > 0.0 else -1.0
     _, F_s = friction(valve.F_c, valve.F_s, direction, stem, q, z)
-    return direction * F_e - HOLDS * F_s
+    return direction * F_e - BREAKAWAY_FACTOR * F_s
 
 
 def acceleration(valve: Karnopp, mode: int, sigma: float, stem: Stem, q: Any, z: Any) -> float:
@@ -220,7 +222,7 @@ def response(damping: float, kappa: float, s: float, g: float, slope: float) -> 
     return Response(g, slope, h, I_0, I_1, (1.0 - 2.0 * (I_0 * per_s + damping * I_1) * per_s) * per_kappa)
 
 
-def leap(
+def exponential_step(
     valve: Karnopp,
     sigma: float,
     drive: Drive,
@@ -290,21 +292,21 @@ def move(
     """Integrate until the moving mode is over or the step ends; return tau, x, v and whether the mode is over."""
     a = acceleration(valve, mode, sigma, stem_at(drive, tau, x, v), q, z)
     s = h - tau
-    if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST * (abs(v) + valve.v_s):
-        s = FIRST * (abs(v) + valve.v_s) / abs(a)
-    shortest_leap = LEAP / sqrt(valve.k_s * valve.per_m)
+    if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST_CHANGE * (abs(v) + valve.v_s):
+        s = FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a)
+    shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
     while tau < h:
-        leaps = mode == SLIP and s > shortest_leap
-        if leaps:
-            x1, v1, a1, error = leap(valve, sigma, drive, tau, s, x, v, a, q, z)
+        exponential = mode == SLIP and s > shortest_exponential
+        if exponential:
+            x1, v1, a1, error = exponential_step(valve, sigma, drive, tau, s, x, v, a, q, z)
         else:
             x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
         allowed = tolerance * (abs(v1) + valve.v_s)
-        if error > allowed and s > SHORTEST * h:
+        if error > allowed and s > SHORTEST_SUBSTEP * h:
             s *= 0.5
             continue
         if margin(valve, mode, sigma, stem_at(drive, tau + s, x1, v1), q, z) < 0.0:
-            if leaps:
+            if exponential:
                 s *= 0.5
                 continue
             s, x1, v1 = end_of_mode(valve, mode, sigma, drive, tau, s, x, v, a, q, z)

@@ -2,10 +2,12 @@
 
 The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which
 the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
-effects' texts and of this file, and the numba version. numba keeps the machine code beside it. A change in any of them
-is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
-Of several processes that need it at once, one compiles and the others wait: the file is locked meanwhile.
-(numba's own cache does not see a change in a callee's file.) No fast-math: the order of operations is the text's.
+effects' texts, of the elements they share and of this file, and the numba version. numba keeps the machine code beside
+it. A change in any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the
+very text that was hashed. (numba's own cache does not see a change in a callee's file.) No fast-math: the order of
+operations is the text's.
+
+Of several processes that need a kernel at once, one compiles and the others wait: the file is locked meanwhile.
 
 numba is untyped: its types stop here.
 """
@@ -28,17 +30,19 @@ from typing import Any, Protocol, cast
 import numba
 
 from config.errors import InputError
-from sim import karnopp
+from sim import first_order_lag, karnopp
 from sim.effect import Effect, execute
 from sim.karnopp import MEMORY, Vector
 from sim.wiring import wiring
 
 BASE = Path(karnopp.__file__)
+SHARED = (first_order_lag,)
+"""Elements that effects may import; compiled with them."""
 OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
 """numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
 INNER: Mapping[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Of functions that only compiled ones call: to make them callable from Python would take a third of the time."""
-APART = ("bogacki_shampine",)
+NOT_INLINED = ("bogacki_shampine",)
 """Left to the compiler to inline: large, and called from two places."""
 NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
@@ -90,8 +94,8 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
 def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int) -> Kernel:
     digest = hashlib.sha256(text.encode()).hexdigest()
     module = _module(f"valve_kernel_{digest}")
-    path = written(digest, text)
-    exec(compile(text, path, "exec", dont_inherit=True), module.__dict__)
+    file = kernel_file(digest, text)
+    exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
     for i, (path, source) in enumerate(sources):
         part = _module(f"{module.__name__}_{i}")
         execute(source, path, part.__dict__)
@@ -100,7 +104,7 @@ def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int)
     entries = {name: getattr(module, name) for name in ENTRIES}
     _inlined(module.__dict__)
     try:
-        with _locked(path):
+        with _locked(file):
             compiled = {
                 name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, nogil=True, **OPTIONS)(entry)
                 for name, entry in entries.items()
@@ -127,11 +131,15 @@ def _module(name: str) -> ModuleType:
 def _inlined(namespace: dict[str, Any]) -> None:
     """Make the functions of a namespace compiled ones; inlining them triples the speed."""
     for name, value in list(namespace.items()):
-        if isinstance(value, FunctionType) and value.__globals__ is namespace:
-            namespace[name] = numba.njit(forceinline=name not in APART, **INNER)(value)
+        if isinstance(value, FunctionType) and (value.__globals__ is namespace or _is_shared(value)):
+            namespace[name] = numba.njit(forceinline=name not in NOT_INLINED, **INNER)(value)
 
 
-def written(digest: str, text: str) -> Path:
+def _is_shared(function: FunctionType) -> bool:
+    return any(function.__globals__ is each.__dict__ for each in SHARED)
+
+
+def kernel_file(digest: str, text: str) -> Path:
     """Return the file that holds the text, in the cache folder or, where that cannot be written, a temporary one."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     try:
@@ -173,6 +181,7 @@ def _temporary_folder() -> Path:
 def _text(effects: Sequence[Effect]) -> str:
     """Return the kernel's text."""
     digests = {each.name: hashlib.sha256(each.source.encode()).hexdigest() for each in effects}
-    compiler = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
-    head = f"# numba {numba.__version__}, compiled.py {compiler}, effects {digests}"
+    files = (__file__, *(str(each.__file__) for each in SHARED))
+    parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
+    head = f"# numba {numba.__version__}, {parts}, effects {digests}"
     return "\n".join([head, BASE.read_text(encoding="utf-8"), wiring(effects) if effects else "", ""])

@@ -67,7 +67,7 @@ def _lines(arguments: argparse.Namespace, compared: "Comparison") -> list[str]:
     slips = compared.slips
     lines += [
         "",
-        f"  slips: {len(slips.matched)} matched, {len(slips.missed_s)} missed, {len(slips.invented_s)} invented",
+        f"  slips: {len(slips.matched)} matched, {len(slips.missed_s)} missed, {len(slips.spurious_s)} spurious",
         f"  residual: {compared.autocorrelation.outside} of {len(compared.autocorrelation.lag) - 1} lags outside the "
         f"99 % band; with the command: {compared.input_correlation.outside} of {len(compared.input_correlation.lag)}",
     ]

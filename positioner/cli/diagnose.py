@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.report import Subject, report_diagnosis, require_plotly
     from workbench.select.diagnosis import diagnose
     from workbench.select.diagnosis_json import as_json
-    from workbench.select.equivalence import untold
+    from workbench.select.equivalence import undetectable
 
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
@@ -79,8 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
     if diagnosis.experiment:
         diagnosis.experiment.write(arguments.experiment)
     print("\n".join(_lines(diagnosis, arguments.experiment)))
-    for each in untold(diagnosis.split, diagnosis.best.fit.valve):
-        print(f"\nnot told: {each.sentence}")
+    for each in undetectable(diagnosis.split, diagnosis.best.fit.valve):
+        print(f"\nnot detectable: {each.sentence}")
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}

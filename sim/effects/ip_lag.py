@@ -2,14 +2,14 @@
 
     T p' = u - p
 
-T time constant, s; u entering pressure, p leaving pressure, Pa. Over a step h in which u goes straight from u_0 to u_1,
-with r = (u_1 - u_0) / h, exactly: p_1 = u_1 - r T + (p_0 - u_0 + r T) exp(-h / T). At T = 0 it lets u through.
+T time constant, s; u entering pressure, p leaving pressure, Pa. Over a step in which u goes straight it is exact
+(`sim.first_order_lag`). At T = 0 it lets u through.
 """
 
-from math import exp
 from typing import Annotated, NamedTuple
 
 from sim.effect import Memory, Parameter
+from sim.first_order_lag import lagged
 
 MEMORY = 1
 STEP_S = 5e-4
@@ -44,9 +44,4 @@ def pressure(u: float, q: Parameters, z: Memory) -> float:
 
 def advance(before: float, after: float, h: float, q: Parameters, z: Memory) -> None:
     """Carry p over the step."""
-    T = q.time_constant_s
-    if T > 0.0:
-        ramp = (after - before) / h * T
-        z[0] = after - ramp + (z[0] - before + ramp) * exp(-h / T)
-    else:
-        z[0] = after
+    z[0] = lagged(z[0], before, after, h, q.time_constant_s)

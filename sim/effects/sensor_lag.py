@@ -2,14 +2,14 @@
 
     T y' = x - y
 
-T time constant, s; x position that enters, y position that leaves. Over a step h in which x goes straight from x_0 to
-x_1, with r = (x_1 - x_0) / h, exactly: y_1 = x_1 - r T + (y_0 - x_0 + r T) exp(-h / T). At T = 0 it lets x through.
+T time constant, s; x position that enters, y position that leaves, m. Over a step in which x goes straight it is exact
+(`sim.first_order_lag`). At T = 0 it lets x through.
 """
 
-from math import exp
 from typing import Annotated, NamedTuple
 
 from sim.effect import Memory, Parameter
+from sim.first_order_lag import lagged
 
 MEMORY = 1
 STEP_S = 5e-4
@@ -44,9 +44,4 @@ def sensor(y: float, q: Parameters, z: Memory) -> float:
 
 def advance(before: float, after: float, h: float, q: Parameters, z: Memory) -> None:
     """Carry it over the step."""
-    T = q.time_constant_s
-    if T > 0.0:
-        ramp = (after - before) / h * T
-        z[0] = after - ramp + (z[0] - before + ramp) * exp(-h / T)
-    else:
-        z[0] = after
+    z[0] = lagged(z[0], before, after, h, q.time_constant_s)

@@ -50,7 +50,7 @@ class Nmt(IntEnum):
 START, STOP, ENTER_PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 128, 129, 130
 
 
-class Trouble(IntEnum):
+class EmergencyCause(IntEnum):
     """Error codes of CiA 301, with their bits of the error register."""
 
     SILENCE = 0x8250
@@ -60,10 +60,10 @@ class Trouble(IntEnum):
     @property
     def register_bits(self) -> int:
         """Generic, and communication or device profile."""
-        return 1 | (1 << 5 if self is Trouble.COMMAND_RANGE else 1 << 4)
+        return 1 | (1 << 5 if self is EmergencyCause.COMMAND_RANGE else 1 << 4)
 
 
-class Machine:
+class DeviceStateMachine:
     """The states of CiA 408, steered by the control word."""
 
     def __init__(self) -> None:
@@ -123,11 +123,11 @@ class CanopenNode:
         send: Callable[[int, bytes], None],
     ) -> None:
         self.number = number
-        self.machine = Machine()
+        self.machine = DeviceStateMachine()
         self.state = Nmt.PRE_OPERATIONAL
         self._device, self._clock, self._send = device, clock, send
         self._power_up = (device.communication_timeout_s, device.communication_action)
-        self._troubles: dict[Trouble, None] = {}
+        self._troubles: dict[EmergencyCause, None] = {}
         self._latched: dict[int, bytes] = {}
         self._syncs = 0
         self._beat_s = 0.0
@@ -183,7 +183,7 @@ class CanopenNode:
         elif command in (RESET_NODE, RESET_COMMUNICATION):
             self._dictionary.reset(0, COMMUNICATION_END if command == RESET_COMMUNICATION else 0x10000)
             if command == RESET_NODE:
-                self.machine = Machine()
+                self.machine = DeviceStateMachine()
                 self._troubles.clear()
                 self._device.supervise(*self._power_up)
             self._compose()
@@ -205,9 +205,9 @@ class CanopenNode:
 
     def _latch(self, identity: int, data: bytes) -> None:
         if len(data) < self._rpdos[identity].layout.size:
-            self._raise(Trouble.RPDO_LENGTH)
+            self._raise(EmergencyCause.RPDO_LENGTH)
             return
-        self._clear(Trouble.RPDO_LENGTH)
+        self._clear(EmergencyCause.RPDO_LENGTH)
         self._latched[identity] = data
 
     def _sync(self) -> None:
@@ -233,23 +233,23 @@ class CanopenNode:
         try:
             self._clock.command(values[COMMAND])
         except ValueError:
-            self._raise(Trouble.COMMAND_RANGE)
+            self._raise(EmergencyCause.COMMAND_RANGE)
         else:
-            self._clear(Trouble.COMMAND_RANGE)
+            self._clear(EmergencyCause.COMMAND_RANGE)
 
     def _watch(self) -> None:
         if self._device.status & DeviceStatus.COMMUNICATION_LOST:
-            if Trouble.SILENCE not in self._troubles:
+            if EmergencyCause.SILENCE not in self._troubles:
                 self.machine.fail()
-                self._raise(Trouble.SILENCE)
+                self._raise(EmergencyCause.SILENCE)
         else:
-            self._clear(Trouble.SILENCE)
+            self._clear(EmergencyCause.SILENCE)
 
-    def _raise(self, trouble: Trouble) -> None:
+    def _raise(self, trouble: EmergencyCause) -> None:
         self._troubles[trouble] = None
         self._emergency(trouble)
 
-    def _clear(self, trouble: Trouble) -> None:
+    def _clear(self, trouble: EmergencyCause) -> None:
         if trouble in self._troubles:
             del self._troubles[trouble]
             if not self._troubles:

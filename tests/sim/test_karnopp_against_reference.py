@@ -114,27 +114,27 @@ def test_coarse_steps_keep_the_accuracy() -> None:
         pytest.param(changed(viscous_ns_per_m=30e3), id="so stiff that the pair would take 0.1 ms"),
     ],
 )
-def test_leaps_over_whole_periods_keep_the_accuracy(file: ValveFile) -> None:
-    assert off_by_leaping_m(file) < 2e-6
+def test_exponential_steps_over_whole_periods_keep_the_accuracy(file: ValveFile) -> None:
+    assert off_by_exponential_m(file) < 2e-6
 
 
-def test_a_leap_through_a_bent_force_is_checked() -> None:
+def test_an_exponential_step_through_a_bent_force_is_checked() -> None:
     bent = ValveFile(
         valve=changed(viscous_ns_per_m=2000.0).valve,
         effect=(EffectTable.model_validate({"name": "spring_hardening", "cubic_n_per_m3": 3e7}),),
     )
-    assert off_by_leaping_m(bent) < 5e-6
+    assert off_by_exponential_m(bent) < 5e-6
 
 
-def off_by_leaping_m(file: ValveFile) -> float:
+def off_by_exponential_m(file: ValveFile) -> float:
     """Return how far a run over whole periods of 10 ms is from one in steps of 10 us, at most."""
     commands = np.repeat(staircase(6e3), 20)
     expected = Valve.from_file(file, step_s=1e-5).run(commands, 0.01).position_m
     composition = Composition.from_file(file)
     theta = composition.theta.copy()
     state = at_rest(composition, theta, 0.0, 0.0, 0.0)
-    leaping = follow(composition, theta, state, commands, 0.01, 0.01, 1e-4)
-    return float(np.abs(leaping.position_m - expected).max())
+    exponential = follow(composition, theta, state, commands, 0.01, 0.01, 1e-4)
+    return float(np.abs(exponential.position_m - expected).max())
 
 
 def test_a_stem_pressed_on_a_stop_comes_to_rest() -> None:

@@ -63,7 +63,9 @@ def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:
 def test_edited_physics_is_another_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = Composition.from_file(SEED).kernel.digest
     edited = tmp_path / "karnopp.py"
-    edited.write_text(compiled.BASE.read_text().replace("direction * F_e - HOLDS * F_s", "direction * F_e - 2.0 * F_s"))
+    edited.write_text(
+        compiled.BASE.read_text().replace("direction * F_e - BREAKAWAY_FACTOR * F_s", "direction * F_e - 2.0 * F_s")
+    )
     monkeypatch.setattr(compiled, "BASE", edited)
     composition = Composition.from_file(SEED)
     valve = Valve(composition)
@@ -78,7 +80,7 @@ def test_without_a_writable_cache_the_text_lies_in_a_private_folder(
     home = tmp_path / "home"
     home.write_text("no folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(home))
-    path = compiled.written("digest", "text")
+    path = compiled.kernel_file("digest", "text")
     assert path.read_text() == "text"
     assert not path.is_relative_to(tmp_path)
     assert path.parent.stat().st_mode & 0o077 == 0

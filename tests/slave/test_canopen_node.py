@@ -12,7 +12,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from fieldbus.canopen.eds import PRODUCT, VENDOR, read_eds
 from fieldbus.canopen.objects import ACTIVATE, Control, NodeState
-from sim.slave.canopen_node import CanopenNode, Machine, Nmt
+from sim.slave.canopen_node import CanopenNode, DeviceStateMachine, Nmt
 from sim.slave.clocks import Clock, Lockstep, RealTime
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
@@ -93,7 +93,7 @@ def command(pressure_pa: float, control: int = ACTIVATE) -> Frame:
     return RPDO, struct.pack("<fH", pressure_pa, control)
 
 
-def state(machine: Machine) -> int:
+def state(machine: DeviceStateMachine) -> int:
     return machine.state
 
 
@@ -230,7 +230,7 @@ def test_only_an_active_node_obeys_and_time_passes_all_the_same(bench: Bench) ->
 
 
 def test_the_reset_bit_counts_only_when_it_rises() -> None:
-    machine = Machine()
+    machine = DeviceStateMachine()
     machine.control(ACTIVATE)
     machine.control(ACTIVATE | Control.RESET)
     machine.fail()
@@ -244,7 +244,7 @@ def test_the_reset_bit_counts_only_when_it_rises() -> None:
 
 
 def test_a_disabled_node_that_fails_is_disabled_after_reset() -> None:
-    machine = Machine()
+    machine = DeviceStateMachine()
     machine.fail()
     assert state(machine) == NodeState.FAULT_DISABLED
     machine.control(Control.RESET)

@@ -24,7 +24,7 @@ def test_the_true_valve_is_adequate(seed: int) -> None:
     assert compared.rms_m == pytest.approx(NOISE_M, rel=0.1)
     assert compared.fit_percent > 99.0
     assert not compared.slips.missed_s
-    assert not compared.slips.invented_s
+    assert not compared.slips.spurious_s
 
 
 def test_backlash_is_said_to_go_too_far_after_every_reversal() -> None:

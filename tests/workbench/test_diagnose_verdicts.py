@@ -57,7 +57,7 @@ def test_the_best_is_listed_first_and_the_preview_ranks_all(diagnosed: Diagnosis
 
 def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, tmp_path: Path) -> None:
     fits = [each.model.fit for each in diagnosed.candidates if each.step == 1 and each.model]
-    record = diagnosed.split.judged.record
+    record = diagnosed.split.test.record
     chosen = experiment(fits, record)
     assert chosen.separation > 1.5
     assert record.command_pa.min() <= chosen.command_pa.min() < chosen.command_pa.max() <= record.command_pa.max()
@@ -69,7 +69,7 @@ def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, t
 def test_a_valve_is_no_experiment_away_from_itself(diagnosed: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("workbench.select.experiment.MENU", dict(list(MENU.items())[:2]))
     twins = [diagnosed.best.fit, replace(diagnosed.best.fit)]
-    assert experiment(twins, diagnosed.split.judged.record).separation < 1.1
+    assert experiment(twins, diagnosed.split.test.record).separation < 1.1
 
 
 def test_an_effect_that_the_library_lacks_is_left_unexplained(lagging: tuple[Recording, Recording]) -> None:

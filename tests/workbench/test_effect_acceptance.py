@@ -185,7 +185,7 @@ def test_the_end_is_held_out_and_the_fit_never_sees_it() -> None:
     recording = moving(900)
     parts = split([recording])
     assert len(parts.train.recording) == 600
-    counted = np.isfinite(residual_m(parts.judged, recording.position_m))
+    counted = np.isfinite(residual_m(parts.test, recording.position_m))
     assert not counted[:600].any()
     assert counted[600:].all()
 
@@ -193,7 +193,7 @@ def test_the_end_is_held_out_and_the_fit_never_sees_it() -> None:
 def test_another_recording_is_held_out_whole() -> None:
     parts = split([moving(300)], moving(200, seed=9))
     assert len(parts.train.recording) == 300
-    assert parts.judged.counted.sum() == 200
+    assert parts.test.counted.sum() == 200
 
 
 def test_recordings_one_after_another_begin_anew_and_keep_what_all_have() -> None:

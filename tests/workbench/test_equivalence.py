@@ -8,7 +8,7 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, SEED, with_effect
 from workbench.data.held_out import split
-from workbench.select.equivalence import imitation, untold
+from workbench.select.equivalence import bare_imitation, undetectable
 
 VALVE = ValveFile(valve=SEED.valve.model_copy(update={"coulomb_n": 600.0, "static_n": 720.0}))
 WIDTH_M = 1.5e-3
@@ -48,7 +48,7 @@ def recording(file: ValveFile, command: Column, noise_m: float = COARSE_M) -> Re
 
 
 def twin() -> ValveParameters:
-    valve = imitation(SLACK)
+    valve = bare_imitation(SLACK)
     assert valve is not None
     return valve
 
@@ -66,27 +66,27 @@ def test_between_reversals_a_bare_valve_does_what_one_with_play_does() -> None:
 
 def test_what_records_of_reversals_leave_open_is_told_with_its_limit() -> None:
     bare = ValveFile(valve=twin())
-    (open_,) = untold(split([recording(SLACK, triangle())]), bare)
+    (open_,) = undetectable(split([recording(SLACK, triangle())]), bare)
     assert (open_.name, open_.like) == ("backlash", ("coulomb_n", "static_n"))
     assert WIDTH_M <= open_.most_m < 2.0 * bare.valve.coulomb_n / bare.valve.spring_n_per_m
     assert "slow restarts in the same direction" in open_.sentence
 
 
 def test_slow_restarts_in_the_same_direction_leave_nothing_open_wherever_they_are() -> None:
-    assert untold(split([recording(VALVE, stairs())]), VALVE) == ()
-    assert untold(split([recording(VALVE, triangle())], recording(VALVE, stairs())), VALVE) == ()
+    assert undetectable(split([recording(VALVE, stairs())]), VALVE) == ()
+    assert undetectable(split([recording(VALVE, triangle())], recording(VALVE, stairs())), VALVE) == ()
 
 
 def test_a_fine_sensor_leaves_less_open_than_a_coarse_one() -> None:
     bare = ValveFile(valve=twin())
-    seen = untold(split([recording(SLACK, triangle(), NOISE_M)]), bare)
+    seen = undetectable(split([recording(SLACK, triangle(), NOISE_M)]), bare)
     assert all(each.most_m < 0.5 * WIDTH_M for each in seen)
 
 
 def test_a_valve_that_has_play_is_not_told_of_another() -> None:
-    assert untold(split([recording(SLACK, triangle())]), SLACK) == ()
+    assert undetectable(split([recording(SLACK, triangle())]), SLACK) == ()
 
 
 def test_a_play_wider_than_a_slip_has_no_bare_twin() -> None:
-    assert imitation(with_effect(VALVE, "backlash", width_m=5e-3)) is None
-    assert imitation(VALVE) is None
+    assert bare_imitation(with_effect(VALVE, "backlash", width_m=5e-3)) is None
+    assert bare_imitation(VALVE) is None

@@ -55,7 +55,7 @@ def test_friction_that_grows_with_pressure_is_found_and_nothing_else() -> None:
     assert (found.verdict, found.missing) == ("missing", ("pressure_friction",))
     assert found.best.parameters["pressure_friction.growth_n_per_pa"] == pytest.approx(1e-4, rel=0.05)
     assert found.floor_n is not None
-    assert found.best.typical_n < 1.7
+    assert found.best.median_error_n < 1.7
     assert found.base.test_rms_n > 4.0
 
 

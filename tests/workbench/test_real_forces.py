@@ -68,7 +68,7 @@ def test_what_is_left_is_not_called_explained(never_trained_on: tuple[str, Force
     _, found = never_trained_on
     assert found.verdict == "unexplained"
     assert found.floor_n is not None
-    assert found.best.typical_n > found.floor_n
+    assert found.best.median_error_n > found.floor_n
 
 
 def test_a_falling_friction_with_speed_is_refused_as_unphysical(never_trained_on: tuple[str, ForceDiagnosis]) -> None:

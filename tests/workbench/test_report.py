@@ -92,7 +92,18 @@ def test_a_comparison_is_reported_in_full(page: Page, compared: tuple[Comparison
 
 
 def test_a_diagnosis_is_reported_in_full(diagnosed_page: Page, diagnosed: tuple[Diagnosis, Subject]) -> None:
-    wanted = ["verdict", "fall", "overlay", "where", "ranking", "added", "alike", "next", "untold", "preview"]
+    wanted = [
+        "verdict",
+        "fall",
+        "overlay",
+        "where",
+        "ranking",
+        "added",
+        "indistinguishable",
+        "next",
+        "undetectable",
+        "preview",
+    ]
     assert diagnosed_page.sections == [*wanted, "recording", "words"]
     assert diagnosed[0].sentence in diagnosed_page.words
 
@@ -130,7 +141,7 @@ def test_the_ranking_has_the_diagnosis_s_numbers(diagnosed_page: Page, diagnosed
 def test_what_no_record_tells_apart_is_said_so(diagnosed_page: Page, diagnosed: tuple[Diagnosis, Subject]) -> None:
     assert diagnosed[0].verdict == "one_of"
     assert diagnosed[0].experiment is None
-    (row,) = diagnosed_page.tables["table-alike"][1:]
+    (row,) = diagnosed_page.tables["table-indistinguishable"][1:]
     assert {row[0][0], row[1][0]} == {"preload", "sensor_offset"}
     assert "equations are the same" in row[2][0]
 

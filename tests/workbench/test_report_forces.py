@@ -37,7 +37,7 @@ def page(diagnosed: ForceDiagnosis, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def test_it_is_reported_in_full_and_fetches_nothing(page: Page, diagnosed: ForceDiagnosis) -> None:
-    wanted = ["verdict", "fall", "friction", "where", "ranking", "added", "alike", "recording", "words"]
+    wanted = ["verdict", "fall", "friction", "where", "ranking", "added", "indistinguishable", "recording", "words"]
     assert page.sections == wanted
     assert page.fetched == []
     for said in (diagnosed.sentence, "seal.csv", "3 recordings", "The missing effect is found."):

@@ -26,16 +26,16 @@ FOUND = Findings(
 
 
 @pytest.mark.parametrize(
-    ("missed", "invented", "said"),
+    ("missed", "spurious", "said"),
     [
-        (0, 3, "it invents 3 slips that the stem does not make"),
-        (0, 1, "it invents 1 slip that the stem does not make"),
+        (0, 3, "it makes 3 spurious slips"),
+        (0, 1, "it makes 1 spurious slip"),
         (2, 0, "it misses 2 of 25 slips"),
-        (2, 1, "it misses 2 of 25 slips and invents 1"),
+        (2, 1, "it misses 2 of 25 slips and makes 1 spurious slip"),
     ],
 )
-def test_slips_missed_and_invented_are_counted_and_none_is_not_said(missed: int, invented: int, said: str) -> None:
-    events = SlipEvents((), tuple(map(float, range(missed))), tuple(map(float, range(invented))))
+def test_slips_missed_and_spurious_are_counted_and_none_is_not_said(missed: int, spurious: int, said: str) -> None:
+    events = SlipEvents((), tuple(map(float, range(missed))), tuple(map(float, range(spurious))))
     told = sentences(replace(FOUND, events=events))
     assert said in told
     assert not [each for each in told if " 0 " in each]

@@ -23,7 +23,7 @@ from config.valve_file import EffectTable, ValveFile, ValveParameters, find_valv
 from sim.composition import Composition
 from sim.effect import Effect, shipped_effect, shipped_effects
 from workbench.blind.input_signal import excitation
-from workbench.blind.trial import LEVELS, NOISE_M, Trial, missed_m
+from workbench.blind.trial import LEVELS, NOISE_M, Trial, refitted_rmse_m
 
 VISIBLE = 0.5
 LEAST_TRAVEL = 0.1
@@ -96,14 +96,14 @@ def _recorded(trial: Trial, truth: ValveFile, clean_m: Column, dirty: bool, gene
     """Return the recording and its floor, m."""
     quantum_m = truth.valve.stroke_m / LEVELS if dirty else 0.0
     sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
-    answer_m = trial.soiled_m(Composition.from_file(truth), generator) if dirty else clean_m
+    answer_m = trial.with_disturbances_m(Composition.from_file(truth), generator) if dirty else clean_m
     recording = trial.recording(answer_m, sensor)
     return recording, float(np.sqrt(np.mean((recording.position_m - clean_m) ** 2)))
 
 
 def _visible(trials: Sequence[Trial], truth: ValveFile, effect: EffectTable, floor_m: float) -> dict[str, Any]:
     others = tuple(each for each in truth.effect if each is not effect)
-    fit_m, test_m = missed_m(trials, truth, ValveFile(valve=truth.valve, effect=others))
+    fit_m, test_m = refitted_rmse_m(trials, truth, ValveFile(valve=truth.valve, effect=others))
     return {"fit_m": fit_m, "test_m": test_m, "is_visible": fit_m > VISIBLE * floor_m}
 
 
@@ -141,12 +141,12 @@ def drawn_effects(generator: Draw, count: int) -> list[Effect]:
     order = [pool[i] for i in generator.permutation(len(pool))]
     chosen: list[Effect] = []
     for effect in order:
-        if len(chosen) < count and all(_can_be_told(effect, other) for other in chosen):
+        if len(chosen) < count and all(_distinguishable(effect, other) for other in chosen):
             chosen.append(effect)
     return chosen
 
 
-def _can_be_told(one: Effect, other: Effect) -> bool:
+def _distinguishable(one: Effect, other: Effect) -> bool:
     return one.confounded.get(other.name) != "" and other.confounded.get(one.name) != ""
 
 

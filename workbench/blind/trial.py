@@ -5,8 +5,8 @@ The lead-in is what precedes the last passage of the command, so that the first 
     dirty     pressure noise between command and valve, an autoregression of 300 Pa and 0.2 s; static friction drawn
               anew at each stop, 4 % standard deviation, never below Coulomb friction; a 12-bit transmitter
 
-`missed_m` is what a valve without something misses of such a trial at its best, spring and friction refitted by scipy
-to the clean answer from the true values: no code is shared with `workbench.fit.fitting`.
+`refitted_rmse_m` is what a valve without something misses of such a trial at its best, spring and friction refitted by
+scipy to the clean answer from the true values: no code is shared with `workbench.fit.fitting`.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ LEAD_IN_S = 5.0
 PRESSURE_NOISE_PA, CORRELATION_S = 300.0, 0.2
 BREAK_AWAY_JITTER = 0.04
 LEVELS = 2**12
-SOILED_EVERY_S = 2e-3
+DISTURBED_EVERY_S = 2e-3
 COARSE_S = 1e-3
 """Step of the refit."""
 SCALES = ((100.0, 1e-3), (30.0, 3e-4), (5.0, 1e-4))
@@ -52,9 +52,9 @@ class Trial:
         follow(composition, vector, state, self.lead_in_pa, self.period_s, step_s)
         return follow(composition, vector, state, self.command_pa[:-1], self.period_s, step_s).indicated_m
 
-    def soiled_m(self, composition: Composition, generator: np.random.Generator) -> Column:
+    def with_disturbances_m(self, composition: Composition, generator: np.random.Generator) -> Column:
         """Return what a dirty valve indicates at the samples, m, before the transmitter."""
-        parts = max(1, round(self.period_s / SOILED_EVERY_S))
+        parts = max(1, round(self.period_s / DISTURBED_EVERY_S))
         h = self.period_s / parts
         commands = np.repeat(np.concatenate([self.lead_in_pa, self.command_pa[:-1]]), parts)
         commands += _pressure_noise(generator, commands.size, h)
@@ -101,7 +101,7 @@ def _pressure_noise(generator: np.random.Generator, count: int, period_s: float)
     return noise
 
 
-def missed_m(trials: Sequence[Trial], truth: ValveFile, without: ValveFile) -> list[float]:
+def refitted_rmse_m(trials: Sequence[Trial], truth: ValveFile, without: ValveFile) -> list[float]:
     """Return the rms distance, m, of a valve refitted to the first trial from the true valve, trial by trial."""
     true = Composition.from_file(truth)
     known = Composition.from_file(without)

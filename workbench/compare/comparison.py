@@ -1,7 +1,7 @@
 """Compare: the model in free run against the measured position, and where it fails.
 
 The model is adequate if its rms error is at most 1.5 times the floor (sensor noise, or repeatability where the
-command repeats itself), the residual does not depend on the input, and no slip is missed or invented.
+command repeats itself), the residual does not depend on the input, and no slip is missed or spurious.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from config.recording import Column, Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
-from workbench.compare.measures import fit_percent, judged_rows, rms, robust
+from workbench.compare.measures import fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, SlipEvents, matched, phases
 from workbench.compare.residuals import (
     Correlation,
@@ -104,12 +104,12 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
     require_units(record, valve.valve)
     composition = Composition.from_file(valve)
     run = FreeRun(composition, record).run(composition.theta)
-    rows = judged_rows(record, run.indicated_m)
+    rows = valid_rows(record, run.indicated_m)
     residual_m = np.where(rows, run.indicated_m - record.position_m, np.nan)
-    stretches = [_stretch(valve, record, run, first, end) for first, end in record.segments]
-    phase, direction = _spread(record, stretches)
-    events = _joined([each.events for each in stretches])
-    velocity = np.concatenate([each.velocity_m_per_s for each in stretches])
+    segments = [_segment_findings(valve, record, run, first, end) for first, end in record.segments]
+    phase, direction = _spread(record, segments)
+    events = _joined([each.events for each in segments])
+    velocity = np.concatenate([each.velocity_m_per_s for each in segments])
     even, period_s = _evenly(record, residual_m)
     autocorrelated = autocorrelation(even[1], period_s)
     with_input = cross_correlation(even[0], even[1], period_s)
@@ -123,7 +123,7 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         floor_m=record.floor_m,
         rms_m=error_m,
         events=events,
-        measured_slips=tuple(slip for each in stretches for slip in each.measured),
+        measured_slips=tuple(slip for each in segments for slip in each.measured),
         depends_on_input=bool(np.max(np.abs(with_input.value)) > CLEAR * with_input.band),
         close=error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
     )
@@ -157,15 +157,18 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         input_correlation=with_input,
         spectrum=spectrum(even[1], period_s),
         friction=balance(
-            _all([each.measured_forces for each in stretches]), _all([each.model_forces for each in stretches])
+            _all([each.measured_forces for each in segments]), _all([each.model_forces for each in segments])
         ),
     )
 
 
 def as_json(value: Any) -> Any:
-    """Return a result as what JSON can say: arrays as lists, what is not a number as null."""
+    """Return a result as what JSON can say: arrays as lists, what is not a number as null.
+
+    A field whose key in JSON is another than its name says so in its metadata.
+    """
     if is_dataclass(value) and not isinstance(value, type):
-        return {each.name: as_json(getattr(value, each.name)) for each in fields(value)}
+        return {each.metadata.get("json", each.name): as_json(getattr(value, each.name)) for each in fields(value)}
     if isinstance(value, np.ndarray):
         return [as_json(each) for each in value.tolist()]
     if isinstance(value, tuple | list):
@@ -176,7 +179,7 @@ def as_json(value: Any) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class _Stretch:
+class _SegmentFindings:
     """What is found in one segment."""
 
     measured: tuple[Slip, ...]
@@ -188,7 +191,7 @@ class _Stretch:
     model_forces: Forces
 
 
-def _stretch(valve: ValveFile, record: Record, run: Run, first: int, end: int) -> _Stretch:
+def _segment_findings(valve: ValveFile, record: Record, run: Run, first: int, end: int) -> _SegmentFindings:
     time_s = record.time_s[first:end]
     rows = np.arange(end - first)
     seen = record.judged[first:end]
@@ -205,7 +208,7 @@ def _stretch(valve: ValveFile, record: Record, run: Run, first: int, end: int) -
         forces(valve.valve, time_s, position_m, pressure_pa, load_n, record.noise_m)
         for position_m in (measured_m, simulated_m)
     ]
-    return _Stretch(
+    return _SegmentFindings(
         measured,
         matched(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.noise_m),
         phases(measured_m, record.noise_m, measured, valve),
@@ -220,9 +223,9 @@ def _pressure(record: Record, run: Run) -> Column:
     return run.pressure_pa if record.pressure_pa is None else record.pressure_pa
 
 
-def _spread(record: Record, stretches: Sequence[_Stretch]) -> tuple[NDArray[np.int64], Column]:
+def _spread(record: Record, segments: Sequence[_SegmentFindings]) -> tuple[NDArray[np.int64], Column]:
     phase, direction = np.zeros(len(record), np.int64), np.zeros(len(record))
-    for (first, end), each in zip(record.segments, stretches, strict=True):
+    for (first, end), each in zip(record.segments, segments, strict=True):
         phase[first:end], direction[first:end] = each.phase, each.direction
     return phase, direction
 
@@ -231,7 +234,7 @@ def _joined(events: Sequence[SlipEvents]) -> SlipEvents:
     return SlipEvents(
         tuple(pair for each in events for pair in each.matched),
         tuple(t for each in events for t in each.missed_s),
-        tuple(t for each in events for t in each.invented_s),
+        tuple(t for each in events for t in each.spurious_s),
     )
 
 
@@ -263,7 +266,7 @@ def _pressure_side(composition: Composition, record: Record, run: Run) -> Pressu
     if record.pressure_pa is None:
         return None
     stem_m = FreeRun(composition, record, from_pressure=True).position_m(composition.theta)
-    rows = judged_rows(record, stem_m)
+    rows = valid_rows(record, stem_m)
     return PressureSide(
         rms((run.pressure_pa - record.pressure_pa)[rows]),
         rms(stem_m[rows] - record.position_m[rows]),

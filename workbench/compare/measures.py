@@ -12,14 +12,14 @@ from workbench.data.record import Record
 BLOCK_S = 1.0
 
 
-def judged_rows(record: Record, simulated_m: Column) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+def valid_rows(record: Record, simulated_m: Column) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
     """Return which rows count: judged and simulated."""
     return record.judged & np.isfinite(simulated_m)
 
 
 def fit_percent(record: Record, simulated_m: Column) -> float:
     """Return the fit in per cent."""
-    rows = judged_rows(record, simulated_m)
+    rows = valid_rows(record, simulated_m)
     measured_m = record.position_m[rows]
     around = float(np.linalg.norm(measured_m - measured_m.mean()))
     error = float(np.linalg.norm(simulated_m[rows] - measured_m))

@@ -6,11 +6,11 @@
 
 A slip finds its match in one of the same direction that goes on within 40 % of the median time between slips. Noise
 cuts a slow slide into pieces, so pieces may share a match, and small ones, below 20 sigma, are neither missed nor
-invented. Times and ends are compared only for slips that are nearest to each other; the ends where both rest.
+spurious. Times and ends are compared only for slips that are nearest to each other; the ends where both rest.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ MATCHED_SAMPLES = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Matched:
+class MatchedSlip:
     """A measured slip and the model's: how much later, s, and how much farther in its direction, m, the model goes."""
 
     time_s: float
@@ -40,11 +40,11 @@ class Matched:
 
 @dataclass(frozen=True, slots=True)
 class SlipEvents:
-    """Slips matched, and the times of those that the model misses and invents."""
+    """Slips matched, and the times of those that the model misses, and of its spurious ones."""
 
-    matched: tuple[Matched, ...]
+    matched: tuple[MatchedSlip, ...]
     missed_s: tuple[float, ...]
-    invented_s: tuple[float, ...]
+    spurious_s: tuple[float, ...] = field(metadata={"json": "invented_s"})
 
 
 def phases(position_m: Column, noise_m: float, found: Sequence[Slip], valve: ValveFile) -> NDArray[np.int64]:
@@ -82,7 +82,7 @@ def matched(
         if partner is not None and _nearest(time_s, partner, ours, within_s) is slip:
             row = min(max(slip.last, partner.last) + REACH, time_s.size - 1)
             pairs.append(
-                Matched(
+                MatchedSlip(
                     float(time_s[slip.first]),
                     slip.direction,
                     i > 0 and ours[i - 1].direction != slip.direction,
@@ -92,8 +92,8 @@ def matched(
             )
     clear_m = CLEAR * noise_m
     missed = [each for each in ours if each.travel_m > clear_m and _nearest(time_s, each, theirs, within_s) is None]
-    invented = [each for each in theirs if each.travel_m > clear_m and _nearest(time_s, each, ours, within_s) is None]
-    return SlipEvents(tuple(pairs), _times(time_s, missed), _times(time_s, invented))
+    spurious = [each for each in theirs if each.travel_m > clear_m and _nearest(time_s, each, ours, within_s) is None]
+    return SlipEvents(tuple(pairs), _times(time_s, missed), _times(time_s, spurious))
 
 
 def _nearest(time_s: Column, slip: Slip, others: Sequence[Slip], within_s: float) -> Slip | None:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from config.recording import Column
 from workbench.compare.measures import BLOCK_S
-from workbench.compare.phases import PHASES, Matched, SlipEvents
+from workbench.compare.phases import PHASES, MatchedSlip, SlipEvents
 from workbench.data.motion import Slip
 
 CERTAIN = 3.5
 FEWEST = 3
-TOLD = 8
-"""Notes told one by one."""
+MOST_LISTED = 8
+"""Notes listed one by one."""
 SHARE = 0.5
 """Part of the squared error from which a phase is named."""
 
@@ -44,15 +44,15 @@ class Findings:
     @property
     def adequate(self) -> bool:
         """Close to the floor, without structure, and the recording has motion to judge by."""
-        unmatched = self.events.missed_s or self.events.invented_s
+        unmatched = self.events.missed_s or self.events.spurious_s
         return bool(self.measured_slips) and self.close and not self.depends_on_input and not unmatched
 
 
 def sentences(found: Findings) -> tuple[str, ...]:
     """Return the sentences."""
     if not found.measured_slips:
-        invented = len(found.events.invented_s)
-        tail = f", the model makes {_count(invented)}" if invented else ""
+        spurious = len(found.events.spurious_s)
+        tail = f", the model makes {_count(spurious, 'spurious ')}" if spurious else ""
         return (f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion",)
     said = []
     if len({each.direction for each in found.measured_slips}) == 1:
@@ -66,10 +66,10 @@ def sentences(found: Findings) -> tuple[str, ...]:
 
 
 def shortened(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return what is said of a recording, many times told only begun: a bad line may lose samples by the thousand."""
-    if len(notes) <= TOLD + 1:
+    """Return what is said of a recording, many of a kind only begun: a bad line may lose samples by the thousand."""
+    if len(notes) <= MOST_LISTED + 1:
         return tuple(notes)
-    return (*notes[:TOLD], f"and {len(notes) - TOLD} more of the kind")
+    return (*notes[:MOST_LISTED], f"and {len(notes) - MOST_LISTED} more of the kind")
 
 
 def _along_motion(found: Findings) -> Iterator[tuple[float, str]]:
@@ -93,7 +93,7 @@ def _late(found: Findings) -> Iterator[tuple[float, str]]:
 
 
 def _by_direction(
-    pairs: Sequence[Matched],
+    pairs: Sequence[MatchedSlip],
     values: Sequence[float],
     matters: float,
     when: str,
@@ -160,10 +160,10 @@ def _trends(found: Findings) -> Iterator[tuple[float, str]]:
 
 
 def _slips(found: Findings) -> Iterator[str]:
-    missed, invented = len(found.events.missed_s), len(found.events.invented_s)
+    missed, spurious = len(found.events.missed_s), len(found.events.spurious_s)
     said = [f"misses {missed} of {len(found.measured_slips)} slips"] if missed else []
-    if invented:
-        said.append(f"invents {invented}" if missed else f"invents {_count(invented)} that the stem does not make")
+    if spurious:
+        said.append(f"makes {_count(spurious, 'spurious ')}")
     if said:
         yield f"it {' and '.join(said)}"
 
@@ -205,8 +205,8 @@ def _certain(mean: float, error: float, matters: float) -> bool:
     return abs(mean) > CERTAIN * error and abs(mean) > matters
 
 
-def _count(slips: int) -> str:
-    return f"{slips} slip{'s' if slips > 1 else ''}"
+def _count(slips: int, kind: str = "") -> str:
+    return f"{slips} {kind}slip{'s' if slips > 1 else ''}"
 
 
 def _mm(value_m: float) -> str:

@@ -33,19 +33,19 @@ class Split:
     """What a candidate is fitted on, and what it is judged on: the other recording, or the end of the whole one."""
 
     train: Part
-    judged: Part
+    test: Part
     floor_m: float
     """The error that no model undercuts: the valve's repeatability where a command repeats, else the sensor's noise."""
 
     @property
-    def moved_m(self) -> float:
+    def motion_std_m(self) -> float:
         """The standard deviation of the position that is fitted, m."""
         return float(np.std(self.train.record.position_m[self.train.counted]))
 
     @property
     def repeats(self) -> bool:
         """Whether a command repeats itself, so that the floor is the valve's own."""
-        return any(each.record.repeatability_m is not None for each in (self.train, self.judged))
+        return any(each.record.repeatability_m is not None for each in (self.train, self.test))
 
 
 def split(recordings: Sequence[Recording], test: Recording | None = None) -> Split:
@@ -58,11 +58,11 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
     require_fittable(whole)
     end = len(whole) if test else round(len(whole) * (1.0 - HELD_OUT))
     train = _part(_head(whole, end), 0)
-    judged = _part(test, 0) if test else _part(whole, end)
-    for part, what in ((train, "to fit"), (judged, "held out")):
+    held_out = _part(test, 0) if test else _part(whole, end)
+    for part, what in ((train, "to fit"), (held_out, "held out")):
         if part.counted.sum() < FEWEST:
             raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {FEWEST} are needed")
-    return Split(train, judged, max(train.record.floor_m, judged.record.floor_m))
+    return Split(train, held_out, max(train.record.floor_m, held_out.record.floor_m))
 
 
 def _part(recording: Recording, first: int) -> Part:

@@ -156,7 +156,7 @@ def fit(
         from_pressure: simulate from the measured pressure instead of the command, without the pressure path.
         base: the fit without `effects`, if it is there already.
         profile: follow the cost for the intervals; without, they are those of the derivatives, at half the time.
-        progress: told the fraction done.
+        progress: called with the fraction done.
 
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect or parameter.

@@ -46,7 +46,7 @@ PLACES = 40
 """Cells of the travel in which a residual's scatter is taken."""
 NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
-WANTED = 3.0
+OUTSIDE_STANDARD_ERRORS = 3.0
 """Standard errors by which a coefficient lies beyond its range before that is said."""
 
 Matrix = NDArray[np.float64]
@@ -66,13 +66,13 @@ class ForceFit:
     """Logarithm of the rms error of each stroke, or reading, so predicted."""
     residual_n: Column
     bic: float
-    beyond: str
+    range_violation: str
     """What the rows want outside its physical range; empty if nothing."""
 
     @property
-    def typical_n(self) -> float:
+    def median_error_n(self) -> float:
         """Median error, as a standard deviation."""
-        return typical_n(self.residual_n)
+        return median_error_n(self.residual_n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ class Balance:
         names = (*TERMS, "presliding")
         return names if self.rows.velocity_m_per_s is not None else tuple(n for n in names if n not in NEEDS_MOTION)
 
-    def slip(self, yield_m: float | None) -> Column:
+    def friction_state(self, yield_m: float | None) -> Column:
         """Return z."""
         if yield_m is None:
             return self.rows.direction
@@ -163,7 +163,7 @@ class Balance:
 
     def columns(self, model: ForceModel) -> list[_Column]:
         """Return the columns of a model."""
-        rows, z = self.rows, self.slip(model.yield_m)
+        rows, z = self.rows, self.friction_state(model.yield_m)
         base = [
             _Column("spring_n_per_m", 0.0, rows.position_m),
             _Column("coulomb_n", 0.0, z),
@@ -192,7 +192,11 @@ class Balance:
         train_n = _rms(residual_n[np.isin(self.fold, trained)])
         values = dict(zip([each.name for each in columns], theta.tolist(), strict=True))
         whole = values | self._shapes(model, values)
-        beyond = self._beyond(columns, reduced, trained, least) or self._drives(model, values) or _outside(whole)
+        violations = (
+            self._range_violation(columns, reduced, trained, least),
+            self._negative_friction(model, values),
+            _outside(whole),
+        )
         deviations = _jackknife(list(others.values()))
         n = int(np.isin(self.fold, trained).sum())
         free = len(columns) + (model.yield_m is not None) + (model.speed_m_per_s is not None)
@@ -205,7 +209,7 @@ class Balance:
             _stroke_logs(self.rows.stroke[judged], predicted_n[judged]),
             np.where(judged, predicted_n, residual_n),
             n * 2.0 * float(np.log(max(train_n, 1e-12))) + free * float(np.log(n)),
-            beyond if bounded else "",
+            next(filter(None, violations), "") if bounded else "",
         )
 
     def _shapes(self, model: ForceModel, values: Mapping[str, float]) -> dict[str, float]:
@@ -221,7 +225,7 @@ class Balance:
                 shapes[relative] = values[absolute] / values["coulomb_n"]
         return shapes
 
-    def _beyond(
+    def _range_violation(
         self, columns: list[_Column], reduced: Mapping[int, Matrix], trained: Sequence[int], least: Column
     ) -> str:
         """Say which of the added coefficients the rows want below its range, by several of its own deviations."""
@@ -231,11 +235,11 @@ class Balance:
         deviations = _jackknife(draws)
         for i, each in enumerate(columns):
             spread = 0.0 if deviations is None else float(deviations[i])
-            if "." in each.name and wanted[i] < each.least - WANTED * spread:
+            if "." in each.name and wanted[i] < each.least - OUTSIDE_STANDARD_ERRORS * spread:
                 return f"not physical: the rows want {each.name} below {each.least:g}, the end of its range"
         return ""
 
-    def _drives(self, model: ForceModel, values: Mapping[str, float]) -> str:
+    def _negative_friction(self, model: ForceModel, values: Mapping[str, float]) -> str:
         """Say if friction comes out negative somewhere; empty if not."""
         up = np.ones(len(self.rows))
         level = values["coulomb_n"] * up
@@ -343,9 +347,9 @@ def floor_of(rows: Rows, residual_n: Column) -> float | None:
     strokes = np.bincount(np.searchsorted(cells, visited), minlength=cells.size)
     mean = np.bincount(member, residual_n) / count
     kept = (strokes > 1)[member]
-    return typical_n((residual_n - mean[member])[kept]) if kept.any() else None
+    return median_error_n((residual_n - mean[member])[kept]) if kept.any() else None
 
 
-def typical_n(error_n: Column) -> float:
+def median_error_n(error_n: Column) -> float:
     """Return the median error as a standard deviation, N."""
     return float(NORMAL * np.median(np.abs(error_n)))

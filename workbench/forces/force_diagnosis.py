@@ -79,7 +79,7 @@ def _searched(balance: Balance) -> ForceDiagnosis:
         step = _step(len(steps) + 1, fit, {name: fitted for name, (_, fitted) in found.items()})
         if steps:
             steps[-1] = without_missing(steps[-1], step, library)
-        explained = floor_n is not None and fit.typical_n <= AT_FLOOR * floor_n
+        explained = floor_n is not None and fit.median_error_n <= AT_FLOOR * floor_n
         if len(steps) == MOST_ADDED or (steps and explained):
             break
         steps.append(step)
@@ -110,7 +110,7 @@ def _step(number: int, before: ForceFit, fits: Mapping[str, ForceFit]) -> ForceS
 def _candidate(number: int, name: str, before: ForceFit, fit: ForceFit) -> ForceCandidate:
     held_out, standard_errors = relative_error_reduction(before.logs, fit.logs)
     gain = Gain(before.bic - fit.bic, held_out, standard_errors, independent_share=1.0)
-    return ForceCandidate(number, name, fit.beyond or gain.rejection_reason(explained=False), fit, gain)
+    return ForceCandidate(number, name, fit.range_violation or gain.rejection_reason(explained=False), fit, gain)
 
 
 def _verdict(
@@ -120,11 +120,11 @@ def _verdict(
     before_n, after_n = steps[0].before.test_rms_n, best.test_rms_n
     fell = f"the held-out error falls from {before_n:.3g} to {after_n:.3g} N"
     rivals = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
-    if floor_n is not None and best.typical_n > AT_FLOOR * floor_n:
+    if floor_n is not None and best.median_error_n > AT_FLOOR * floor_n:
         part = f" A part of it is {names}: {fell}.{rivals}" if names else f" The held-out error is {after_n:.3g} N."
         return "unexplained", (
-            f"Something is left that the balance does not explain: it is off by {best.typical_n:.3g} N, where strokes "
-            f"repeat each other to {floor_n:.3g} N.{part}"
+            f"Something is left that the balance does not explain: it is off by {best.median_error_n:.3g} N, where "
+            f"strokes repeat each other to {floor_n:.3g} N.{part}"
         )
     if not names:
         return "adequate", f"Nothing is missing: no effect lowers the held-out error of {after_n:.3g} N as it must."

@@ -41,7 +41,7 @@ def _candidate(each: ForceCandidate) -> dict[str, Any]:
         "evidence": each.gain.bic,
         "held_out_gain": each.gain.held_out,
         "held_out_standard_errors": each.gain.standard_errors,
-        "physical": not each.fit.beyond,
+        "physical": not each.fit.range_violation,
         "accepted": each.accepted,
         "why_not": each.rejection_reason,
     }

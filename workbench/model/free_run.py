@@ -60,7 +60,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class InitialState:
     """Where a segment begins: position, m, and velocity, m/s."""
 
     position_m: float
@@ -86,7 +86,7 @@ class FreeRun:
         self._drive_pa = _measured(record) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
-        self._starts = [start(record, first, end) for first, end in record.segments]
+        self._starts = [initial_state(record, first, end) for first, end in record.segments]
 
     def run(self, theta: Vector) -> Run:
         """Simulate; theta as `composition.names`."""
@@ -108,7 +108,7 @@ class FreeRun:
         """Return the indicated position, a value a sample."""
         return self.run(theta).indicated_m
 
-    def _begin(self, theta: Vector, begin: Start, time_s: float, pressure_pa: float) -> Vector:
+    def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         stem_m = begin.position_m
         for _ in range(3):
             held_pa = balanced_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
@@ -129,7 +129,7 @@ def balanced_pa(theta: Vector, position_m: float, velocity_m_per_s: float, comma
     return float(min(max(command_pa, least_pa), most_pa))
 
 
-def start(record: Record, first: int, end: int) -> Start:
+def initial_state(record: Record, first: int, end: int) -> InitialState:
     """Return where a segment begins, from its first judged samples."""
     rows = first + np.flatnonzero(record.judged[first:end])
     if not rows.size:
@@ -140,9 +140,9 @@ def start(record: Record, first: int, end: int) -> Start:
     moving = np.abs(position_m - position_m[0]) > 2.0 * band_m
     still = int(moving.argmax()) if moving.any() else position_m.size
     if still >= SHORT or position_m.size < SHORT:
-        return Start(float(np.median(position_m[: max(1, still - 1)])), 0.0)
+        return InitialState(float(np.median(position_m[: max(1, still - 1)])), 0.0)
     slope, place = np.polyfit(time_s[:SHORT] - time_s[0], position_m[:SHORT], 1)
-    return Start(float(place), float(slope))
+    return InitialState(float(place), float(slope))
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:

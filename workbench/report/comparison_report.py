@@ -101,14 +101,14 @@ def _verdict(each: Comparison) -> str:
 
 
 def _key_figures(each: Comparison, stroke_m: float) -> str:
-    missed, invented = len(each.slips.missed_s), len(each.slips.invented_s)
+    missed, spurious = len(each.slips.missed_s), len(each.slips.spurious_s)
     return figures_of_merit(
         [
             ("Error, rms, mm", length(each.rms_m), of_stroke(each.rms_m, stroke_m)),
             ("Floor, mm", length(each.floor_m), "sensor noise" if _is_noise(each) else "repeatability of the valve"),
             ("Error in floors", Shown(times(each.rms_m, each.floor_m)), f"a model that holds: at most {ADEQUATE:g} ×"),
             ("Fit", Shown(f"{each.fit_percent:.1f} %"), "100 % is perfect"),
-            ("Slips matched", Shown(f"{len(each.slips.matched)}"), f"{missed} missed, {invented} invented"),
+            ("Slips matched", Shown(f"{len(each.slips.matched)}"), f"{missed} missed, {spurious} spurious"),
         ]
     )
 
@@ -248,11 +248,11 @@ def _slips(each: Comparison) -> str:
                 rows.append(Row([f"{name}, {when}", f"{len(found)}", f"{late_s:+.3f}", length(farther_m, sign=True)]))
     return section(
         "slips",
-        "Slips: matched, missed, invented",
+        "Slips: matched, missed, spurious",
         text(
             f"Matched: {len(slips.matched)}. Missed, the stem slipped and the model did not: {len(slips.missed_s)}"
-            f"{_at(slips.missed_s)}. Invented, the model slipped and the stem did not: {len(slips.invented_s)}"
-            f"{_at(slips.invented_s)}."
+            f"{_at(slips.missed_s)}. Spurious, the model slipped and the stem did not: {len(slips.spurious_s)}"
+            f"{_at(slips.spurious_s)}."
         ),
         table("table-slips", ["Matched slips", "Number", "Model later by, s", "Model farther by, mm"], rows)
         if rows

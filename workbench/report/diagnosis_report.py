@@ -12,7 +12,7 @@ from workbench.fit.fitting import Fitted
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
-from workbench.report.effects_table import Race, added_effects, headline, not_told_apart, outcome, tried_effects
+from workbench.report.effects_table import RankedStep, added_effects, headline, not_told_apart, outcome, tried_effects
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
     Row,
@@ -30,12 +30,12 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.plot_series import drawn, rounded
-from workbench.report.ranking import Tried
+from workbench.report.ranking import RankedEffect
 from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
-from workbench.select.equivalence import untold
+from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
 
 DIAGNOSIS_WORDS = {
@@ -50,20 +50,20 @@ DIAGNOSIS_WORDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
-    """What the report takes from a diagnosis beyond its models: the recording judged, and which of it was held out."""
+class _Validation:
+    """What the report takes from a diagnosis beyond its models: the recording held out, and which rows of it."""
 
-    judged: Recording
+    recording: Recording
     held_out: Mask
     floor_m: float
     base: Comparison
     best: Comparison
 
 
-def _seen(diagnosis: Diagnosis) -> _Seen:
-    part = diagnosis.split.judged
+def _validation(diagnosis: Diagnosis) -> _Validation:
+    part = diagnosis.split.test
     base, best = (compare(part.recording, each.fit.valve) for each in (diagnosis.base, diagnosis.best))
-    return _Seen(part.recording, part.counted, diagnosis.split.floor_m, base, best)
+    return _Validation(part.recording, part.counted, diagnosis.split.floor_m, base, best)
 
 
 def report_diagnosis(
@@ -80,23 +80,23 @@ def report_diagnosis(
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    seen = _seen(diagnosis)
+    validation = _validation(diagnosis)
     name = subject.valve.valve.name
     write(
         path,
         f"Valve {name}: which effect is missing",
         [
-            heading(f"Valve “{name}”: which effect is missing", subject, _facts(diagnosis, seen)),
-            _verdict(diagnosis, seen),
-            _key_figures(diagnosis, seen),
-            _fall(diagnosis, seen),
-            _overlay(seen),
-            _where(seen),
-            _ranking(diagnosis, seen),
+            heading(f"Valve “{name}”: which effect is missing", subject, _facts(diagnosis, validation)),
+            _verdict(diagnosis, validation),
+            _key_figures(diagnosis, validation),
+            _fall(diagnosis, validation),
+            _overlay(validation),
+            _where(validation),
+            _ranking(diagnosis, validation),
             _added(diagnosis),
             not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "see the next section"),
             _next(diagnosis, experiment_file),
-            _untold(diagnosis),
+            _undetectable(diagnosis),
             _preview(diagnosis),
             recording(subject, diagnosis.split.train.record.notes, []),
             section("words", "Words used here", glossary(DIAGNOSIS_WORDS | WORDS)),
@@ -104,22 +104,22 @@ def report_diagnosis(
     )
 
 
-def _facts(diagnosis: Diagnosis, seen: _Seen) -> str:
-    held_out, fitted = int(seen.held_out.sum()), int(diagnosis.split.train.counted.sum())
-    if held_out < len(seen.judged):
-        return f"{facts(seen.base)}; {fitted} fitted, {held_out} held out"
-    return f"fitted {fitted} samples; held out {facts(seen.base)}"
+def _facts(diagnosis: Diagnosis, validation: _Validation) -> str:
+    held_out, fitted = int(validation.held_out.sum()), int(diagnosis.split.train.counted.sum())
+    if held_out < len(validation.recording):
+        return f"{facts(validation.base)}; {fitted} fitted, {held_out} held out"
+    return f"fitted {fitted} samples; held out {facts(validation.base)}"
 
 
-def _verdict(diagnosis: Diagnosis, seen: _Seen) -> str:
+def _verdict(diagnosis: Diagnosis, validation: _Validation) -> str:
     return verdict(
         *headline(diagnosis.verdict, diagnosis.missing),
         text(diagnosis.sentence, "Where the model failed before:"),
-        bullets(seen.base.sentences),
+        bullets(validation.base.sentences),
     )
 
 
-def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
+def _key_figures(diagnosis: Diagnosis, validation: _Validation) -> str:
     before, after = diagnosis.base.errors, diagnosis.best.errors
     stroke_m = diagnosis.base.fit.valve.valve.stroke_m
     added = ", ".join(find_effect(name, "effects").name.replace("_", " ") for name in diagnosis.missing)
@@ -131,7 +131,7 @@ def _key_figures(diagnosis: Diagnosis, seen: _Seen) -> str:
                 f"{of_stroke(before.test_rmse_m, stroke_m)}, base parameters refitted",
             ),
             ("and after, mm", length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
-            ("Floor, mm", length(seen.floor_m), "no model does better"),
+            ("Floor, mm", length(validation.floor_m), "no model does better"),
             ("Added", Shown(added or "nothing"), f"of {len(_names(diagnosis))} effects tried"),
         ]
     )
@@ -141,7 +141,7 @@ def _names(diagnosis: Diagnosis) -> frozenset[str]:
     return frozenset(each.name for each in diagnosis.candidates)
 
 
-def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
+def _fall(diagnosis: Diagnosis, validation: _Validation) -> str:
     stages: list[tuple[str, EvaluatedModel, EffectCandidate | None]] = [("as it was, refitted", diagnosis.base, None)]
     stages += [
         (f"+ {step.added.name}", step.added.model, step.added)
@@ -149,14 +149,14 @@ def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
         if step.added and step.added.model
     ]
     errors = [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages]
-    figure = ranking.fall(errors, seen.floor_m, LENGTH)
+    figure = ranking.error_reduction(errors, validation.floor_m, LENGTH)
     rows = [
         Row(
             [
                 name,
                 length(model.errors.train_rmse_m),
                 length(model.errors.test_rmse_m),
-                times(model.errors.test_rmse_m, seen.floor_m),
+                times(model.errors.test_rmse_m, validation.floor_m),
                 length(model.errors.test_block_m),
                 "–" if candidate is None or candidate.gain is None else f"{candidate.gain.bic:.4g}",
             ],
@@ -174,7 +174,7 @@ def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
             figure,
             300,
             f"Error, rms, of each model. The held-out data it had not seen before. Dashed: the floor, "
-            f"{length(seen.floor_m).text} mm.",
+            f"{length(validation.floor_m).text} mm.",
         ),
         table("table-fall", head, rows),
         text(
@@ -184,54 +184,54 @@ def _fall(diagnosis: Diagnosis, seen: _Seen) -> str:
     )
 
 
-def _overlay(seen: _Seen) -> str:
-    base, best = seen.base, seen.best
+def _overlay(validation: _Validation) -> str:
+    base, best = validation.base, validation.best
     models = [Simulated("before", MODEL, base.simulated_m)]
     if base is not best and not np.array_equal(base.simulated_m, best.simulated_m, equal_nan=True):
         models.append(Simulated("after", EXTENDED, best.simulated_m))
-    whole = bool(seen.held_out.all())
+    whole = bool(validation.held_out.all())
     figure = overlay(
         base.time_s,
         base.command_pa,
         base.measured_m,
         models,
-        [] if whole else [Shade("held out", HELD_OUT, seen.held_out)],
+        [] if whole else [Shade("held out", HELD_OUT, validation.held_out)],
     )
     told = "All of it was held out." if whole else "On the green ground: what was held out."
     return overlaid(figure, told, base.time_s.size)
 
 
-def _where(seen: _Seen) -> str:
+def _where(validation: _Validation) -> str:
     rows = [
         Row(
-            [before.name, length(before.rms_m), length(after.rms_m), times(after.rms_m, seen.floor_m)],
+            [before.name, length(before.rms_m), length(after.rms_m), times(after.rms_m, validation.floor_m)],
             MEANINGS[before.name],
         )
-        for before, after in zip(seen.base.phases, seen.best.phases, strict=True)
+        for before, after in zip(validation.base.phases, validation.best.phases, strict=True)
         if before.count
     ]
     slips = [
         f"slips {when}: {len(each.slips.matched)} matched, {len(each.slips.missed_s)} missed, "
-        f"{len(each.slips.invented_s)} invented"
-        for when, each in (("before", seen.base), ("after", seen.best))
+        f"{len(each.slips.spurious_s)} spurious"
+        for when, each in (("before", validation.base), ("after", validation.best))
     ]
     return section(
         "where",
         "Where it failed, and what is left",
         table("table-phases", ["What the stem does", "Error before, mm", "After, mm", "After, in floors"], rows),
-        bullets([*slips, *(f"after: {each}" for each in seen.best.sentences)]),
+        bullets([*slips, *(f"after: {each}" for each in validation.best.sentences)]),
     )
 
 
-def _ranking(diagnosis: Diagnosis, seen: _Seen) -> str:
-    races = [Race(step.before.effects, step.before.errors.test_rmse_m, _tried(step)) for step in diagnosis.steps]
-    return tried_effects(races, seen.floor_m, LENGTH, "second by second")
+def _ranking(diagnosis: Diagnosis, validation: _Validation) -> str:
+    steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, _tried(step)) for step in diagnosis.steps]
+    return tried_effects(steps, validation.floor_m, LENGTH, "second by second")
 
 
-def _tried(step: EffectStep) -> list[Tried]:
+def _tried(step: EffectStep) -> list[RankedEffect]:
     added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
-        Tried(
+        RankedEffect(
             each.name,
             each.model.errors.test_rmse_m if each.model else None,
             each.model.errors.train_rmse_m if each.model else None,
@@ -319,7 +319,7 @@ def _command(chosen: Experiment) -> dict[str, object]:
     return {"data": [trace], "layout": layout(xaxis=axis("time, s"), yaxis=axis("command, kPa"), showlegend=False)}
 
 
-def _untold(diagnosis: Diagnosis) -> str:
+def _undetectable(diagnosis: Diagnosis) -> str:
     best = diagnosis.best.fit
     said = [
         f"not determined by this recording: {', '.join(parameter(name)[0] for name in each.split(', '))}"
@@ -328,14 +328,14 @@ def _untold(diagnosis: Diagnosis) -> str:
     said += [
         f"at the end of its physical range: {parameter(key)[0]}" for key, f in best.parameters.items() if f.at_bound
     ]
-    said += [each.sentence for each in untold(diagnosis.split, best.valve)]
+    said += [each.sentence for each in undetectable(diagnosis.split, best.valve)]
     if not best.trusted:
         said.append("searches from different starts end at different errors: a better fit may exist")
     said.append(
         "only ratios of forces can be read from pressure and position: the diaphragm area is taken from the valve file"
     )
     said.append("an effect that does not show under this recording's inputs may still be there")
-    return section("untold", "What the recording does not tell", bullets(said))
+    return section("undetectable", "What the recording does not tell", bullets(said))
 
 
 def _preview(diagnosis: Diagnosis) -> str:

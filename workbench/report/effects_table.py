@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from sim.effect import Effect, find_effect
 from workbench.report import ranking
 from workbench.report.page import Row, plot, preformatted, section, subheading, table, text
-from workbench.report.ranking import Tried
+from workbench.report.ranking import RankedEffect
 from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_REDUCTION, LEAST_STANDARD_ERRORS
-from workbench.select.equivalence import classes, told_apart
+from workbench.select.equivalence import classes, distinguishing_record
 
 VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
@@ -23,12 +23,12 @@ KINDS = {"added": "good", "as good": "set"}
 
 
 @dataclass(frozen=True, slots=True)
-class Race:
+class RankedStep:
     """A forward step: what was there, its held-out error, SI, and all that was tried beside it."""
 
     beside: tuple[str, ...]
     before: float
-    tried: Sequence[Tried]
+    tried: Sequence[RankedEffect]
 
 
 def headline(verdict: str, missing: Sequence[str]) -> tuple[str, str]:
@@ -47,8 +47,8 @@ def outcome(name: str, added: str, indistinguishable: Collection[str], *, refuse
     return "refused" if refused else "accepted"
 
 
-def tried_effects(races: Sequence[Race], floor: float | None, of: Quantity, parts: str) -> str:
-    """Return the section of all races; `parts` says of what the error must fall, part by part."""
+def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity, parts: str) -> str:
+    """Return the section of all steps; `parts` says of what the error must fall, part by part."""
     shown = [
         text(
             "Each effect of the library was added in turn and the whole model refitted with it, all with equal effort. "
@@ -58,7 +58,7 @@ def tried_effects(races: Sequence[Race], floor: float | None, of: Quantity, part
         )
     ]
     dashed = "dashed the floor, " if floor is not None else ""
-    for number, race in enumerate(races, start=1):
+    for number, race in enumerate(steps, start=1):
         rows = sorted(race.tried, key=lambda each: each.order)
         shown += [
             subheading(f"Step {number}: beside {', '.join(race.beside)}" if race.beside else f"Step {number}"),
@@ -86,14 +86,14 @@ def tried_effects(races: Sequence[Race], floor: float | None, of: Quantity, part
     return section("ranking", "The effects that were tried", *shown)
 
 
-def _ranked(each: Tried, of: Quantity) -> Row:
+def _ranked(each: RankedEffect, of: Quantity) -> Row:
     return Row(
         [
             each.name,
             f"{each.outcome}: {each.why}" if each.why else each.outcome,
             of.shown(each.test),
             of.shown(each.train),
-            "–" if each.fall_errors is None else f"{each.fall_errors:.3g}",
+            "–" if each.reduction_standard_errors is None else f"{each.reduction_standard_errors:.3g}",
             "–" if each.evidence is None else f"{each.evidence:.4g}",
         ],
         _effect(each.name).text.rstrip("."),
@@ -119,7 +119,7 @@ def not_told_apart(
     title = "What could not be told apart"
     if not sets:
         nothing = "Nothing: no other effect comes within reach of the one that was added."
-        return section("alike", title, text(nothing if missing else NO_QUESTION))
+        return section("indistinguishable", title, text(nothing if missing else NO_QUESTION))
     library = {name: _effect(name) for name in tried}
     rows = [
         _two(name, other, library, otherwise)
@@ -128,13 +128,13 @@ def not_told_apart(
         for other in names[i + 1 :]
     ]
     return section(
-        "alike",
+        "indistinguishable",
         title,
         text(
             f"These explain the recording equally well: {'; '.join(' or '.join(names) for names in sets)}. "
             "That is as far as it can tell. One of each set was added to go on with; it is not proved."
         ),
-        table("table-alike", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
+        table("table-indistinguishable", ["This", "or this", "What record would tell"], rows, (0, 1, 2)),
     )
 
 
@@ -144,7 +144,7 @@ NO_QUESTION = "The question does not arise: no effect was accepted."
 def _two(name: str, other: str, library: Mapping[str, Effect], otherwise: str) -> Row:
     same = len(classes((name, other), library)) == 1
     none = "none of pressure and position: their equations are the same" if same else otherwise
-    return Row([name, other, told_apart(name, other, library) or none])
+    return Row([name, other, distinguishing_record(name, other, library) or none])
 
 
 def _effect(name: str) -> Effect:

@@ -14,7 +14,7 @@ from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
-from workbench.report.effects_table import Race, added_effects, headline, not_told_apart, outcome, tried_effects
+from workbench.report.effects_table import RankedStep, added_effects, headline, not_told_apart, outcome, tried_effects
 from workbench.report.page import (
     Row,
     Subject,
@@ -31,7 +31,7 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.plot_series import rounded
-from workbench.report.ranking import Tried
+from workbench.report.ranking import RankedEffect
 from workbench.report.units import FORCE, Shown, force, parameter, times
 from workbench.select.block_errors import AT_FLOOR
 
@@ -98,7 +98,7 @@ def _facts(rows: Rows) -> str:
 def _key_figures(diagnosis: ForceDiagnosis) -> str:
     floor_n, best = diagnosis.floor_n, diagnosis.best
     typical = (
-        Shown("–") if floor_n is None else Shown(times(best.typical_n, floor_n)),
+        Shown("–") if floor_n is None else Shown(times(best.median_error_n, floor_n)),
         f"of {floor_n:.3g} N; explained: at most {AT_FLOOR:g} ×" if floor_n else "each place is passed once",
     )
     added = ", ".join(name.replace("_", " ") for name in diagnosis.missing)
@@ -125,7 +125,7 @@ def _fall(diagnosis: ForceDiagnosis) -> str:
                 name,
                 force(fit.train_rms_n),
                 force(fit.test_rms_n),
-                force(fit.typical_n),
+                force(fit.median_error_n),
                 f"{diagnosis.base.bic - fit.bic:.4g}",
             ]
         )
@@ -136,7 +136,7 @@ def _fall(diagnosis: ForceDiagnosis) -> str:
         "How the error fell",
         plot(
             "plot-fall",
-            ranking.fall(errors, None, FORCE),
+            ranking.error_reduction(errors, None, FORCE),
             300,
             "Error of the balance, rms. Each held-out part is predicted by a fit that has not seen it.",
         ),
@@ -231,14 +231,14 @@ def _means(over: Column, values: Column) -> Profile:
 
 
 def _ranking(diagnosis: ForceDiagnosis) -> str:
-    races = [Race(step.before.effects, step.before.test_rms_n, _tried(step)) for step in diagnosis.steps]
-    return tried_effects(races, None, FORCE, "stroke by stroke")
+    steps = [RankedStep(step.before.effects, step.before.test_rms_n, _tried(step)) for step in diagnosis.steps]
+    return tried_effects(steps, None, FORCE, "stroke by stroke")
 
 
-def _tried(step: ForceStep) -> list[Tried]:
+def _tried(step: ForceStep) -> list[RankedEffect]:
     added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
-        Tried(
+        RankedEffect(
             each.name,
             each.fit.test_rms_n,
             each.fit.train_rms_n,

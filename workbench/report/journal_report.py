@@ -18,7 +18,7 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.units import LENGTH, Shown, length, parameter, times
-from workbench.select.extension_journal import Journal, Step
+from workbench.select.extension_journal import ExtensionStep, Journal
 
 WORDS = {
     "As given": "The valve file as it was before the step, nothing fitted.",
@@ -62,7 +62,7 @@ def report_journal(journal: Journal, path: Path, name: str) -> None:
                 "How the error fell",
                 plot(
                     "plot-journal",
-                    ranking.fall(_stages(journal.steps), last.floor_m, LENGTH),
+                    ranking.error_reduction(_stages(journal.steps), last.floor_m, LENGTH),
                     320,
                     f"Error, rms, at each step. Dashed: the floor of the last, {length(last.floor_m).text} mm.",
                 ),
@@ -77,7 +77,7 @@ def report_journal(journal: Journal, path: Path, name: str) -> None:
 HEAD = ["Model", "Error, fitted, mm", "Held out, mm", "In floors"]
 
 
-def _stages(steps: Sequence[Step]) -> list[tuple[str, float, float]]:
+def _stages(steps: Sequence[ExtensionStep]) -> list[tuple[str, float, float]]:
     """Return what the errors were: as given and refitted before the first step, and after each."""
     first = steps[0]
     stages = [
@@ -89,7 +89,7 @@ def _stages(steps: Sequence[Step]) -> list[tuple[str, float, float]]:
     return stages
 
 
-def _remark(number: int, step: Step) -> str:
+def _remark(number: int, step: ExtensionStep) -> str:
     return (
         f"step {number}, {', '.join(step.effects)} added: held-out error {length(step.refitted_test_rmse_m).text} to "
         f"{length(step.extended_test_rmse_m).text} mm"
@@ -100,14 +100,14 @@ def _row(name: str, train_m: float, test_m: float, floor_m: float) -> Row:
     return Row([name, length(train_m), length(test_m), times(test_m, floor_m)])
 
 
-def _step(number: int, step: Step) -> str:
+def _step(number: int, step: ExtensionStep) -> str:
     rows = []
     for name, value in step.parameters.items():
         words, factor, unit = parameter(name)
         rows.append(Row([words, Shown(f"{factor * value:.4g}", f"{name} = {value:.6g}"), unit]))
     return section(
         f"step-{number}",
-        f"Step {number}: {', '.join(step.effects)}",
+        f"ExtensionStep {number}: {', '.join(step.effects)}",
         text(f"Why: {step.why}."),
         subheading("What was fitted"),
         table(f"table-step-{number}", ["Parameter", "Value", "Unit"], rows),

@@ -1,6 +1,6 @@
 """The overlay: measured and simulated position, the error below, the command at the foot; one time axis for all.
 
-Behind them stand the phases, or what was held out; triangles mark slips that the model misses or invents.
+Behind them stand the phases, or what was held out; triangles mark slips that the model misses or makes without cause.
 """
 
 from collections.abc import Iterator, Sequence
@@ -159,7 +159,7 @@ def _marks(time_s: Column, measured_m: Column, slips: SlipEvents) -> Iterator[Tr
     along_s = time_s - time_s[0]
     for name, times, symbol, colour in (
         ("missed slip", slips.missed_s, "triangle-up", "#b4491b"),
-        ("invented slip", slips.invented_s, "triangle-down-open", "#7a3fa0"),
+        ("spurious slip", slips.spurious_s, "triangle-down-open", "#7a3fa0"),
     ):
         if times:
             rows = np.clip(np.searchsorted(along_s, np.asarray(times)), 0, time_s.size - 1)

@@ -1,4 +1,4 @@
-"""The race of the effects: held-out error with each added, against the floor; and how the error fell step by step."""
+"""The ranking of the effects: held-out error with each added, against the floor; and how the error fell by steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ STEPS = ((1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9), (1, 1.2, 1.4, 1.6, 1.8, 2,
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class RankedEffect:
     """An effect and what came of it; errors, SI, None where it could not be fitted."""
 
     name: str
     test: float | None
     train: float | None
-    fall_errors: float | None
+    reduction_standard_errors: float | None
     """By how many standard errors the held-out error falls."""
     evidence: float | None
     outcome: str
@@ -39,7 +39,7 @@ class Tried:
         return ORDER.index(self.outcome), np.inf if self.test is None else self.test
 
 
-def ranking(tried: Sequence[Tried], before: float, floor: float | None, of: Quantity) -> Figure:
+def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, of: Quantity) -> Figure:
     """Return the held-out errors on a logarithmic scale."""
     names = [each.name for each in tried]
     lines = [(before, QUIET, "dot")] if floor is None else [(before, QUIET, "dot"), (floor, INK, "dash")]
@@ -74,7 +74,7 @@ def ranking(tried: Sequence[Tried], before: float, floor: float | None, of: Quan
     }
 
 
-def _errors(tried: Sequence[Tried]) -> list[float]:
+def _errors(tried: Sequence[RankedEffect]) -> list[float]:
     return [each.test for each in tried if each.test is not None]
 
 
@@ -92,7 +92,7 @@ def _ticks(values: Sequence[float]) -> Figure:
     return {"tickvals": shown, "ticktext": [f"{each:g}" for each in shown], "range": np.log10([low, high]).tolist()}
 
 
-def fall(stages: Sequence[tuple[str, float, float]], floor: float | None, of: Quantity) -> Figure:
+def error_reduction(stages: Sequence[tuple[str, float, float]], floor: float | None, of: Quantity) -> Figure:
     """Return the errors of the models in the order they were made: name, fitted and held-out rms, SI."""
     names = [name for name, _, _ in stages]
     traces = []

@@ -61,15 +61,15 @@ class BlockErrors:
         mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
         return mostly and self.train_rmse_m <= RARELY_OFF * floor_m
 
-    def follows(self, moved_m: float) -> bool:
+    def follows(self, motion_std_m: float) -> bool:
         """Whether a typical second's error is small against the motion, given by its standard deviation, m."""
-        return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * moved_m
+        return max(self.train_block_m, self.test_block_m) <= MOST_LEFT * motion_std_m
 
 
 def block_errors(fit: Fit, split: Split) -> BlockErrors:
     """Return how far a fit is off on what it was fitted to and on what was held out."""
     negligible_m = NEGLIGIBLE * split.floor_m
-    train, test = split.train, split.judged
+    train, test = split.train, split.test
     fitted_m = residual_m(train, fit.predict(train.recording))
     held_out_m = residual_m(test, fit.predict(test.recording))
     rows = np.isfinite(held_out_m)

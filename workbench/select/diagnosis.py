@@ -60,7 +60,7 @@ def diagnose(
         seed: of the searches.
         workers: threads, by default one a core; the result does not depend on it.
         on_preview: given the tangent preview as soon as it is there.
-        progress: told what is being done, and the fraction of it done.
+        progress: called with what is being done, and the fraction of it done.
 
     Raises:
         InputError: the recording holds too little or other units than SI, an unknown effect.
@@ -81,7 +81,7 @@ def diagnose(
     last = steps[-1]
     best = last.added.model if last.added and last.added.model else last.before
     base, best = search.with_intervals(steps[0].before), search.with_intervals(best)
-    found = verdict(best, steps, parts.moved_m)
+    found = verdict(best, steps, parts.motion_std_m)
     return Diagnosis(
         steps=steps,
         verdict=found,

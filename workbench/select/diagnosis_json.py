@@ -10,7 +10,7 @@ from typing import Any
 from workbench.fit.fitting import Fit
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
-from workbench.select.equivalence import untold
+from workbench.select.equivalence import undetectable
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -27,7 +27,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "preview": [{"name": each.name, "score": each.score} for each in diagnosis.preview],
         "untold": [
             {"name": each.name, "like": list(each.like), "most_m": each.most_m, "shown_by": each.shown_by}
-            for each in untold(diagnosis.split, diagnosis.best.fit.valve)
+            for each in undetectable(diagnosis.split, diagnosis.best.fit.valve)
         ],
         "candidates": [_candidate(each) for each in diagnosis.candidates],
     }

@@ -22,7 +22,7 @@ from workbench.model.parameters import free_parameters
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
-from workbench.select.equivalence import classes, imitation
+from workbench.select.equivalence import bare_imitation, classes
 from workbench.select.experiment import Experiment, experiment
 from workbench.select.forward_selection import MOST_ADDED, without_missing
 
@@ -97,7 +97,7 @@ class EffectSearch:
             apart = [fits[min(each)] for each in classes(fits, self._library)]
             if len(apart) > 1:
                 self._progress("choosing the experiment", 0.0)
-                record = self._split.judged.record
+                record = self._split.test.record
                 return experiment(apart, record, seed=self._seed, workers=self._workers)
         return None
 
@@ -132,7 +132,7 @@ class EffectSearch:
     def _base_from(self, before: EvaluatedModel, models: Sequence[EvaluatedModel]) -> EvaluatedModel:
         """Return the model before, fitted again where a search from a better one's parameters ends below it."""
         better = [each.fit.valve for each in models if bic(before.fit) - bic(each.fit) > LEAST_BIC]
-        imitations = [each for each in map(imitation, better) if each]
+        imitations = [each for each in map(bare_imitation, better) if each]
         valves = [*(each.valve for each in better), *imitations]
         bare = [ValveFile(valve=valve, effect=before.fit.valve.effect) for valve in valves]
         with ThreadPoolExecutor(self._workers) as pool:

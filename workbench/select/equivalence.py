@@ -12,7 +12,8 @@ motion begins with a reversal, the play is taken up first, and from there on
 
 so that a bare valve does the same but for the moment in which the play is taken up. Where the stem goes on in the
 same direction after a rest, the play is taken up already and break-away is at F_s, which tells, unless the command
-jumps past both. Hence `untold` asks the record itself: it is simulated with growing plays and friction changed so.
+jumps past both. Hence `undetectable` asks the record itself: it is simulated with growing plays and friction changed
+so.
 """
 
 from collections.abc import Iterable, Mapping
@@ -28,10 +29,10 @@ from workbench.data.held_out import Part, Split
 from workbench.data.motion import slips
 from workbench.model.free_run import FreeRun
 
-PLAY = "backlash"
+BACKLASH = "backlash"
 
 
-UNSEEN = 0.3
+DETECTABLE = 0.3
 """Of the floor: a change of the simulation below it does not show."""
 WIDTHS = 16
 LEAST_PLAY = 4.0
@@ -41,7 +42,7 @@ TAKEN_UP = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Untold:
+class Undetectable:
     """An effect that the recordings do not show up to a strength, and the parameters that stand in for it."""
 
     name: str
@@ -58,9 +59,9 @@ class Untold:
         )
 
 
-def untold(split: Split, valve: ValveFile) -> tuple[Untold, ...]:
+def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
     """Return what may be there unseen beside the effects of a fitted valve: a play that friction stands in for."""
-    if any(each.name == PLAY for each in valve.effect):
+    if any(each.name == BACKLASH for each in valve.effect):
         return ()
     widest_m = 2.0 * valve.valve.coulomb_n / valve.valve.spring_n_per_m
     least_m = LEAST_PLAY * split.floor_m
@@ -68,26 +69,26 @@ def untold(split: Split, valve: ValveFile) -> tuple[Untold, ...]:
         return ()
     most_m = 0.0
     for width_m in np.geomspace(least_m, 0.99 * widest_m, WIDTHS).tolist():
-        twin = with_play(valve, width_m)
-        if any(_apart_m(each, valve, twin) > UNSEEN * split.floor_m for each in (split.train, split.judged)):
+        twin = with_backlash(valve, width_m)
+        if any(_apart_m(each, valve, twin) > DETECTABLE * split.floor_m for each in (split.train, split.test)):
             break
         most_m = width_m
     like = ("coulomb_n", "static_n")
-    return (Untold(PLAY, like, most_m, "slow restarts in the same direction after a hold"),) if most_m else ()
+    return (Undetectable(BACKLASH, like, most_m, "slow restarts in the same direction after a hold"),) if most_m else ()
 
 
-def with_play(file: ValveFile, width_m: float) -> ValveFile:
+def with_backlash(file: ValveFile, width_m: float) -> ValveFile:
     """Return the valve with play that answers as this one does between reversals."""
     valve = file.valve
     shift_n = 0.5 * valve.spring_n_per_m * width_m
     changed = valve.model_copy(update={"coulomb_n": valve.coulomb_n - shift_n, "static_n": valve.static_n + shift_n})
-    play = EffectTable.model_validate({"name": PLAY, "width_m": width_m})
+    play = EffectTable.model_validate({"name": BACKLASH, "width_m": width_m})
     return ValveFile(valve=changed, effect=(play, *file.effect))
 
 
-def imitation(file: ValveFile) -> ValveParameters | None:
+def bare_imitation(file: ValveFile) -> ValveParameters | None:
     """Return the bare valve that answers as one with play does while it only reverses; None without one."""
-    width_m = next((each.parameters["width_m"] for each in file.effect if each.name == PLAY), 0.0)
+    width_m = next((each.parameters["width_m"] for each in file.effect if each.name == BACKLASH), 0.0)
     valve = file.valve
     shift_n = 0.5 * valve.spring_n_per_m * width_m
     if not 0.0 < 2.0 * shift_n <= valve.static_n - valve.coulomb_n:
@@ -139,7 +140,7 @@ def classes(names: Iterable[str], library: Mapping[str, Effect]) -> list[frozens
     return gathered
 
 
-def told_apart(name: str, other: str, library: Mapping[str, Effect]) -> str:
+def distinguishing_record(name: str, other: str, library: Mapping[str, Effect]) -> str:
     """Return what record tells two effects apart, as their files say it; empty if they do not."""
     return library[name].confounded.get(other, "") or library[other].confounded.get(name, "")
 

@@ -68,7 +68,7 @@ def extend(
         test: held out; by default the last third of the recording.
         seed: of the searches.
         workers: threads, by default one a core.
-        progress: told what is being done, and the fraction of it done.
+        progress: called with what is being done, and the fraction of it done.
 
     Raises:
         InputError: the recording holds too little or other units than SI, an unknown effect or one that is there.
@@ -94,7 +94,7 @@ def extend(
     return Extension(
         effects=tuple(effects),
         given_train_rmse_m=_rmse_m(valve, on.train),
-        given_test_rmse_m=_rmse_m(valve, on.judged),
+        given_test_rmse_m=_rmse_m(valve, on.test),
         refitted=before,
         refitted_errors=before_errors,
         extended=after,

@@ -11,7 +11,7 @@ from config.loading import Schema, validated
 from workbench.select.extension import Extension
 
 
-class Step(Schema):
+class ExtensionStep(Schema):
     """One extension. Errors are rms, m: of the valve as given, refitted without the effects, and with them."""
 
     effects: tuple[str, ...]
@@ -49,7 +49,7 @@ class Step(Schema):
 class Journal(Schema):
     """The steps in order."""
 
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ExtensionStep, ...] = ()
 
     @classmethod
     def beside(cls, valve: Path) -> Self:
@@ -68,7 +68,7 @@ class Journal(Schema):
 
     def followed_by(self, extension: Extension) -> Self:
         """Return the journal with one more step."""
-        return validated(type(self), {"steps": (*self.steps, Step.of(extension))}, "journal")
+        return validated(type(self), {"steps": (*self.steps, ExtensionStep.of(extension))}, "journal")
 
     def write_beside(self, valve: Path) -> None:
         """Write the journal of a valve file."""

@@ -16,15 +16,15 @@ from workbench.select.effect_candidates import EffectStep, EvaluatedModel
 Verdict = Literal["adequate", "missing", "one_of", "unexplained", "untrusted"]
 
 
-def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], moved_m: float) -> Verdict:
+def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float) -> Verdict:
     """Return the verdict.
 
     Args:
         best: the last model accepted, or the valve as it is.
         steps: the forward steps made.
-        moved_m: standard deviation of the position that was fitted, m.
+        motion_std_m: standard deviation of the position that was fitted, m.
     """
-    if best.explained and not best.errors.follows(moved_m):
+    if best.explained and not best.errors.follows(motion_std_m):
         return "unexplained"
     added = [step for step in steps if step.added]
     if best.explained and not added:

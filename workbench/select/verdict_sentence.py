@@ -6,7 +6,7 @@ from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
-from workbench.select.equivalence import classes, told_apart
+from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.verdict import Verdict
 
 SCATTERS = 3.0
@@ -61,10 +61,11 @@ def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
     if len(names) < 2:
         return ""
     texts = [
-        f" {name} or {other}: {told_apart(name, other, library) or 'no record of pressure and position tells'}."
+        f" {name} or {other}: "
+        f"{distinguishing_record(name, other, library) or 'no record of pressure and position tells'}."
         for i, name in enumerate(names)
         for other in names[i + 1 :]
-        if told_apart(name, other, library) or len(classes((name, other), library)) == 1
+        if distinguishing_record(name, other, library) or len(classes((name, other), library)) == 1
     ]
     return "".join(texts) or f" Equally good: {', '.join(names)}."
 
@@ -81,7 +82,7 @@ def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
 
 def _scatter(parts: Split) -> str:
     """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it."""
-    noise_m = max(each.record.noise_m for each in (parts.train, parts.judged))
+    noise_m = max(each.record.noise_m for each in (parts.train, parts.test))
     if parts.floor_m < SCATTERS * noise_m:
         return ""
     return (
