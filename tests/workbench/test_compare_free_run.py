@@ -113,5 +113,6 @@ def test_everything_can_be_written_as_json() -> None:
     valve = drawn_valve(np.random.default_rng(0))
     written = json.loads(json.dumps(as_json(compare(record_of(valve, 0), valve)), allow_nan=False))
     assert len(written["residual_m"]) == 3000
+    assert set(written["slips"]) == {"matched", "missed_s", "invented_s"}
     assert len(written["autocorrelation"]["value"]) == 26
     assert len(written["input_correlation"]["value"]) == 51

@@ -43,7 +43,7 @@ def test_slips_missed_and_spurious_are_counted_and_none_is_not_said(missed: int,
 
 def test_a_stem_at_rest_that_the_model_moves_is_said() -> None:
     still = replace(FOUND, measured_slips=(), events=SlipEvents((), (), (1.0,)))
-    assert "the model makes 1 slip:" in sentences(still)[0]
+    assert "the model makes 1 spurious slip:" in sentences(still)[0]
 
 
 def test_a_thousand_notes_are_counted_and_not_all_told() -> None:
