@@ -1,19 +1,21 @@
 """`positioner demo`: a sticking valve identified and controlled over a real bus, in under a minute.
 
-A simulated slave and the daemon run as processes of their own, on the bus that `--bus` names (`BUSES`); this command
-plays the DCS over Modbus TCP: start, identification, steps up and down, ageing of the packing by 30 %, the same steps
-once more, identification anew, and the steps again. What the daemon identified is held against the truth here, where it
-is known; the daemon never sees it.
+A simulated slave and the daemon run as processes of their own, on the bus that `--bus` names
+(`parts.simulated_plant`); this command plays the DCS over Modbus TCP: start, identification, steps up and down, ageing
+of the packing by 30 %, the same steps once more, identification anew, and the steps again. What the daemon identified
+is compared with the truth here, where it is known; the daemon never has it.
 """
 
 import argparse
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from positioner.cli.parts.simulated_plant import AGEING, AGES_AT_S, BUSES, started
 
 if TYPE_CHECKING:
     from config.valve_file import ValveParameters
@@ -27,16 +29,6 @@ ALPHA_PA, BETA_PA = 6.4 * PSI, 1.92 * PSI
 """The seed's excitation."""
 AGED_ALPHA_PA = 11.5 * PSI
 """Enough for the aged packing to break away from where the stem is then."""
-AGEING = 1.3
-AGES_AT_S = 8.0
-PERIOD_S = 1e-3
-WINDOW_S = 0.8
-"""Of the identification."""
-RTU_PERIOD_S = 5e-3
-"""On a pseudo-terminal, an exchange takes two silences of 1.75 ms; at 115200 baud a real line adds 4.2 ms."""
-RTU_WINDOW_S = 1.2
-"""A fifth of the samples in a second: a longer window, within the rise of the sine, brings k/c back within 1 %."""
-NOISE_PU = 1e-4
 STEPS = (0.65, 0.40, 0.80, 0.50, 0.40)
 """This valve's spring has no preload: without pressure it pulls the stem down only to F_c / k_s, 0.27 to 0.35 p.u."""
 STEP_S = 0.5
@@ -96,53 +88,6 @@ class DemoOutcome:
         ]
 
 
-@dataclass(frozen=True, slots=True)
-class BusSetup:
-    """What a bus puts into the two files, and how its slave is started."""
-
-    slave: str
-    device: Callable[[str], str]
-    """Table `[device]` of the daemon, given the slave's ready line."""
-    options: tuple[str, ...] = ("--port", "0")
-    period_s: float = PERIOD_S
-    """Of the daemon's cycle."""
-    window_s: float = WINDOW_S
-    """Of its identification."""
-
-
-@contextmanager
-def _modbus() -> Iterator[BusSetup]:
-    yield BusSetup("", lambda ready: f"port = {_port_in(ready)}\n")
-
-
-@contextmanager
-def _canopen() -> Iterator[BusSetup]:
-    yield BusSetup('[bus]\nkind = "canopen"\n', lambda ready: f'bus = "canopen"\nchannel = "{_port_in(ready)}"\n')
-
-
-@contextmanager
-def _rtu() -> Iterator[BusSetup]:
-    from positioner.cli.parts.pseudo_line import pseudo_line
-
-    def serial(path: str) -> str:
-        return f'serial = {{path = "{path}", baud = 115200}}\n'
-
-    with pseudo_line() as (end, other_end):
-        slave = f'[bus]\nkind = "rtu"\n{serial(other_end)}'
-        device = f'bus = "rtu"\n{serial(end)}'
-        yield BusSetup(slave, lambda _: device, options=(), period_s=RTU_PERIOD_S, window_s=RTU_WINDOW_S)
-
-
-BUSES: dict[str, Callable[[], AbstractContextManager[BusSetup]]] = {"modbus": _modbus, "canopen": _canopen, "rtu": _rtu}
-"""The buses, by the name that `--bus` gives them."""
-
-
-def _port_in(ready: str) -> int:
-    from positioner.cli.parts.children import port_in
-
-    return port_in(ready)
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("--bus", choices=tuple(BUSES), default="modbus", help="the fieldbus (modbus)")
@@ -155,6 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     import json
 
     from config.valve_file import load_valve, shipped_valve
+    from positioner.cli.parts.children import port_in
 
     valve = load_valve(shipped_valve("seed")).valve
     with _folder(arguments.out) as folder:
@@ -162,7 +108,7 @@ def run(arguments: argparse.Namespace) -> int:
         _print_line("starting a simulated valve and the daemon")
         with started(arguments.bus, folder, valve) as pair:
             _print_line(f"slave {pair.slave}; daemon {pair.daemon}")
-            outcome = _play(_port_in(pair.daemon), valve, pair.powered_s)
+            outcome = _play(port_in(pair.daemon), valve, pair.powered_s)
         _report(outcome)
         picture = _picture(folder, outcome)
         if arguments.out:
@@ -173,29 +119,6 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"DOES NOT HOLD: {problem}")
         print(f"{'all holds' if not outcome.problems else 'failed'}, {time.monotonic() - started_s:.0f} s")
     return 1 if outcome.problems else 0
-
-
-@dataclass(frozen=True, slots=True)
-class RunningPair:
-    """A slave and a daemon that run: what each says, and when the slave was powered up."""
-
-    slave: str
-    daemon: str
-    powered_s: float
-
-
-@contextmanager
-def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[RunningPair]:
-    """Run a slave and a daemon on a bus as processes, their files and logs in a folder."""
-    from positioner.cli.parts.children import running
-
-    with BUSES[bus]() as setup:
-        slave_path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave))
-        with running("sim", slave_path, *setup.options) as slave:
-            powered_s = time.monotonic()
-            daemon_path = _write(folder / "daemon.toml", _daemon_toml(valve, setup, slave))
-            with running("run", daemon_path) as daemon:
-                yield RunningPair(slave, daemon, powered_s)
 
 
 @contextmanager
@@ -216,43 +139,6 @@ def _folder(asked: Path | None) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"--out {asked}", f"cannot be written: {error.strerror}") from None
     yield asked
-
-
-def _slave_toml(valve: "ValveParameters", bus: str) -> str:
-    return f"""# The simulated valve of the demo; its packing ages {AGES_AT_S:g} s after power-up.
-valve = "seed"
-{bus}[clock]
-period_s = {PERIOD_S}
-[sensor]
-noise_std_m = {NOISE_PU * valve.stroke_m}
-seed = 1
-[[change]]
-at_s = {AGES_AT_S}
-coulomb_n = {AGEING * valve.coulomb_n}
-static_n = {AGEING * valve.static_n}
-"""
-
-
-def _daemon_toml(valve: "ValveParameters", setup: BusSetup, ready: str) -> str:
-    return f"""# The daemon of the demo. It knows the stroke; all else it identifies.
-[valve]
-name = "demo"
-stroke_m = {valve.stroke_m}
-[device]
-{setup.device(ready)}[cycle]
-period_s = {setup.period_s}
-[identification]
-window_s = {setup.window_s}
-[supervisory]
-port = 0
-[recorder]
-folder = "recordings"
-"""
-
-
-def _write(path: Path, text: str) -> Path:
-    path.write_text(text)
-    return path
 
 
 def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:

@@ -3,4 +3,11 @@
 `controller.step` reads top to bottom: supervise, follow the reference, identify, choose the state, command. It
 never reads a clock, sleeps, writes a file or touches a socket, so the same code runs in virtual time, lockstep and
 real time.
+
+    controller, settings, requests, sample      one step, what it is given and what it is given once
+    supervision, states, reference              who commands, S0 to S3, the reference and its last change
+    balance_law                                 the seed's law: the pressure that balances spring and friction
+    breakaway_law, breakaway_memory             the law for small moves: the course of a move
+    pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress
+    rest_detector, sine_excitation              where the stem rests; the excitation of S3
 """

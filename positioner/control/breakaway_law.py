@@ -25,166 +25,51 @@ All levels are balances of the moving stem at a point X, beta_s the error of tha
 Why there is no limit cycle: a pulse is only given if it is predicted to leave less than 0.7 of the error, the dead
 band widens with every reversal, and the number of pulses per move is limited. After the end of the move nothing
 happens until the reference changes, or something else has measurably moved the stem.
+
+Here is the course of a move. What is remembered is in `breakaway_memory`, 5. in `pulse_following`, and which pulse to
+give and what its outcome teaches (3., 4.) in `pulse_trial`; `pulse` has the mechanics of the stem.
 """
 
-from dataclasses import dataclass, replace
-from math import inf, log, sqrt
+from dataclasses import replace
+from math import sqrt
 
 from config.codes import InhibitReason
 from positioner.control.balance_law import balance_pa
-from positioner.control.pulse import Pulse, PulseResponse, unidentified_response
+from positioner.control.breakaway_memory import (
+    RESOLUTION,
+    BreakawayMemory,
+    BreakawaySettings,
+    Move,
+    Observation,
+    PulseInProgress,
+    PulseTrial,
+)
+from positioner.control.pulse_following import follow_pressure, moved_nothing, should_be_at_rest
+from positioner.control.pulse_trial import (
+    SETTLE_PERIODS,
+    evaluate_trial,
+    planned_trial,
+    push_limit_m,
+    take_identification,
+)
 from positioner.control.rest_detector import RestEstimate
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimates
 
-RESOLUTION = 2e-4
-"""Of the stroke: to this a position at rest is averaged."""
-UNKNOWN_BALANCE = 3e-3
-"""Of the stroke: standard deviation of the balance where the identification says none, and ..."""
-BALANCE_WALK = 3e-4
-"""... how far it changes from move to move, for b/c is not quite right and friction not quite the same."""
-FIRST_PUSH, PUSH_CLIMB = 0.05, 1.3
-"""(F_s - F_c)/F_c that is tried first, and the factor from there until the stem moves."""
-PUSH_RAISE, PUSH_LOWER = 1.08, 0.99
 LARGEST_LEFT = 0.7
+"""Share of the error that a pulse may be predicted to leave."""
 REVERSAL_WIDENS = 1.5
+"""Factor on the dead band for each reversal after the first."""
 MOST_PULSES = 40
-SHORTEST_AIM = 0.5
-"""Of the way: an uncertain pulse aims no shorter."""
-STUCK_AFTER, AT_LIMIT = 3, 0.999
+"""In a move."""
+STUCK_AFTER = 3
 """So many pulses at the limit must have moved nothing."""
-SETTLE_PERIODS = 3
-"""Beyond the computed end: the delay of the loop and a sample to be sure."""
 SLOW_PUSH = 0.3
-"""Of F_c: so much more is asked of a slow pressure."""
-LONGEST_PUSH_S, LONGEST_PRESSURE_S = 1.0, 0.5
-PRESSURE_ARRIVED = 0.02
-"""Of F_c/A."""
-MOTION_SEEN = 5.0
-"""Standard deviations of a sample."""
-WITHIN_NOISE, DISTINCT, DISTURBED = 2.5, 2.5, 8.0
-"""Standard deviations of a mean: that an error may be, a step must be, a shift at rest must be."""
+"""Share of F_c: so much more is asked of a slow pressure."""
+WITHIN_NOISE, DISTURBED = 2.5, 8.0
+"""Standard deviations of a mean: that an error may be, that a shift at rest must be."""
 REFILL_S = 60.0
 """At rest, after this time each, a pulse comes back to the number that is left."""
-
-
-@dataclass(frozen=True, slots=True)
-class BreakawaySettings:
-    """Settings of the law: m, Pa."""
-
-    stroke_m: float
-    dead_band_m: float
-    minimum_pa: float
-    maximum_pa: float
-    breakaway_pa: float | None
-    """F_s/A where it is known."""
-    push_limit_pa: float | None
-    """The most that a push may be beyond the balance; None: F_c/A as identified."""
-
-
-@dataclass(frozen=True, slots=True)
-class PulseTrial:
-    """A pulse given to learn from: the rest it started at, m, and how far the shortest pulse would have gone, m."""
-
-    pulse: Pulse
-    from_m: float
-    from_error_m: float
-    shortest_m: float
-    arrived: bool = False
-    """Whether the pressure has reached the push."""
-
-
-@dataclass(frozen=True, slots=True)
-class PulseInProgress:
-    """The stem moves, or may move: the pressures of push and hold, and when it should be at rest."""
-
-    push_pa: float
-    hold_pa: float
-    start_s: float
-    settle_s: float
-    """Delay from the end of the push until its effect is in the samples ..."""
-    glide_s: float
-    """... and from there until the stem is predicted to rest."""
-    push_end_s: float = inf
-    """Infinite while it is pushed."""
-    first_gap: tuple[float, float] | None = None
-    """Time, s, and gap between pressure and hold, Pa, when the outcome began to show."""
-    lag_known: bool = False
-    trial: PulseTrial | None = None
-    """None: nothing can be learnt from this pulse, for the reference changed meanwhile."""
-
-
-@dataclass(frozen=True, slots=True)
-class LearntPush:
-    """The push in one direction beyond the balance as learnt, m, and whether such a pulse ever moved the stem."""
-
-    push_m: float
-    moved: bool
-
-
-UNTRIED_PUSH, UNKNOWN_RESPONSE = LearntPush(0.0, False), unidentified_response(0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Move:
-    """A move since the reference changed."""
-
-    target_m: float
-    pulses: int = 0
-    reversals: int = 0
-    direction: int = 0
-    at_limit: int = 0
-    """Pulses at the limit, in a row, that moved nothing."""
-    ended_s: float | None = None
-    ended_at_m: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class BreakawayMemory:
-    """What the law remembers from one step to the next."""
-
-    rest: RestEstimate
-    ratios: Ratios | None = None
-    response: PulseResponse = UNKNOWN_RESPONSE
-    up: LearntPush = UNTRIED_PUSH
-    down: LearntPush = UNTRIED_PUSH
-    slow_pressure: bool = False
-    lag_s: float = 0.0
-    """Of the pressure, when it is slow; 0: not measured."""
-    now_s: float = 0.0
-    level_pa: float = 0.0
-    move: Move | None = None
-    """None while another state commands."""
-    in_progress: PulseInProgress | None = None
-    inhibit_reason: InhibitReason = InhibitReason.NOTHING
-
-    def held_pa(self, command_pa: float) -> float:
-        """Return what to hold when something interrupts after a command, Pa: what a push would have given way to."""
-        pushing = self.in_progress is not None and self.in_progress.push_end_s == inf
-        return self.in_progress.hold_pa if self.in_progress is not None and pushing else command_pa
-
-    def push_in(self, direction: int) -> LearntPush:
-        """Return the push in a direction."""
-        return self.up if direction > 0 else self.down
-
-    def with_push_in(self, direction: int, push: LearntPush) -> "BreakawayMemory":
-        """Return the memory with another push in a direction."""
-        return replace(self, up=push) if direction > 0 else replace(self, down=push)
-
-
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """The measurement of one step, SI units. `usable` says whether the position may be used."""
-
-    now_s: float
-    position_m: float
-    pressure_pa: float
-    usable: bool
-
-
-def initial_memory(settings: BreakawaySettings) -> BreakawayMemory:
-    """Return the memory of a law that has no measurement yet."""
-    return BreakawayMemory(RestEstimate(RESOLUTION * settings.stroke_m))
 
 
 def while_not_commanding(memory: BreakawayMemory, observation: Observation, command_pa: float) -> BreakawayMemory:
@@ -214,11 +99,11 @@ def step(
     period_s = observation.now_s - memory.now_s
     memory = replace(memory, now_s=observation.now_s)
     if ratios != memory.ratios:
-        memory = _take_identification(memory, ratios, estimates, settings)
+        memory = take_identification(memory, ratios, estimates, settings)
     if memory.move is None or reference_m != memory.move.target_m:
         memory = _begin_move(memory, observation, reference_m, ratios, settings)
     if memory.in_progress is not None:
-        memory = _follow_pressure(memory, memory.in_progress, observation, ratios)
+        memory = follow_pressure(memory, memory.in_progress, observation, ratios)
     in_progress = memory.in_progress
     if not observation.usable or (
         in_progress is not None and observation.now_s < in_progress.push_end_s + in_progress.settle_s
@@ -229,33 +114,10 @@ def step(
     if memory.rest.block_count or not memory.rest.known or not period_s > 0:
         return memory
     if in_progress is not None and not (
-        _should_be_at_rest(in_progress, observation, ratios) or _unmoved(in_progress, memory.rest)
+        should_be_at_rest(in_progress, observation, ratios) or moved_nothing(in_progress, memory.rest)
     ):
         return replace(memory, rest=memory.rest.restarted())
-    return _next_pulse(_evaluate_trial(memory, ratios, settings), period_s, ratios, settings)
-
-
-def _take_identification(
-    memory: BreakawayMemory, ratios: Ratios, estimates: Estimates, settings: BreakawaySettings
-) -> BreakawayMemory:
-    """Take over newly identified numbers; what pulses have taught besides stays."""
-    first = memory.ratios is None
-    std_m = UNKNOWN_BALANCE * settings.stroke_m
-    if estimates.k_over_c.valid:
-        std_m = max(BALANCE_WALK * settings.stroke_m, estimates.k_over_c.std / -ratios.b_over_c)
-    response = unidentified_response(std_m) if first else memory.response.with_new_balance(std_m)
-    a, b = estimates.a, estimates.b
-    if a.valid and b.valid:
-        response = response.with_poles(a.value, b.value, max(abs(a.std / a.value), abs(b.std / b.value)))
-    memory = replace(memory, ratios=ratios, response=response)
-    if not first:
-        return memory
-    friction_pa = -ratios.k_over_c
-    beyond_pa, known = FIRST_PUSH * friction_pa, settings.breakaway_pa is not None
-    if settings.breakaway_pa is not None:
-        beyond_pa = max(beyond_pa, PUSH_RAISE * (settings.breakaway_pa - friction_pa))
-    push = LearntPush(beyond_pa / -ratios.b_over_c, known)
-    return replace(memory, up=push, down=push)
+    return _next_pulse(evaluate_trial(memory, ratios, settings), period_s, ratios, settings)
 
 
 def _begin_move(
@@ -271,109 +133,6 @@ def _begin_move(
     glide_s = memory.response.slide_s(abs(reference_m - observation.position_m), RESOLUTION * settings.stroke_m)
     in_progress = PulseInProgress(level_pa, level_pa, observation.now_s, 0.0, glide_s, observation.now_s)
     return replace(begun, in_progress=in_progress, level_pa=level_pa, rest=memory.rest.restarted())
-
-
-def _follow_pressure(
-    memory: BreakawayMemory, in_progress: PulseInProgress, observation: Observation, ratios: Ratios
-) -> BreakawayMemory:
-    """Check whether the pressure follows, and end the push when it is time."""
-    trial = in_progress.trial
-    if trial is None:
-        return memory
-    sign = trial.pulse.direction
-    if not trial.arrived:
-        tolerance_pa = max(_tolerance_pa(ratios), 0.2 * trial.pulse.push_m * -ratios.b_over_c)
-        # Written so that a pressure that is not measured (NaN) has arrived.
-        trial = replace(trial, arrived=not sign * (in_progress.push_pa - observation.pressure_pa) > tolerance_pa)
-        in_progress = replace(in_progress, trial=trial)
-    if in_progress.push_end_s < inf:
-        return _measure_lag(memory, in_progress, observation, ratios)
-    if memory.slow_pressure and observation.now_s < in_progress.start_s + LONGEST_PUSH_S:
-        least_m = max(MOTION_SEEN * memory.rest.std_m, memory.rest.resolution_m)
-        moving = observation.usable and sign * (observation.position_m - trial.from_m) > least_m
-        if not (moving or trial.arrived):
-            return replace(memory, in_progress=in_progress)
-        if moving:  # this is where it broke loose
-            broke_m = sign * (observation.pressure_pa - balance_pa(trial.from_m, sign, ratios)) / -ratios.b_over_c
-            in_progress = replace(in_progress, trial=replace(trial, pulse=trial.pulse._replace(push_m=broke_m)))
-            memory = memory.with_push_in(sign, LearntPush(max(0.0, broke_m + memory.response.bias_m(sign)), moved=True))
-    in_progress = replace(in_progress, push_end_s=observation.now_s)
-    return replace(memory, in_progress=in_progress, level_pa=in_progress.hold_pa)
-
-
-def _measure_lag(
-    memory: BreakawayMemory, in_progress: PulseInProgress, observation: Observation, ratios: Ratios
-) -> BreakawayMemory:
-    """Measure the lag of a pressure that does not follow at once: T_p = (t_2 - t_1) / ln(gap_1 / gap_2)."""
-    if in_progress.lag_known or observation.now_s < in_progress.push_end_s + in_progress.settle_s:
-        return replace(memory, in_progress=in_progress)
-    gap_pa = abs(observation.pressure_pa - in_progress.hold_pa)
-    if in_progress.first_gap is None:
-        follows = not gap_pa > _tolerance_pa(ratios)
-        return replace(
-            memory, in_progress=replace(in_progress, first_gap=(observation.now_s, gap_pa), lag_known=follows)
-        )
-    first_s, first_pa = in_progress.first_gap
-    if not 0.0 < gap_pa < 0.5 * first_pa:
-        return replace(memory, in_progress=in_progress)
-    lag_s = (observation.now_s - first_s) / log(first_pa / gap_pa)
-    return replace(memory, in_progress=replace(in_progress, lag_known=True), lag_s=lag_s)
-
-
-def _should_be_at_rest(in_progress: PulseInProgress, observation: Observation, ratios: Ratios) -> bool:
-    """Return whether stem and pressure should be at rest."""
-    unsteady = abs(observation.pressure_pa - in_progress.hold_pa) > _tolerance_pa(ratios)
-    patience_s = in_progress.settle_s + in_progress.glide_s + (LONGEST_PRESSURE_S if unsteady else 0.0)
-    return observation.now_s >= in_progress.push_end_s + patience_s
-
-
-def _unmoved(in_progress: PulseInProgress, rest: RestEstimate) -> bool:
-    """Return whether the push is over and has moved nothing."""
-    trial = in_progress.trial
-    return trial is not None and trial.arrived and not _moved(trial, rest)
-
-
-def _moved(trial: PulseTrial, rest: RestEstimate) -> bool:
-    """Return whether a pulse has moved the stem: by half of the least it can, and by more than noise would."""
-    travel_m = trial.pulse.direction * (rest.mean_m - trial.from_m)
-    noise_m = sqrt(rest.error_m**2 + trial.from_error_m**2)
-    return travel_m > max(0.5 * trial.shortest_m, DISTINCT * noise_m)
-
-
-def _tolerance_pa(ratios: Ratios) -> float:
-    return PRESSURE_ARRIVED * -ratios.k_over_c
-
-
-def _evaluate_trial(memory: BreakawayMemory, ratios: Ratios, settings: BreakawaySettings) -> BreakawayMemory:
-    """Learn from the pulse that has just ended, if there is one: whether it moved the stem, and how far."""
-    in_progress, move = memory.in_progress, memory.move
-    if in_progress is None or move is None:
-        return memory
-    memory = replace(memory, in_progress=None)
-    trial = in_progress.trial
-    if trial is None:
-        return memory
-    pulse, rest = trial.pulse, memory.rest
-    push = memory.push_in(pulse.direction)
-    if _moved(trial, rest):
-        travel_m = pulse.direction * (rest.mean_m - trial.from_m)
-        variance_m2 = rest.error_m**2 + trial.from_error_m**2
-        response = memory.response.updated(pulse, travel_m, variance_m2, BALANCE_WALK * settings.stroke_m)
-        by_the_push = pulse.push_m <= _push_m(memory, pulse.direction, ratios, settings)
-        push = LearntPush(push.push_m * (PUSH_LOWER if by_the_push and not memory.slow_pressure else 1.0), moved=True)
-        other = memory.push_in(-pulse.direction)
-        if not other.moved:
-            memory = memory.with_push_in(-pulse.direction, replace(other, push_m=push.push_m))
-        memory = replace(memory, response=response, move=replace(move, at_limit=0))
-        return memory.with_push_in(pulse.direction, push)
-    if not (trial.arrived or memory.slow_pressure):
-        return replace(memory, slow_pressure=True)
-    limit_m = _push_limit_m(ratios, settings)
-    push_m = pulse.push_m + memory.response.bias_m(pulse.direction)
-    if push_m >= AT_LIMIT * limit_m:
-        memory = replace(memory, move=replace(move, at_limit=move.at_limit + 1))
-    push_m = max(push.push_m, push_m) * (PUSH_RAISE if push.moved else PUSH_CLIMB)
-    return memory.with_push_in(pulse.direction, replace(push, push_m=min(push_m, limit_m)))
 
 
 def _next_pulse(
@@ -395,7 +154,7 @@ def _next_pulse(
         return _end_move(memory, move, InhibitReason.NOTHING)
     if move.at_limit >= STUCK_AFTER:
         return _end_move(memory, move, InhibitReason.STUCK)
-    trial = _planned_trial(memory, abs(error_m), direction, period_s, ratios, settings)
+    trial = planned_trial(memory, abs(error_m), direction, period_s, ratios, settings)
     end = memory.response.end(trial.pulse, RESOLUTION * settings.stroke_m)
     if move.pulses >= MOST_PULSES or abs(abs(error_m) - end.travel_m) > LARGEST_LEFT * abs(error_m):
         return _end_move(memory, move, InhibitReason.TRIM_ENDED)
@@ -421,7 +180,7 @@ def _give_pulse(
     pulse = trial.pulse
     push_m = pulse.push_m
     if memory.slow_pressure:  # or it would creep up to the push for ever; it is taken back in time
-        limit_m = _push_limit_m(ratios, settings) - memory.response.bias_m(pulse.direction)
+        limit_m = push_limit_m(ratios, settings) - memory.response.bias_m(pulse.direction)
         push_m = max(push_m, min(push_m + SLOW_PUSH * ratios.k_over_c / ratios.b_over_c, limit_m))
     push_pa, hold_pa = (
         balance_pa(trial.from_m + pulse.direction * level_m, pulse.direction, ratios)
@@ -440,33 +199,6 @@ def _give_pulse(
         rest=memory.rest.restarted(),
         inhibit_reason=InhibitReason.NOTHING,
     )
-
-
-def _planned_trial(
-    memory: BreakawayMemory, way_m: float, direction: int, period_s: float, ratios: Ratios, settings: BreakawaySettings
-) -> PulseTrial:
-    """Choose the pulse that goes a way, m, or short of it by what it is not sure of."""
-    response, rest = memory.response, memory.rest
-    deepest_m = -ratios.k_over_c / ratios.b_over_c
-    duration_s = (SETTLE_PERIODS if memory.slow_pressure else 1) * period_s
-    push = Pulse(_push_m(memory, direction, ratios, settings), deepest_m, duration_s, direction, memory.lag_s)
-    pulse = response.reaching(way_m, push, deepest_m)
-    short_m = 2 * response.std_m(pulse) - settings.dead_band_m
-    if short_m > 0:
-        pulse = response.reaching(max(way_m - short_m, SHORTEST_AIM * way_m), push, deepest_m)
-    shortest_m = response.end(pulse._replace(hold_m=min(pulse.hold_m, deepest_m)), inf).travel_m
-    return PulseTrial(pulse, rest.mean_m, rest.error_m, shortest_m)
-
-
-def _push_m(memory: BreakawayMemory, direction: int, ratios: Ratios, settings: BreakawaySettings) -> float:
-    """Return the push by the balance as identified, m."""
-    push_m = min(memory.push_in(direction).push_m, _push_limit_m(ratios, settings))
-    return push_m - memory.response.bias_m(direction)
-
-
-def _push_limit_m(ratios: Ratios, settings: BreakawaySettings) -> float:
-    limit_pa = settings.push_limit_pa if settings.push_limit_pa is not None else -ratios.k_over_c
-    return limit_pa / -ratios.b_over_c
 
 
 def _end_move(memory: BreakawayMemory, move: Move, inhibit_reason: InhibitReason) -> BreakawayMemory:

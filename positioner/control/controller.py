@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control import breakaway_law as breakaway
 from positioner.control.balance_law import balance_pa
-from positioner.control.breakaway_law import BreakawayMemory
+from positioner.control.breakaway_memory import BreakawayMemory, Observation, initial_memory
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -91,7 +91,7 @@ class Controller:
             state=State.S0_START,
             excitation=None,
             identifying=False,
-            breakaway=breakaway.initial_memory(settings.breakaway) if settings.breakaway else None,
+            breakaway=initial_memory(settings.breakaway) if settings.breakaway else None,
         )
 
     @property
@@ -278,9 +278,7 @@ def _breakaway_memory(
     """Return what the law for small moves remembers after this step, if it is the law."""
     if memory.breakaway is None or settings.breakaway is None:
         return None
-    observation = breakaway.Observation(
-        sample.now_s, sample.position_m, sample.pressure_pa, usable(sample, settings.limits)
-    )
+    observation = Observation(sample.now_s, sample.position_m, sample.pressure_pa, usable(sample, settings.limits))
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
         return breakaway.step(
             memory.breakaway, observation, reference.value_m, applied.ratios, estimates, settings.breakaway

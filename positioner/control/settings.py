@@ -1,4 +1,4 @@
-"""What the controller is told once, from the daemon's file."""
+"""The settings of the controller, from the daemon's file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from config.daemon_file import DaemonFile, Law
 from config.device import ActionName
 from positioner.control.balance_law import balance_pa
-from positioner.control.breakaway_law import BreakawaySettings
+from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.online import IdentificationSettings
@@ -18,7 +18,7 @@ The law for small moves has a memory and is not among them."""
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the controller is told once."""
+    """The settings of the controller, SI units; they do not change while it runs."""
 
     limits: Limits
     minimum_pa: float

@@ -8,9 +8,10 @@ import pytest
 from config.codes import Fault, Mode
 from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
-from positioner.cli.demo import LARGEST_ERROR_PU, ComparedEstimate, DemoOutcome, StepOutcome, started
+from positioner.cli.demo import LARGEST_ERROR_PU, ComparedEstimate, DemoOutcome, StepOutcome
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
+from positioner.cli.parts.simulated_plant import started
 from positioner.dcs import Dcs
 from tests.cli.test_daemon_process import until
 

@@ -1,1 +1,1 @@
-"""What several commands share: child processes, the place of a daemon, series from files, pictures, virtual time."""
+"""What several commands share: child processes, a simulated plant of them, a daemon's address, series from files."""

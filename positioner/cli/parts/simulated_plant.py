@@ -1,0 +1,128 @@
+"""A simulated slave and the daemon as processes on a bus, with the files that both are given: what `demo` runs on.
+
+The packing of the simulated valve ages by `AGEING` at `AGES_AT_S` after power-up.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from positioner.cli.parts.children import port_in, running
+
+if TYPE_CHECKING:
+    from config.valve_file import ValveParameters
+
+AGEING = 1.3
+"""Factor on F_c and F_s."""
+AGES_AT_S = 8.0
+PERIOD_S = 1e-3
+WINDOW_S = 0.8
+"""Length of the identification."""
+RTU_PERIOD_S = 5e-3
+"""On a pseudo-terminal, an exchange takes two silences of 1.75 ms; at 115200 baud a real line adds 4.2 ms."""
+RTU_WINDOW_S = 1.2
+"""A fifth of the samples in a second: a longer window, within the rise of the sine, brings k/c back within 1 %."""
+NOISE_PU = 1e-4
+"""Standard deviation of the position, share of the stroke."""
+
+
+@dataclass(frozen=True, slots=True)
+class BusSetup:
+    """What a bus puts into the two files, and how its slave is started."""
+
+    slave: str
+    device: Callable[[str], str]
+    """Table `[device]` of the daemon, given the slave's ready line."""
+    options: tuple[str, ...] = ("--port", "0")
+    period_s: float = PERIOD_S
+    """Of the daemon's cycle."""
+    window_s: float = WINDOW_S
+    """Of its identification."""
+
+
+@contextmanager
+def _modbus() -> Iterator[BusSetup]:
+    yield BusSetup("", lambda ready: f"port = {port_in(ready)}\n")
+
+
+@contextmanager
+def _canopen() -> Iterator[BusSetup]:
+    yield BusSetup('[bus]\nkind = "canopen"\n', lambda ready: f'bus = "canopen"\nchannel = "{port_in(ready)}"\n')
+
+
+@contextmanager
+def _rtu() -> Iterator[BusSetup]:
+    from positioner.cli.parts.pseudo_line import pseudo_line
+
+    def serial(path: str) -> str:
+        return f'serial = {{path = "{path}", baud = 115200}}\n'
+
+    with pseudo_line() as (end, other_end):
+        slave = f'[bus]\nkind = "rtu"\n{serial(other_end)}'
+        device = f'bus = "rtu"\n{serial(end)}'
+        yield BusSetup(slave, lambda _: device, options=(), period_s=RTU_PERIOD_S, window_s=RTU_WINDOW_S)
+
+
+BUSES: dict[str, Callable[[], AbstractContextManager[BusSetup]]] = {"modbus": _modbus, "canopen": _canopen, "rtu": _rtu}
+"""The buses, by the name that `--bus` gives them."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunningPair:
+    """A slave and a daemon that run: what each says, and when the slave was powered up."""
+
+    slave: str
+    daemon: str
+    powered_s: float
+
+
+@contextmanager
+def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[RunningPair]:
+    """Run a slave and a daemon on a bus as processes, their files and logs in a folder."""
+    with BUSES[bus]() as setup:
+        slave_path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave))
+        with running("sim", slave_path, *setup.options) as slave:
+            powered_s = time.monotonic()
+            daemon_path = _write(folder / "daemon.toml", _daemon_toml(valve, setup, slave))
+            with running("run", daemon_path) as daemon:
+                yield RunningPair(slave, daemon, powered_s)
+
+
+def _slave_toml(valve: "ValveParameters", bus: str) -> str:
+    return f"""# The simulated valve of the demo; its packing ages {AGES_AT_S:g} s after power-up.
+valve = "seed"
+{bus}[clock]
+period_s = {PERIOD_S}
+[sensor]
+noise_std_m = {NOISE_PU * valve.stroke_m}
+seed = 1
+[[change]]
+at_s = {AGES_AT_S}
+coulomb_n = {AGEING * valve.coulomb_n}
+static_n = {AGEING * valve.static_n}
+"""
+
+
+def _daemon_toml(valve: "ValveParameters", setup: BusSetup, ready: str) -> str:
+    return f"""# The daemon of the demo. It knows the stroke; all else it identifies.
+[valve]
+name = "demo"
+stroke_m = {valve.stroke_m}
+[device]
+{setup.device(ready)}[cycle]
+period_s = {setup.period_s}
+[identification]
+window_s = {setup.window_s}
+[supervisory]
+port = 0
+[recorder]
+folder = "recordings"
+"""
+
+
+def _write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
