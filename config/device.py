@@ -52,15 +52,27 @@ class Quantity:
     text: str
 
 
+def _numbers(codes: type[IntEnum]) -> str:
+    return ", ".join(f"{int(each)} {_words(each.name)}" for each in codes)
+
+
+def _bits(flags: type[IntFlag]) -> str:
+    return ", ".join(f"{each.bit_length() - 1} {_words(each.name)}" for each in flags)
+
+
+def _words(name: str | None) -> str:
+    return (name or "").lower().replace("_", " ")
+
+
 QUANTITIES = (
     Quantity("position_m", "m", "float32", False, "stem position"),
     Quantity("pressure_pa", "Pa", "float32", False, "actuator pressure"),
     Quantity("sample_counter", "1", "uint32", False, "samples taken since power-up, wraps"),
     Quantity("device_time_us", "us", "uint64", False, "device's clock at the sample"),
-    Quantity("status", "1", "uint16", False, "bits: 0 communication lost, 1 sensor fault, 2 not ready"),
+    Quantity("status", "1", "uint16", False, f"bits: {_bits(DeviceStatus)}"),
     Quantity("command_pa", "Pa", "float32", True, "pressure command"),
     Quantity("communication_timeout_s", "s", "float32", True, "silence before the action; 0 is never"),
-    Quantity("communication_action", "1", "uint16", True, "0 hold, 1 vent, 2 fill"),
+    Quantity("communication_action", "1", "uint16", True, _numbers(CommunicationAction)),
 )
 
 WRITABLE = frozenset(quantity.name for quantity in QUANTITIES if quantity.writable)

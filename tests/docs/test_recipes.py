@@ -48,9 +48,9 @@ def change(path: Path, diff: str) -> None:
     """Change a file: the lines that stay or go must stand in it once, as they are."""
     lines = diff.splitlines(keepends=True)
     old, new = ("".join(line[1:] or "\n" for line in lines if line[0] != sign) for sign in "+-")
-    text = path.read_text(encoding="utf-8")
-    assert text.count(old) == 1, f"{path.name} has {text.count(old)} times:\n{old}"
-    path.write_text(text.replace(old, new), encoding="utf-8")
+    text = "\n" + path.read_text(encoding="utf-8")
+    assert text.count("\n" + old) == 1, f"{path.name} has {text.count(old)} times:\n{old}"
+    path.write_text(text.replace("\n" + old, "\n" + new)[1:], encoding="utf-8")
 
 
 def install(tree: Path) -> None:

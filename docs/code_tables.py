@@ -1,0 +1,58 @@
+"""The tables of the documents that repeat a code, written from the code: `python -m docs.code_tables`.
+
+`codes.md` is written whole; in `health.md` what stands between two marks is.
+"""
+
+from pathlib import Path
+
+from config.codes import Code, Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, Refusal, State
+from positioner.daemon.health.ne107 import CLASS
+
+HERE = Path(__file__).parent
+BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"
+END = "<!-- end of the classes -->"
+HEAD = """# What the numbers say
+
+Written by `python -m docs.code_tables` from `config/codes.py`, from which `positioner map` has its texts, too. A number
+never gets a new meaning.
+"""
+SERVED: dict[type[Code], str] = {
+    Mode: "mode",
+    State: "state",
+    Fault: "fault",
+    Quality: "quality",
+    InhibitReason: "why",
+    Refusal: "*_reason, refusal",
+    Ne107Status: "ne107",
+    Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes",
+}
+"""The register that serves each."""
+
+
+def codes() -> str:
+    """Return the whole of `codes.md`."""
+    return "\n".join([HEAD, *(_section(code, register) for code, register in SERVED.items())])
+
+
+def _section(code: type[Code], register: str) -> str:
+    said = (code.__doc__ or "").strip().partition("\n")[0]
+    rows = [f"| {int(each)} | `{each.name}` | {each.text} |" for each in code]
+    return "\n".join([f"## {code.__name__}: register {register}", "", said, "", "| | | |", "|---|---|---|", *rows, ""])
+
+
+def renewed(document: str) -> str:
+    """Return `health.md` with the NE 107 classes between its marks."""
+    head, _, rest = document.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    rows = [f"| {int(status)} {status.text} | {_causes(status)} |" for status in sorted(Ne107Status, reverse=True)]
+    return "\n".join([head + BEGIN, "| class | causes |", "|---|---|", *rows, END + tail])
+
+
+def _causes(status: Ne107Status) -> str:
+    return ", ".join(f"{int(cause)} {cause.text}" for cause, own in CLASS.items() if own is status)
+
+
+if __name__ == "__main__":
+    (HERE / "codes.md").write_text(codes(), encoding="utf-8")
+    health = HERE / "health.md"
+    health.write_text(renewed(health.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,45 @@
+"""What a document says of a code is what the code says: tables written from it, numbers and names in the text."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from config import codes
+from config.codes import Code, Fault, InhibitReason
+from docs import code_tables
+
+DOCS = Path(__file__).parents[2] / "docs"
+STALE = "stale: run python -m docs.code_tables"
+
+
+def said(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def test_the_tables_are_those_of_today() -> None:
+    assert said("codes.md") == code_tables.codes(), STALE
+    assert said("health.md") == code_tables.renewed(said("health.md")), STALE
+
+
+def test_every_code_has_its_table() -> None:
+    assert set(Code.__subclasses__()) == set(code_tables.SERVED)
+
+
+def test_numbers_in_the_text_say_what_the_code_says() -> None:
+    found = re.findall(r"`why` = (\d+)(?:, ([^;.)\n]+))?", said("law.md"))
+    assert len(found) >= 4
+    for number, words in found:
+        assert words in ("", InhibitReason(int(number)).text)
+
+
+def test_the_table_of_faults_has_every_code_of_a_fault() -> None:
+    table = said("architecture.md").partition("\n## How a fault ends\n")[2].partition("\n## ")[0]
+    assert set(re.findall(r"`Fault\.(\w+)`", table)) == {each.name for each in Fault} - {"NONE"}
+
+
+@pytest.mark.parametrize("path", sorted(DOCS.rglob("*.md")), ids=lambda path: path.name)
+def test_a_code_that_is_named_exists(path: Path) -> None:
+    for code, member in re.findall(r"`([A-Z]\w+)\.([A-Z][A-Z0-9_]+)`", path.read_text(encoding="utf-8")):
+        if "PRESSURE_IMPLAUSIBLE" not in member:  # which a recipe adds
+            assert member in getattr(codes, code).__members__
