@@ -73,6 +73,23 @@ def wrong_name(name: str) -> str | None:
     return None if is_there(name) else "no such module or name in it"
 
 
+@cache
+def sources() -> list[tuple[str, str]]:
+    """Return the text of every Python file but the tests' of documents, each with its name without the ending."""
+    files = [path for room in ROOMS for path in (ROOT / room).rglob("*.py") if path.parent != Path(__file__).parent]
+    return [(path.stem, path.read_text(encoding="utf-8")) for path in files]
+
+
+def wrong_member(holder: str, member: str) -> str | None:
+    """Say whether a class, or a module, of ours has no such member; what is not ours may be anything."""
+    own = [text for name, text in sources() if name == holder or re.search(rf"^class {holder}\b", text, re.M)]
+    return None if not own or any(re.search(rf"\b{member}\b", text) for text in own) else f"{holder} has none"
+
+
+def wrong_constant(name: str) -> str | None:
+    return None if any(re.search(rf"\b{name}\b", text) for _, text in sources()) else "no such constant"
+
+
 def is_there(name: str) -> bool:
     """Return whether a dotted name is a module, or something in one."""
     parts = name.split(".")
@@ -124,6 +141,8 @@ CHECKS: dict[str, Callable[..., str | None]] = {
     rf"((?:{'|'.join(ROOMS)})/[\w./*-]*)": wrong_path,
     r"(\w+\.(?:py|md))": wrong_file,
     rf"((?:{'|'.join(ROOMS)})(?:\.\w+)+)": wrong_name,
+    r"([A-Z][a-z]\w+|[a-z]\w+)\.([A-Za-z_]\w*)": wrong_member,
+    r"([A-Z][A-Z0-9]*_[A-Z0-9_]+)": wrong_constant,
     r"positioner (.+)": wrong_command,
     r"python -m ([\w.]+).*": wrong_module,
     r"make (\w+)": wrong_target,
@@ -165,6 +184,9 @@ def test_every_link_leads_somewhere(document: Path) -> None:
         ("karnop.py", "no file of that name"),
         ("config.registers.REGISTER", "no such module or name in it"),
         ("config.registers.Register.adress", "no such module or name in it"),
+        ("Cycle.request", "Cycle has none"),
+        ("controller.stepp", "controller has none"),
+        ("LEAST_LUCK", "no such constant"),
         ("positioner diagnos rec.csv", "no such command"),
         ("positioner get --config daemon.toml --valf FV", "no option --valf"),
         ("python -m benchmarks.luck", "no such module"),
@@ -184,6 +206,10 @@ def test_what_does_not_exist_is_found(span: str, problem: str) -> None:
         "sim/effects/",
         "karnopp.py",
         "config.registers.Register.address",
+        "Cycle.requests",
+        "controller.step",
+        "time.sleep",
+        "LEAST_BIC",
         "positioner get --valve FV",
         "python -m benchmarks",
         "make test",
