@@ -9,6 +9,7 @@ from workbench.compare.sentences import shortened
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
 from workbench.report.overlay import Simulated, overlay, phase_shades
 from workbench.report.page import (
+    Html,
     Row,
     Subject,
     bullets,
@@ -92,7 +93,7 @@ def facts(comparison: Comparison) -> str:
     )
 
 
-def _verdict(each: Comparison) -> str:
+def _verdict(each: Comparison) -> Html:
     if each.adequate:
         return verdict("good", "The model holds.", bullets(each.sentences))
     if not each.over_direction.count.sum():
@@ -100,7 +101,7 @@ def _verdict(each: Comparison) -> str:
     return verdict("bad", "The model does not hold. Where it fails:", bullets(each.sentences))
 
 
-def _key_figures(each: Comparison, stroke_m: float) -> str:
+def _key_figures(each: Comparison, stroke_m: float) -> Html:
     missed, spurious = len(each.slips.missed_s), len(each.slips.spurious_s)
     return figures_of_merit(
         [
@@ -117,7 +118,7 @@ def _is_noise(each: Comparison) -> bool:
     return each.repeatability_m is None or each.repeatability_m <= each.noise_m
 
 
-def _overlay(each: Comparison) -> str:
+def _overlay(each: Comparison) -> Html:
     judged = np.isfinite(each.residual_m)
     figure = overlay(
         each.time_s,
@@ -130,7 +131,7 @@ def _overlay(each: Comparison) -> str:
     return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
 
 
-def overlaid(figure: Figure, ground: str, samples: int) -> str:
+def overlaid(figure: Figure, ground: str, samples: int) -> Html:
     """Return the section of an overlay; `ground` says what the shades behind it mean."""
     return section(
         "overlay",
@@ -152,7 +153,7 @@ def thinned(count: int) -> str:
     return f" Of every {stretch(count)} samples the least and the greatest are drawn; the figures are of all {count}."
 
 
-def _phases(each: Comparison, stroke_m: float) -> str:
+def _phases(each: Comparison, stroke_m: float) -> Html:
     return section(
         "phases",
         "Where it fails",
@@ -201,7 +202,7 @@ def _phase(part: Phase, floor_m: float, stroke_m: float) -> Row:
     )
 
 
-def _profile(over: str, each: Comparison, title: str, factor: float) -> str:
+def _profile(over: str, each: Comparison, title: str, factor: float) -> Html:
     figure = profiles(
         [("error", MODEL, getattr(each, f"over_{over}"))], (title, factor), ("mean error, mm", 1e3, "mm", "m")
     )
@@ -210,7 +211,7 @@ def _profile(over: str, each: Comparison, title: str, factor: float) -> str:
     return plot(f"plot-over-{over}", figure, 270, f"Mean error {title}.")
 
 
-def _friction(each: Comparison) -> str:
+def _friction(each: Comparison) -> Html:
     both = (("measured", MEASURED), ("model", MODEL))
     force = ("friction, N", 1.0, "N", "N")
 
@@ -236,7 +237,7 @@ def _friction(each: Comparison) -> str:
     )
 
 
-def _slips(each: Comparison) -> str:
+def _slips(each: Comparison) -> Html:
     slips = each.slips
     rows = []
     for name, wanted in (("opening", 1), ("closing", -1)):
@@ -254,11 +255,13 @@ def _slips(each: Comparison) -> str:
             f"{_at(slips.missed_s)}. Spurious, the model slipped and the stem did not: {len(slips.spurious_s)}"
             f"{_at(slips.spurious_s)}."
         ),
-        table("table-slips", ["Matched slips", "Number", "Model later by, s", "Model farther by, mm"], rows)
-        if rows
-        else "",
-        text("Medians; a minus: earlier, or not far enough.") if rows else "",
+        *(_matched_slips(rows) if rows else ()),
     )
+
+
+def _matched_slips(rows: list[Row]) -> tuple[Html, Html]:
+    head = ["Matched slips", "Number", "Model later by, s", "Model farther by, mm"]
+    return table("table-slips", head, rows), text("Medians; a minus: earlier, or not far enough.")
 
 
 def _at(times_s: tuple[float, ...]) -> str:
@@ -269,7 +272,7 @@ def _at(times_s: tuple[float, ...]) -> str:
     return f" (at {shown} s{f' and {rest} more' if rest > 0 else ''})"
 
 
-def _statistics(each: Comparison) -> str:
+def _statistics(each: Comparison) -> Html:
     return folded(
         "statistics",
         "For specialists: correlations and spectrum of the error",
@@ -318,7 +321,7 @@ def _pressure(each: Comparison) -> list[str]:
     ]
 
 
-def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> str:
+def recording(subject: Subject, notes: tuple[str, ...], more: list[str]) -> Html:
     """Return what is known of the recording itself."""
     said = [f"{key}: {value}" for key, value in subject.metadata.items()]
     whole = [] if notes else ["Nothing in it had to be left out or cut"]

@@ -15,6 +15,7 @@ from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid,
 from workbench.report.effects_table import RankedStep, added_effects, headline, not_told_apart, outcome, tried_effects
 from workbench.report.overlay import HELD_OUT, Mask, Shade, Simulated, overlay
 from workbench.report.page import (
+    Html,
     Row,
     Subject,
     bullets,
@@ -111,7 +112,7 @@ def _facts(diagnosis: Diagnosis, validation: _Validation) -> str:
     return f"fitted {fitted} samples; held out {facts(validation.base)}"
 
 
-def _verdict(diagnosis: Diagnosis, validation: _Validation) -> str:
+def _verdict(diagnosis: Diagnosis, validation: _Validation) -> Html:
     return verdict(
         *headline(diagnosis.verdict, diagnosis.missing),
         text(diagnosis.sentence, "Where the model failed before:"),
@@ -119,7 +120,7 @@ def _verdict(diagnosis: Diagnosis, validation: _Validation) -> str:
     )
 
 
-def _key_figures(diagnosis: Diagnosis, validation: _Validation) -> str:
+def _key_figures(diagnosis: Diagnosis, validation: _Validation) -> Html:
     before, after = diagnosis.base.errors, diagnosis.best.errors
     stroke_m = diagnosis.base.fit.valve.valve.stroke_m
     added = ", ".join(find_effect(name, "effects").name.replace("_", " ") for name in diagnosis.missing)
@@ -141,7 +142,7 @@ def _names(diagnosis: Diagnosis) -> frozenset[str]:
     return frozenset(each.name for each in diagnosis.candidates)
 
 
-def _fall(diagnosis: Diagnosis, validation: _Validation) -> str:
+def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
     stages: list[tuple[str, EvaluatedModel, EffectCandidate | None]] = [("as it was, refitted", diagnosis.base, None)]
     stages += [
         (f"+ {step.added.name}", step.added.model, step.added)
@@ -184,7 +185,7 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> str:
     )
 
 
-def _overlay(validation: _Validation) -> str:
+def _overlay(validation: _Validation) -> Html:
     base, best = validation.base, validation.best
     models = [Simulated("before", MODEL, base.simulated_m)]
     if base is not best and not np.array_equal(base.simulated_m, best.simulated_m, equal_nan=True):
@@ -201,7 +202,7 @@ def _overlay(validation: _Validation) -> str:
     return overlaid(figure, told, base.time_s.size)
 
 
-def _where(validation: _Validation) -> str:
+def _where(validation: _Validation) -> Html:
     rows = [
         Row(
             [before.name, length(before.rms_m), length(after.rms_m), times(after.rms_m, validation.floor_m)],
@@ -223,7 +224,7 @@ def _where(validation: _Validation) -> str:
     )
 
 
-def _ranking(diagnosis: Diagnosis, validation: _Validation) -> str:
+def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
     steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, _tried(step)) for step in diagnosis.steps]
     return tried_effects(steps, validation.floor_m, LENGTH, "second by second")
 
@@ -244,7 +245,7 @@ def _tried(step: EffectStep) -> list[RankedEffect]:
     ]
 
 
-def _added(diagnosis: Diagnosis) -> str:
+def _added(diagnosis: Diagnosis) -> Html:
     names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
     rows = [
         _parameter(name, diagnosis.base.fit.parameters.get(name), diagnosis.best.fit.parameters.get(name))
@@ -265,7 +266,7 @@ def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
     return Row([words, shown(before), shown(after), interval, unit], remark)
 
 
-def _next(diagnosis: Diagnosis, experiment_file: str) -> str:
+def _next(diagnosis: Diagnosis, experiment_file: str) -> Html:
     chosen = diagnosis.experiment
     if chosen is None:
         return section("next", "What to measure next", bullets(_advice(diagnosis)))
@@ -319,7 +320,7 @@ def _command(chosen: Experiment) -> dict[str, object]:
     return {"data": [trace], "layout": layout(xaxis=axis("time, s"), yaxis=axis("command, kPa"), showlegend=False)}
 
 
-def _undetectable(diagnosis: Diagnosis) -> str:
+def _undetectable(diagnosis: Diagnosis) -> Html:
     best = diagnosis.best.fit
     said = [
         f"not determined by this recording: {', '.join(parameter(name)[0] for name in each.split(', '))}"
@@ -338,7 +339,7 @@ def _undetectable(diagnosis: Diagnosis) -> str:
     return section("undetectable", "What the recording does not tell", bullets(said))
 
 
-def _preview(diagnosis: Diagnosis) -> str:
+def _preview(diagnosis: Diagnosis) -> Html:
     rows = [Row([each.name, f"{100 * each.score:.3g} %"]) for each in diagnosis.preview]
     return folded(
         "preview",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sim.effect import Effect, find_effect
 from workbench.report import ranking
-from workbench.report.page import Row, plot, preformatted, section, subheading, table, text
+from workbench.report.page import Html, Row, plot, preformatted, section, subheading, table, text
 from workbench.report.ranking import RankedEffect
 from workbench.report.units import Quantity
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_REDUCTION, LEAST_STANDARD_ERRORS
@@ -47,7 +47,7 @@ def outcome(name: str, added: str, indistinguishable: Collection[str], *, refuse
     return "refused" if refused else "accepted"
 
 
-def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity, parts: str) -> str:
+def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity, parts: str) -> Html:
     """Return the section of all steps; `parts` says of what the error must fall, part by part."""
     shown = [
         text(
@@ -101,7 +101,7 @@ def _ranked(each: RankedEffect, of: Quantity) -> Row:
     )
 
 
-def added_effects(names: Sequence[str], *parameters: str) -> str:
+def added_effects(names: Sequence[str], *parameters: Html) -> Html:
     """Return the section of what was added, with its equations; `parameters` is HTML that follows."""
     parts = []
     for effect in map(_effect, names):
@@ -114,7 +114,7 @@ def added_effects(names: Sequence[str], *parameters: str) -> str:
 
 def not_told_apart(
     sets: Sequence[Sequence[str]], tried: Collection[str], missing: Sequence[str], otherwise: str
-) -> str:
+) -> Html:
     """Return the section of what could not be told apart; `otherwise` where the effects' files say nothing of it."""
     title = "What could not be told apart"
     if not sets:

@@ -16,6 +16,7 @@ from workbench.report.comparison_report import WORDS
 from workbench.report.diagnosis_report import DIAGNOSIS_WORDS
 from workbench.report.effects_table import RankedStep, added_effects, headline, not_told_apart, outcome, tried_effects
 from workbench.report.page import (
+    Html,
     Row,
     Subject,
     bullets,
@@ -95,7 +96,7 @@ def _facts(rows: Rows) -> str:
     return f"{len(rows)} rows, {recordings} recording{'s' if recordings > 1 else ''}, {strokes} strokes"
 
 
-def _key_figures(diagnosis: ForceDiagnosis) -> str:
+def _key_figures(diagnosis: ForceDiagnosis) -> Html:
     floor_n, best = diagnosis.floor_n, diagnosis.best
     typical = (
         Shown("–") if floor_n is None else Shown(times(best.median_error_n, floor_n)),
@@ -116,7 +117,7 @@ def _names(diagnosis: ForceDiagnosis) -> frozenset[str]:
     return frozenset(each.name for each in diagnosis.candidates)
 
 
-def _fall(diagnosis: ForceDiagnosis) -> str:
+def _fall(diagnosis: ForceDiagnosis) -> Html:
     stages = [("bare", diagnosis.base), *((f"+ {s.added.name}", s.added.fit) for s in diagnosis.steps if s.added)]
     errors = [(name, fit.train_rms_n, fit.test_rms_n) for name, fit in stages]
     rows = [
@@ -144,7 +145,7 @@ def _fall(diagnosis: ForceDiagnosis) -> str:
     )
 
 
-def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> str:
+def _friction(diagnosis: ForceDiagnosis, measured_n: Column) -> Html:
     rows, best = diagnosis.rows, diagnosis.best
     every = -(-len(rows) // DRAWN)
     left_n = (measured_n - carried_n(rows, best.parameters))[::every]
@@ -180,7 +181,7 @@ def _dot(colour: str, drawn: Sequence[float | None]) -> Figure:
     return {"color": colour, "size": 4 if len(drawn) > FEW else 9, "opacity": 0.6}
 
 
-def _where(diagnosis: ForceDiagnosis) -> str:
+def _where(diagnosis: ForceDiagnosis) -> Html:
     rows = diagnosis.rows
     opening = rows.direction > 0.0
     places = [
@@ -214,7 +215,7 @@ def _profile(
     kept: np.ndarray[tuple[int], np.dtype[np.bool_]],
     rows: Rows,
     fits: list[tuple[str, str, ForceFit]],
-) -> str:
+) -> Html:
     resisting = [
         (said, colour, _means(over[kept], (rows.direction * fit.residual_n)[kept])) for said, colour, fit in fits
     ]
@@ -230,7 +231,7 @@ def _means(over: Column, values: Column) -> Profile:
     return Profile(over[order], values[order], np.zeros(over.size), np.ones(over.size, np.int64))
 
 
-def _ranking(diagnosis: ForceDiagnosis) -> str:
+def _ranking(diagnosis: ForceDiagnosis) -> Html:
     steps = [RankedStep(step.before.effects, step.before.test_rms_n, _tried(step)) for step in diagnosis.steps]
     return tried_effects(steps, None, FORCE, "stroke by stroke")
 
@@ -251,7 +252,7 @@ def _tried(step: ForceStep) -> list[RankedEffect]:
     ]
 
 
-def _parameters(diagnosis: ForceDiagnosis) -> str:
+def _parameters(diagnosis: ForceDiagnosis) -> Html:
     base, best = diagnosis.base, diagnosis.best
     rows = [_parameter(name, base, best) for name in dict.fromkeys([*base.parameters, *best.parameters])]
     return table("table-parameters", ["Parameter", "Before", "After", "Std", "Unit"], rows, (0,))

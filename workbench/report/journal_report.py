@@ -5,6 +5,7 @@ from pathlib import Path
 
 from workbench.report import ranking
 from workbench.report.page import (
+    Html,
     Row,
     bullets,
     glossary,
@@ -100,7 +101,7 @@ def _row(name: str, train_m: float, test_m: float, floor_m: float) -> Row:
     return Row([name, length(train_m), length(test_m), times(test_m, floor_m)])
 
 
-def _step(number: int, step: ExtensionStep) -> str:
+def _step(number: int, step: ExtensionStep) -> Html:
     rows = []
     for name, value in step.parameters.items():
         words, factor, unit = parameter(name)

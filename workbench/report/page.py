@@ -10,13 +10,15 @@ from html import escape
 from importlib import import_module
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, NewType
 
 from config.errors import InputError
 from config.valve_file import ValveFile
 from workbench.report.units import Shown
 
 HERE = Path(__file__).parent
+Html = NewType("Html", str)
+"""Markup: what stands in it as text has been escaped. A page is made of nothing else, which the type checker holds."""
 DATES = ("recorded", "date")
 """Metadata of a recording that say when it was made."""
 
@@ -58,7 +60,7 @@ def require_plotly(path: Path) -> str:
         ) from None
 
 
-def write(path: Path, title: str, parts: Iterable[str]) -> None:
+def write(path: Path, title: str, parts: Iterable[Html]) -> None:
     """Write the page.
 
     Raises:
@@ -78,87 +80,89 @@ def write(path: Path, title: str, parts: Iterable[str]) -> None:
         raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 
 
-def heading(title: str, subject: Subject, facts: str) -> str:
+def heading(title: str, subject: Subject, facts: str) -> Html:
     """Return the title and where the data come from."""
     files = ", ".join(f"<code>{escape(each)}</code>" for each in subject.recordings)
     when = f" · recorded {escape(subject.recorded)}" if subject.recorded else ""
-    return f'<h1>{escape(title)}</h1>\n<p class="source">{files}{when} · {escape(facts)}</p>'
+    return Html(f'<h1>{escape(title)}</h1>\n<p class="source">{files}{when} · {escape(facts)}</p>')
 
 
-def heading_alone(title: str, facts: str) -> str:
+def heading_alone(title: str, facts: str) -> Html:
     """Return the title of what is about no recording."""
-    return f'<h1>{escape(title)}</h1>\n<p class="source">{escape(facts)}</p>'
+    return Html(f'<h1>{escape(title)}</h1>\n<p class="source">{escape(facts)}</p>')
 
 
-def verdict(kind: str, first: str, *parts: str) -> str:
+def verdict(kind: str, first: str, *parts: Html) -> Html:
     """Return the verdict, with the HTML that belongs to it; kind good, bad or open."""
-    return f'<section class="verdict {kind}" id="verdict"><strong>{escape(first)}</strong>{_lines(parts)}</section>'
+    return Html(
+        f'<section class="verdict {kind}" id="verdict"><strong>{escape(first)}</strong>{_lines(parts)}</section>'
+    )
 
 
-def figures_of_merit(cards: Sequence[tuple[str, Shown, str]]) -> str:
+def figures_of_merit(cards: Sequence[tuple[str, Shown, str]]) -> Html:
     """Return the key figures: what, how much, and a remark."""
     shown = "".join(
         f"<div><dt>{escape(what)}</dt><dd{_si(value)}>{escape(value.text)}<small>{escape(remark)}</small></dd></div>"
         for what, value, remark in cards
     )
-    return f'<dl class="figures">{shown}</dl>'
+    return Html(f'<dl class="figures">{shown}</dl>')
 
 
-def section(name: str, title: str, *parts: str) -> str:
+def section(name: str, title: str, *parts: Html) -> Html:
     """Return a section; parts are HTML, empty ones are left out."""
-    return f'<section id="{name}">\n<h2>{escape(title)}</h2>\n{_lines(parts)}\n</section>'
+    return Html(f'<section id="{name}">\n<h2>{escape(title)}</h2>\n{_lines(parts)}\n</section>')
 
 
-def subheading(title: str) -> str:
+def subheading(title: str) -> Html:
     """Return a heading inside a section."""
-    return f"<h3>{escape(title)}</h3>"
+    return Html(f"<h3>{escape(title)}</h3>")
 
 
-def folded(name: str, title: str, *parts: str) -> str:
+def folded(name: str, title: str, *parts: Html) -> Html:
     """Return what is closed until asked for."""
-    return f'<details id="{name}"><summary>{escape(title)}</summary>\n{_lines(parts)}\n</details>'
+    return Html(f'<details id="{name}"><summary>{escape(title)}</summary>\n{_lines(parts)}\n</details>')
 
 
-def pair(*parts: str) -> str:
+def pair(*parts: Html) -> Html:
     """Return figures side by side where there is room."""
-    return f'<div class="pair">{_lines(parts)}</div>'
+    return Html(f'<div class="pair">{_lines(parts)}</div>')
 
 
-def text(*paragraphs: str) -> str:
+def text(*paragraphs: str) -> Html:
     """Return paragraphs."""
     return _each("p", [each for each in paragraphs if each])
 
 
-def bullets(items: Sequence[str]) -> str:
+def bullets(items: Sequence[str]) -> Html:
     """Return a list of sentences."""
-    return f"<ul>{_each('li', [sentence(each) for each in items])}</ul>" if items else ""
+    return Html(f"<ul>{_each('li', [sentence(each) for each in items])}</ul>" if items else "")
 
 
-def preformatted(lines: str) -> str:
+def preformatted(lines: str) -> Html:
     """Return lines as they are."""
-    return f"<pre>{escape(lines)}</pre>" if lines else ""
+    return Html(f"<pre>{escape(lines)}</pre>" if lines else "")
 
 
-def glossary(words: Mapping[str, str]) -> str:
+def glossary(words: Mapping[str, str]) -> Html:
     """Return words and what they mean."""
     pairs = "".join(f"<dt>{escape(word)}</dt><dd>{escape(meaning)}</dd>" for word, meaning in words.items())
-    return f'<dl class="words">{pairs}</dl>'
+    return Html(f'<dl class="words">{pairs}</dl>')
 
 
-def table(name: str, head: Sequence[str], rows: Sequence[Row], words: Iterable[int] = (0,)) -> str:
+def table(name: str, head: Sequence[str], rows: Sequence[Row], words: Iterable[int] = (0,)) -> Html:
     """Return a table; the columns in `words` hold words, not numbers."""
     left = set(words)
     top = "".join(f'<th scope="col"{_class(i in left)}>{escape(each)}</th>' for i, each in enumerate(head))
     body = "\n".join(f'<tr class="{row.kind}">{_cells(row, left)}</tr>' for row in rows)
-    return (
+    return Html(
         f'<div class="scroll"><table id="{name}"><thead><tr>{top}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
     )
 
 
-def plot(name: str, figure: Mapping[str, Any], height_px: int, caption: str) -> str:
+def plot(name: str, figure: Mapping[str, Any], height_px: int, caption: str) -> Html:
     """Return a figure that the page's script draws."""
     data = json.dumps(figure, allow_nan=False, separators=(",", ":"), ensure_ascii=False).replace("</", "<\\/")
-    return (
+    return Html(
         f'<figure><div class="plot" id="{name}" role="img" aria-label="{escape(caption)}" '
         f'style="height:{height_px}px"></div><script type="application/json" id="{name}-data">{data}</script>\n'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
@@ -194,11 +198,11 @@ def _si(value: Shown) -> str:
     return f' title="{escape(value.si)}"' if value.si else ""
 
 
-def _each(tag: str, texts: Sequence[str]) -> str:
-    return "".join(f"<{tag}>{escape(each)}</{tag}>" for each in texts)
+def _each(tag: str, texts: Sequence[str]) -> Html:
+    return Html("".join(f"<{tag}>{escape(each)}</{tag}>" for each in texts))
 
 
-def _lines(parts: Iterable[str]) -> str:
+def _lines(parts: Iterable[Html]) -> str:
     return "\n".join(part for part in parts if part)
 
 
