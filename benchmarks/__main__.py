@@ -1,11 +1,12 @@
 """`python -m benchmarks`: every benchmark that takes seconds; `benchmarks.memory` takes minutes and runs alone."""
 
-from benchmarks import bus, can, cycle_time, estimation, physics, rtu, startup, tls
+from benchmarks import bus, can, cycle_time, estimation, modbus_pieces, physics, rtu, startup, tls
 
 for name, benchmark in {
     "physics": physics.report,
     "estimation": estimation.report,
     "bus": bus.report,
+    "Modbus, piece by piece": modbus_pieces.report,
     "cycle": cycle_time.report,
     "can": can.report,
     "rtu": rtu.report,

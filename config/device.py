@@ -11,8 +11,8 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
-from pyModbusTCP.utils import valid_host
 
+from config.hosts import is_host
 from config.loading import Port, Schema
 from config.register_format import Format, WireType, WordOrder
 from config.serial_port import RtuUnit, SerialPort
@@ -194,7 +194,7 @@ SIMULATED_MAP = _simulated_map()
 
 
 def _host(host: str) -> str:
-    if not valid_host(host):
+    if not is_host(host):
         raise ValueError("must be a host name or an IP address")
     return host
 

@@ -8,14 +8,19 @@ import math
 import struct
 from abc import ABC, abstractmethod
 
-from pyModbusTCP.constants import EXP_TXT
+from pymodbus.constants import ExcCodes
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadInputRegistersRequest,
+    ReadWriteMultipleRegistersRequest,
+    WriteMultipleRegistersRequest,
+)
 
 from config.device import CommunicationAction, ModbusDevice, ModbusMap, Place
 from drivers.boundary import BadReply, Capabilities, Reading, Refused
+from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.layout import layout
-
-ILLEGAL_FUNCTION = 1
-ILLEGAL_VALUE = 3
+from fieldbus.modbus.pdu import encoded
 
 
 class ModbusDriver(ABC):
@@ -31,6 +36,7 @@ class ModbusDriver(ABC):
         self._who = who
         self._sample = _Sample(config.map)
         self._command = _Setting("command_pa", config.map.command_pa)
+        self._exchange_head = _exchange_head(self._sample, config.map.command_pa)
         self._one_transaction = self._sample.table == "holding"  # function 23 reads holding registers only
 
     @abstractmethod
@@ -92,7 +98,7 @@ class ModbusDriver(ABC):
             try:
                 return self._write_and_read(command_pa)
             except Refused as refusal:
-                if refusal.code != ILLEGAL_FUNCTION:
+                if refusal.code != ExcCodes.ILLEGAL_FUNCTION:
                     raise
                 self._one_transaction = False
         self.write(command_pa)
@@ -101,7 +107,7 @@ class ModbusDriver(ABC):
     def _held_command_pa(self) -> float:
         place = self._config.map.command_pa
         words = place.format.words
-        request = struct.pack(">BHH", 3, place.address, words)
+        request = encoded(ReadHoldingRegistersRequest(address=place.address, count=words))
         (raw,) = layout([place]).unpack(self._ask(request, bytes((3, 2 * words)), 2 + 2 * words))
         held_pa = place.value(raw)
         if not math.isfinite(held_pa):
@@ -121,18 +127,18 @@ class ModbusDriver(ABC):
 
     def _write_and_read(self, command_pa: float) -> Reading:
         sample, command = self._sample, self._command
-        request = sample.read_after + command.head + self._data(command, command_pa)
+        request = self._exchange_head + self._data(command, command_pa)
         return self._reading(self._ask(request, sample.head_after, sample.length))
 
     def _tell(self, setting: "_Setting", value: float) -> None:
-        request = b"\x10" + setting.head + self._data(setting, value)
+        request = setting.head + self._data(setting, value)
         self._ask(request, request[:5], 5)
 
     def _data(self, setting: "_Setting", value: float) -> bytes:
         try:
             return setting.data(value)
         except ValueError as error:
-            raise Refused(f"{self._who}: {setting.name} not sent: {error}", ILLEGAL_VALUE) from None
+            raise Refused(f"{self._who}: {setting.name} not sent: {error}", ExcCodes.ILLEGAL_VALUE) from None
 
     def _reading(self, data: bytes) -> Reading:
         values = self._sample.values(data)
@@ -147,8 +153,7 @@ class ModbusDriver(ABC):
 
     def _refused(self, request: bytes, code: int) -> Refused:
         """Return what an exception of the device means."""
-        reason = EXP_TXT.get(code, "not in the specification")
-        return Refused(f"{self._about(request)}: exception {code}, {reason}", code)
+        return Refused(f"{self._about(request)}: {exception_text(code)}", code)
 
     def _about(self, request: bytes) -> str:
         """Say who was asked what."""
@@ -164,12 +169,11 @@ class _Sample:
         self._is_plain = all(place.is_plain for place in self._places)
         self.names = list(registers.sampled)
         self.table = registers.position_m.table
-        where = (self._layout.address, self._layout.words)
-        size = 2 * self._layout.words
-        function = 3 if self.table == "holding" else 4
-        self.length = 2 + size
-        self.read, self.head = struct.pack(">BHH", function, *where), bytes((function, size))
-        self.read_after, self.head_after = struct.pack(">BHH", 23, *where), bytes((23, size))
+        self.address, self.count = address, count = self._layout.address, self._layout.words
+        read = ReadHoldingRegistersRequest if self.table == "holding" else ReadInputRegistersRequest
+        self.length = 2 + 2 * count
+        self.read, self.head = encoded(read(address=address, count=count)), bytes((read.function_code, 2 * count))
+        self.head_after = bytes((ReadWriteMultipleRegistersRequest.function_code, 2 * count))
 
     def values(self, data: bytes) -> list[float]:
         """Return the quantities, in the order of `names`."""
@@ -198,7 +202,9 @@ class _Setting:
         self.name = name
         self._place = place
         self._layout = layout([place])
-        self.head = struct.pack(">HHB", place.address, self._layout.words, 2 * self._layout.words)
+        nothing = [0] * self._layout.words
+        self.head = encoded(WriteMultipleRegistersRequest(address=place.address, registers=nothing))[:6]
+        """The request up to its registers."""
 
     def data(self, value: float) -> bytes:
         """Return the registers that say a value.
@@ -207,6 +213,12 @@ class _Setting:
             ValueError: it is not a finite number, or they cannot hold it.
         """
         return self._layout.pack((self._place.raw(value),))
+
+
+def _exchange_head(sample: _Sample, command: Place) -> bytes:
+    """Return the request of function 23 that writes a command and reads a sample, up to its registers."""
+    nothing = [0] * command.format.words
+    return encoded(ReadWriteMultipleRegistersRequest(sample.address, sample.count, command.address, nothing))[:10]
 
 
 def _question(request: bytes) -> str:

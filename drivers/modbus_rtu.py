@@ -12,10 +12,10 @@ import time
 from config.device import ModbusRtuDevice
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply
 from drivers.modbus_device import ModbusDriver
+from fieldbus.modbus.exception_codes import EXCEPTION
 from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
 
-EXCEPTION = 0x80
 EXCEPTION_FRAME = 5
 ROUND_FRAME = 3
 """Bytes of a frame round its PDU: unit and check sum."""

@@ -13,7 +13,7 @@ from config.device import MOST_REGISTERS
 from config.errors import InputError, Unfulfilled
 from config.registers import Register, register_named
 from config.tls_table import Tls
-from fieldbus.modbus.client import modbus_client, reason
+from fieldbus.modbus.client import ClientError, ModbusClient, NobodyThere, NotConnected, Refused
 
 POLL_S = 0.05
 CYCLES_WRAP = 1 << 32
@@ -41,12 +41,15 @@ class Dcs:
 
     def __init__(self, host: str, port: int, unit: int = 1, timeout_s: float = 2.0, tls: Tls | None = None) -> None:
         self._where = f"{host}:{port}"
-        self._client = modbus_client(host, port, unit, timeout_s, tls)
+        self._client = ModbusClient(host, port, unit, timeout_s, tls)
 
     def __enter__(self) -> Self:
-        if not self._client.open():
-            nobody = "no daemon answers there (is `positioner run` running?)"
-            raise DcsError(f"{self._where}: {reason(self._client) or nobody}")
+        try:
+            self._client.open()
+        except NobodyThere:
+            raise DcsError(f"{self._where}: no daemon answers there (is `positioner run` running?)") from None
+        except NotConnected as error:
+            raise DcsError(f"{self._where}: {error}") from None
         return self
 
     def __exit__(
@@ -99,9 +102,11 @@ class Dcs:
             run = _neighbours(registers)
             registers = registers[len(run) :]
             words = [word for each in run for word in each.format.encode(values[each.name])]
-            if not self._client.write_multiple_registers(run[0].address, words):
+            try:
+                self._client.write_registers(run[0].address, words)
+            except ClientError as error:
                 asked = ", ".join(f"{each.name} = {values[each.name]:g}" for each in run)
-                raise DcsError(f"{self._where}: {asked} was refused: {self._reason()}")
+                raise DcsError(f"{self._where}: {asked} was refused: {_in_words(error)}") from None
 
     def identify(
         self, excitation: Mapping[str, float], timeout_s: float, show: Callable[[float], None] = lambda _: None
@@ -149,19 +154,15 @@ class Dcs:
         return f"no valid estimates within {timeout_s:g} s"
 
     def _read(self, start: int, end: int) -> list[int]:
-        words = self._client.read_holding_registers(start, end - start)
-        if words is None:
-            raise DcsError(f"{self._where}: registers {start} to {end - 1} cannot be read: {self._reason()}")
-        return list(words)
+        try:
+            return self._client.read_holding_registers(start, end - start)
+        except ClientError as error:
+            which = f"registers {start} to {end - 1}"
+            raise DcsError(f"{self._where}: {which} cannot be read: {_in_words(error)}") from None
 
     @staticmethod
     def _decoded(register: Register, words: list[int], start: int) -> float:
         return register.format.decode(words[register.address - start : register.end - start])
-
-    def _reason(self) -> str:
-        if self._client.last_except:
-            return f"exception {self._client.last_except}, {self._client.last_except_as_txt.lower()} (see its log)"
-        return reason(self._client) or str(self._client.last_error_as_txt)
 
 
 def _neighbours(registers: Sequence[Register]) -> list[Register]:
@@ -176,3 +177,7 @@ def _neighbours(registers: Sequence[Register]) -> list[Register]:
 
 def _plain(code: Fault | InhibitReason) -> str:
     return code.name.lower().replace("_", " ")
+
+
+def _in_words(error: ClientError) -> str:
+    return f"{error} (see its log)" if isinstance(error, Refused) else str(error)

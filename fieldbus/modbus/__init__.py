@@ -1,4 +1,5 @@
-"""Modbus, both ends: `server` and `connection` answer, `client` asks, `rtu` and `serial_line` are the serial line.
+"""Modbus, both ends, on pymodbus: `server`, `connection` and `register_answers` answer, `client` asks.
 
-`layout` packs values into registers, `tls` is Modbus/TCP Security.
+`pdu` and `exception_codes` are what frames carry, `rtu` and `serial_line` the serial line, `layout` packs values into
+registers, `tls` is Modbus/TCP Security. What is pymodbus's and what is ours: docs/decisions/0012-pymodbus.md.
 """

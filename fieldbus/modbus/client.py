@@ -1,120 +1,220 @@
-"""pyModbusTCP's client, on TLS where that is asked for: of the driver and of the small DCS."""
+"""A Modbus TCP client, on TLS where that is asked for: of the driver and of the small DCS.
+
+pymodbus makes and reads frames and PDUs. The connection is a socket of ours: a reply must be whole within one time-out,
+in however many pieces it comes, and a secured server's certificate must be that of the host called. Checked here:
+transaction, protocol, length and unit. After anything but a whole reply to the request the connection is closed, so
+that no late reply is ever read.
+
+Source: MODBUS Messaging on TCP/IP Implementation Guide V1.0b, sections 3.1.3 (header) and 4.3.2 (transactions).
+"""
 
 import socket
 import ssl
 import time
+from collections.abc import Sequence
 
-from pyModbusTCP.client import ModbusClient
-from pyModbusTCP.constants import MB_CONNECT_ERR, MB_RECV_ERR, MB_TIMEOUT_ERR
+from pymodbus.framer import FramerSocket
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadHoldingRegistersResponse,
+    WriteMultipleRegistersRequest,
+    WriteMultipleRegistersResponse,
+)
 
 from config.tls_table import Tls
-from fieldbus.modbus.tls import client_context, why
+from fieldbus.modbus.exception_codes import exception_code, exception_text
+from fieldbus.modbus.pdu import encoded
+from fieldbus.modbus.tls import client_context, failure_reason
 
 CHUNK = 512
 """More than a frame has."""
+LAST_TRANSACTION = 0xFFFF
+LENGTH_ENDS = 6
+"""Bytes of a frame up to its length, which counts those behind it."""
+CLOSED = "the connection is closed"
+
+_FRAMER = FramerSocket(DecodePDU(is_server=False))
 
 
-def modbus_client(host: str, port: int, unit: int, timeout_s: float, tls: Tls | None) -> ModbusClient:
-    """Return a client, not yet open.
+class ClientError(Exception):
+    """No reply to a request; the text says why, in words."""
+
+
+class NotConnected(ClientError):
+    """The server was not reached, or the connection has ended."""
+
+
+class NobodyThere(NotConnected):
+    """Nobody accepts a connection at the address."""
+
+
+class ReplyTimeout(ClientError):
+    """No whole reply came within the time-out."""
+
+
+class UnexpectedReply(ClientError):
+    """What came is no reply to the request."""
+
+    def __init__(self, frame: bytes) -> None:
+        super().__init__(f"the reply does not fit: {frame.hex(' ')}")
+
+
+class Refused(ClientError):
+    """The server refuses the request with an exception."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(exception_text(code))
+        self.code = code
+
+
+class ModbusClient:
+    """A connection to a Modbus TCP server, closed until `open`.
+
+    Args:
+        host: name or address of the server.
+        port: its TCP port.
+        unit: the unit that is asked, 0 to 255.
+        timeout_s: for connecting, and for the whole of each reply.
+        tls: certificates; None talks in the clear.
 
     Raises:
         InputError: a file of `tls` that is not there or does not fit.
     """
-    if tls is None:
-        return PlainClient(host, port, unit, timeout=timeout_s, auto_open=False)
-    return SecuredClient(host, port, unit, timeout_s, client_context(tls), tls.handshake_timeout_s)
 
+    def __init__(self, host: str, port: int, unit: int, timeout_s: float, tls: Tls | None = None) -> None:
+        self._address = (host, port)
+        self._unit = unit
+        self._timeout_s = timeout_s
+        self._context = None if tls is None else client_context(tls)
+        self._handshake_timeout_s = 0.0 if tls is None else tls.handshake_timeout_s
+        self._socket: socket.socket | None = None
+        self._received = b""
+        self._transaction = 0
 
-def reason(client: ModbusClient) -> str:
-    """Return why TLS failed in the last call; "" without TLS, or when it did not."""
-    return client.problem if isinstance(client, SecuredClient) else ""
+    def open(self) -> None:
+        """Connect (anew).
 
-
-class PlainClient(ModbusClient):  # type: ignore[misc]  # the library has no types
-    """The library's client, with a time-out for the whole of a reply: its own is for each piece of one.
-
-    A reply is mostly there whole at the first look, which then is the only one. What comes behind it is left for the
-    next, where it does not fit.
-    """
-
-    _sock: socket.socket
-    _stream = b""
-    _due_s = 0.0
-    _looked = _hurried = False
-
-    def _open(self) -> None:
-        self._stream, self._hurried = b"", False
-        super()._open()
-
-    def _send_pdu(self, pdu: bytes) -> None:
-        if self._hurried and self.is_open:
-            self._sock.settimeout(self.timeout)
-            self._hurried = False
-        super()._send_pdu(pdu)
-        self._due_s, self._looked = time.monotonic() + self.timeout, False
-
-    def _recv_all(self, size: int) -> bytes:
-        while len(self._stream) < size:
-            self._stream += self._more()
-        data, self._stream = self._stream[:size], self._stream[size:]
-        return data
-
-    def _more(self) -> bytes:
-        """Return what has come; the first look for a reply has all of the time-out, each other what is left of it."""
-        if self._looked:
-            rest_s = self._due_s - time.monotonic()
-            if rest_s <= 0:
-                self._sock.close()
-                raise ModbusClient._NetworkError(MB_TIMEOUT_ERR, "timeout error")
-            self._sock.settimeout(rest_s)
-            self._hurried = True
-        self._looked = True
-        data: bytes = self._recv(CHUNK)
-        return data
-
-
-class SecuredClient(PlainClient):
-    """The same client on TLS; `problem` says why TLS failed in the last call.
-
-    With TLS 1.3 a server refuses the client's certificate only after the handshake: it shows at the first reply.
-    """
-
-    def __init__(
-        self, host: str, port: int, unit: int, timeout_s: float, context: ssl.SSLContext, handshake_timeout_s: float
-    ) -> None:
-        super().__init__(host, port, unit, timeout=timeout_s, auto_open=False)
-        self.problem = ""
-        self._context = context
-        self._handshake_timeout_s = handshake_timeout_s
-
-    def _open(self) -> None:
-        super()._open()
-        plain: socket.socket = self._sock
-        # Or the first request would wait 40 ms for the server to acknowledge the end of the handshake.
+        Raises:
+            NotConnected: the name is not known, nobody accepts, or TLS failed.
+        """
+        self.close()
+        self._received = b""
+        try:
+            plain = socket.create_connection(self._address, self._timeout_s)
+        except socket.gaierror as error:
+            raise NotConnected(error.strerror) from None
+        except OSError:
+            raise NobodyThere(f"nobody accepts a connection within {1e3 * self._timeout_s:g} ms") from None
         plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket = plain if self._context is None else self._secured(plain, self._context)
+
+    def close(self) -> None:
+        """End the connection. Never raises."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def transact(self, pdu: bytes) -> bytes:
+        """Return the PDU that answers a request's.
+
+        Raises:
+            NotConnected: the connection is, or was, closed.
+            ReplyTimeout: no whole reply within the time-out.
+            UnexpectedReply: of another transaction, protocol or unit, or no frame.
+        """
+        line = self._socket
+        if line is None:
+            raise NotConnected(CLOSED)
+        self._transaction = transaction = self._transaction % LAST_TRANSACTION + 1
+        try:
+            line.sendall(_FRAMER.encode(pdu, self._unit, transaction))
+            return self._reply(line, transaction)
+        except TimeoutError:
+            self.close()
+            raise ReplyTimeout(f"no reply within {1e3 * self._timeout_s:g} ms") from None
+        except OSError as error:
+            self.close()
+            raise NotConnected(failure_reason(error) if isinstance(error, ssl.SSLError) else CLOSED) from None
+        except UnexpectedReply:
+            self.close()
+            raise
+
+    def read_holding_registers(self, address: int, count: int) -> list[int]:
+        """Return `count` words (function 3).
+
+        Raises:
+            ClientError: as `transact`; `Refused` where the server does.
+        """
+        reply = self._answer(ReadHoldingRegistersRequest(address=address, count=count), 2 + 2 * count)
+        answer = ReadHoldingRegistersResponse()
+        answer.decode(reply[1:])
+        return list(answer.registers)
+
+    def write_registers(self, address: int, words: Sequence[int]) -> None:
+        """Write words (function 16).
+
+        Raises:
+            ClientError: as `transact`; `Refused` where the server does.
+        """
+        reply = self._answer(WriteMultipleRegistersRequest(address=address, registers=words), 5)
+        echo = WriteMultipleRegistersResponse()
+        echo.decode(reply[1:])
+        if (echo.address, echo.count) != (address, len(words)):
+            raise self._unexpected(reply)
+
+    def _answer(self, request: ModbusPDU, size: int) -> bytes:
+        """Return the PDU that answers a request, of its function and a size in bytes."""
+        asked = encoded(request)
+        reply = self.transact(asked)
+        if (code := exception_code(asked, reply)) is not None:
+            raise Refused(code)
+        if len(reply) != size or reply[0] != request.function_code:
+            raise self._unexpected(reply)
+        return reply
+
+    def _unexpected(self, reply: bytes) -> UnexpectedReply:
+        self.close()
+        return UnexpectedReply(reply)
+
+    def _reply(self, line: socket.socket, transaction: int) -> bytes:
+        """Return the PDU of the next frame, which must be the reply to a transaction."""
+        due_s = time.monotonic() + self._timeout_s
+        stream = self._received or _some(line)
+        in_pieces = False
+        while True:
+            if stream[2:5].strip(b"\0"):  # another protocol, or longer than a frame
+                raise UnexpectedReply(stream)
+            used, unit, answered, pdu = _FRAMER.decode(stream)
+            if used:
+                break
+            if b"\0\0" <= stream[4:6] < b"\0\2":  # no frame is that short; pymodbus would wait for more
+                raise UnexpectedReply(stream)
+            in_pieces = True
+            if (left_s := due_s - time.monotonic()) <= 0:
+                raise TimeoutError
+            line.settimeout(left_s)
+            stream += _some(line)
+        if in_pieces:
+            line.settimeout(self._timeout_s)
+        if answered != transaction or unit != self._unit or used != LENGTH_ENDS + stream[LENGTH_ENDS - 1]:
+            raise UnexpectedReply(stream)
+        self._received = stream[used:]
+        return pdu
+
+    def _secured(self, plain: socket.socket, context: ssl.SSLContext) -> ssl.SSLSocket:
         plain.settimeout(self._handshake_timeout_s)
         try:
-            self._sock = self._context.wrap_socket(plain, server_hostname=self.host)
+            secured = context.wrap_socket(plain, server_hostname=self._address[0])
         except OSError as error:
             plain.close()
-            self.problem = why(error)
-            raise ModbusClient._NetworkError(MB_CONNECT_ERR, self.problem) from None
-        self._sock.settimeout(self.timeout)
+            raise NotConnected(failure_reason(error)) from None
+        secured.settimeout(self._timeout_s)
+        return secured
 
-    def _req_init(self) -> None:
-        super()._req_init()
-        self.problem = ""
 
-    def _recv(self, size: int) -> bytes:
-        try:
-            data: bytes = self._sock.recv(size)
-        except TimeoutError:
-            self._sock.close()
-            raise ModbusClient._NetworkError(MB_TIMEOUT_ERR, "timeout error") from None
-        except OSError as error:
-            self.problem = why(error)
-            data = b""
-        if not data:
-            self._sock.close()
-            raise ModbusClient._NetworkError(MB_RECV_ERR, "recv error")
-        return data
+def _some(line: socket.socket) -> bytes:
+    data = line.recv(CHUNK)
+    if not data:
+        raise ConnectionResetError
+    return data

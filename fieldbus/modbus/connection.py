@@ -32,11 +32,11 @@ class Host(Protocol):
         """Return the PDU that answers one."""
         ...
 
-    def is_used(self, peer: str) -> None:
+    def note_use(self, peer: str) -> None:
         """Take note that a client has asked for something (or has just come)."""
         ...
 
-    def is_gone(self, peer: str) -> None:
+    def note_end(self, peer: str) -> None:
         """Take note that a client has gone."""
         ...
 
@@ -49,15 +49,15 @@ class Connection(BaseRequestHandler):
 
     def handle(self) -> None:
         """Answer the client's requests."""
-        peer = place(self.client_address)
+        peer = endpoint(self.client_address)
         self.request.settimeout(SEND_TIMEOUT_S)
-        self.server.is_used(peer)
+        self.server.note_use(peer)
         with suppress(OSError):  # it is gone, or does not read
             for transaction, unit, pdu in self._requests():
-                self.server.is_used(peer)
+                self.server.note_use(peer)
                 answer = self.server.answer(unit, pdu, peer)
                 self.request.sendall(HEADER.pack(transaction, 0, len(answer) + 1, unit) + answer)
-        self.server.is_gone(peer)
+        self.server.note_end(peer)
 
     def _requests(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield transaction, unit and PDU of each frame, until the client has no more to say or makes no sense."""
@@ -82,11 +82,13 @@ class Connection(BaseRequestHandler):
     def _more(self) -> bytes:
         """Return what comes next; b"" when the client has no more to say."""
         while True:
-            with suppress(TimeoutError):  # that one is for sending: a client may be silent for as long as it likes
+            try:
                 return self.request.recv(CHUNK)
+            except TimeoutError:  # that one is for sending: a client may be silent for as long as it likes
+                continue
 
 
-def place(address: tuple[object, ...]) -> str:
+def endpoint(address: tuple[object, ...]) -> str:
     """Return `host:port` of a socket's address, an IPv6 host in brackets."""
     host, port, *_ = address
     return f"[{host}]:{port}" if ":" in str(host) else f"{host}:{port}"

@@ -48,8 +48,8 @@ def client_context(tls: Tls) -> ssl.SSLContext:
     return _context(tls, ssl.PROTOCOL_TLS_CLIENT)
 
 
-def why(error: OSError) -> str:
-    """Say in a few words why a handshake or a secured connection failed."""
+def failure_reason(error: OSError) -> str:
+    """Return in a few words why a handshake or a secured connection failed."""
     if isinstance(error, ssl.SSLCertVerificationError):
         return f"its certificate is not accepted: {error.verify_message.rstrip('.')}"
     if isinstance(error, TimeoutError):
@@ -77,6 +77,10 @@ def expiry(tls: Tls) -> datetime:
     )
 
 
+class NotAuthorized(Exception):
+    """A request that the client's role does not permit; the text says which role does."""
+
+
 class Guard:
     """A server's side: handshakes, and what each client may do.
 
@@ -96,15 +100,15 @@ class Guard:
         self._timeout_s = tls.handshake_timeout_s
         self._writers = writers
 
-    def wrapped(self, connection: socket.socket) -> ssl.SSLSocket:
-        """Take over an accepted connection, for `shaken`."""
+    def wrap(self, connection: socket.socket) -> ssl.SSLSocket:
+        """Return an accepted connection as a TLS socket, before its `handshake`."""
         return self._context.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
 
-    def shaken(self, connection: ssl.SSLSocket) -> Identity:
-        """Shake hands and return who the client is. Blocks its thread for the handshake time-out at most.
+    def handshake(self, connection: ssl.SSLSocket) -> Identity:
+        """Do the TLS handshake and return who the client is. Blocks its thread for the handshake time-out at most.
 
         Raises:
-            OSError: no handshake; `why` says why.
+            OSError: no handshake; `failure_reason` puts it in words.
         """
         connection.settimeout(self._timeout_s)
         connection.do_handshake()
@@ -112,13 +116,16 @@ class Guard:
         assert certificate is not None  # CERT_REQUIRED
         return identity_in(certificate)
 
-    def objection(self, identity: Identity, pdu: bytes) -> str | None:
-        """Return why a request is not this client's to make, or None."""
-        first, count = _written(pdu)
+    def authorize(self, identity: Identity, pdu: bytes) -> None:
+        """Check that a client's role permits a request (MODBUS/TCP Security Protocol Specification, section 8.3).
+
+        Raises:
+            NotAuthorized: it needs a higher role, that of the highest register written.
+        """
+        first, count = _written_range(pdu)
         needed = max((self._writers(address) for address in range(first, first + count)), default=Role.OBSERVER)
-        if identity.role >= needed:
-            return None
-        return f"function {pdu[0]} needs the role {needed.name.lower()}"
+        if identity.role < needed:
+            raise NotAuthorized(f"function {pdu[0]} needs the role {needed.name.lower()}")
 
 
 def identity_in(certificate: bytes) -> Identity:
@@ -144,7 +151,7 @@ def _role(value: bytes) -> Role:
     return next((role for role in Role if role and role_extension(role) == value), Role.NONE)
 
 
-def _written(pdu: bytes) -> tuple[int, int]:
+def _written_range(pdu: bytes) -> tuple[int, int]:
     """Return first address and number of the registers that a request writes; 0 of them for all else."""
     if pdu[0] == 6 and len(pdu) >= 3:
         return int.from_bytes(pdu[1:3]), 1

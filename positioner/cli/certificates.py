@@ -27,15 +27,14 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a host name that is none; a folder that is not empty, or cannot be written.
     """
-    from pyModbusTCP.utils import valid_host
-
     from config.errors import InputError
+    from config.hosts import is_host
     from config.roles import Role
     from positioner.cli.parts.authority import Authority, Owner
 
     hosts = tuple(arguments.host or HERE)
     for host in hosts:
-        if not valid_host(host):
+        if not is_host(host):
             raise InputError("--host", f"must be a host name or an IP address, got {host!r}")
     owners = {
         Owner("device", hosts): "the device: [bus.tls] of a simulated one",

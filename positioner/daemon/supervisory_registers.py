@@ -17,6 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 
+from pymodbus.constants import ExcCodes
+
 from config.codes import Fault, Mode
 from config.registers import (
     BY_NAME,
@@ -29,7 +31,7 @@ from config.registers import (
     WORD_TEST,
     Register,
 )
-from fieldbus.modbus.server import ExceptionCode, RegisterError, Table
+from fieldbus.modbus.register_answers import RegisterError, Table
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, ne107_condition
@@ -66,7 +68,7 @@ class SupervisoryRegisters:
             RegisterError: ILLEGAL_ADDRESS, beyond the map.
         """
         if address + count > SIZE:
-            raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+            raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
         snapshot, requests = self._cycle.snapshot, self._cycle.requests
         words = [0] * count
         for register in dict.fromkeys(AT[each] for each in range(address, address + count) if each in AT):
@@ -109,15 +111,15 @@ class SupervisoryRegisters:
             register = AT.get(at)
             if register is None or register.access == "r":
                 raise WriteRejected(
-                    ExceptionCode.ILLEGAL_ADDRESS, f"{register.name if register else at}: nothing to write there"
+                    ExcCodes.ILLEGAL_ADDRESS, f"{register.name if register else at}: nothing to write there"
                 )
             if register.address != at or register.end > end:
                 raise WriteRejected(
-                    ExceptionCode.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words"
+                    ExcCodes.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words"
                 )
             value = register.format.decode(words[at - address : register.end - address])
             if problem := register.problem_with(value):
-                raise WriteRejected(ExceptionCode.ILLEGAL_VALUE, problem)
+                raise WriteRejected(ExcCodes.ILLEGAL_VALUE, problem)
             values[register.name] = value
             at = register.end
         return values
@@ -163,30 +165,30 @@ class SupervisoryRegisters:
         scaled = values.get("reference_scaled", math.nan) / SCALE
         reference = values.get("reference", scaled)
         if abs(reference - scaled) > 1 / SCALE:
-            raise WriteRejected(ExceptionCode.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
+            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "reference and reference_scaled disagree in one request")
         return reference * self._stroke_m
 
     def _mode(self, value: float) -> Mode:
         mode, fault = Mode(int(value)), self._cycle.snapshot.decision.fault
         if mode is not Mode.HOLD and fault is not Fault.NONE:
-            raise WriteRejected(ExceptionCode.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
+            raise WriteRejected(ExcCodes.DEVICE_BUSY, f"mode: fault {fault.name} is latched, acknowledge it first")
         return mode
 
     def _require_friction(self) -> None:
         if self._cycle.snapshot.decision.applied.ratios is None:
-            raise WriteRejected(ExceptionCode.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
+            raise WriteRejected(ExcCodes.DEVICE_BUSY, "health_baseline: no friction has been identified yet")
 
     def _manual_pa(self, value: float) -> float:
         if not self._minimum_pa <= value <= self._maximum_pa:
             allowed = f"{self._minimum_pa:g} to {self._maximum_pa:g} Pa"
-            raise WriteRejected(ExceptionCode.ILLEGAL_VALUE, f"manual_pressure: allowed is {allowed}, got {value:g}")
+            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, f"manual_pressure: allowed is {allowed}, got {value:g}")
         return value
 
 
 class WriteRejected(Exception):
     """A write that is not taken: the Modbus exception that answers it, and the reason for the log."""
 
-    def __init__(self, code: ExceptionCode, reason: str) -> None:
+    def __init__(self, code: ExcCodes, reason: str) -> None:
         self.code = code
         self.reason = reason
 

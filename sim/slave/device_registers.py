@@ -9,9 +9,11 @@ import struct
 from collections.abc import Sequence
 from operator import attrgetter
 
+from pymodbus.constants import ExcCodes
+
 from config.device import SIMULATED_MAP, WRITABLE, CommunicationAction, ModbusMap
 from fieldbus.modbus.layout import layout
-from fieldbus.modbus.server import ExceptionCode, RegisterError, Table
+from fieldbus.modbus.register_answers import RegisterError, Table
 from sim.slave.clocks import Clock
 from sim.slave.simulated_device import Device
 
@@ -42,7 +44,7 @@ class DeviceRegisters:
         """
         first = address - self._layout.address
         if not 0 <= first <= first + count <= self._layout.words:
-            raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+            raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
         self._clock.catch_up()
         raw = [place.raw(value) for place, value in zip(self._places, self._values(self._device), strict=True)]
         return self._words.unpack(self._layout.pack(raw))[first : first + count]
@@ -66,18 +68,18 @@ class DeviceRegisters:
             if "command_pa" in written:
                 self._clock.command(written["command_pa"])
         except ValueError:
-            raise RegisterError(ExceptionCode.ILLEGAL_VALUE) from None
+            raise RegisterError(ExcCodes.ILLEGAL_VALUE) from None
 
     def _quantities(self, address: int, words: Sequence[int]) -> dict[str, float]:
         """Return the values written, by name."""
         values, at = {}, 0
         while at < len(words):
             if address + at not in self._writable:
-                raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+                raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
             name, place = self._writable[address + at]
             end = at + place.format.words
             if end > len(words):
-                raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+                raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
             values[name] = place.value(place.format.decode(words[at:end]))
             at = end
         return values

@@ -11,9 +11,9 @@ from threading import Event, Thread
 
 from config.errors import InputError
 from config.serial_port import SerialPort
+from fieldbus.modbus.register_answers import RegisterAnswers, Registers
 from fieldbus.modbus.rtu import BROADCAST, ECHO, LARGEST_FRAME, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
-from fieldbus.modbus.server import RegisterAnswers, Registers
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ class RtuServer(RegisterAnswers):
         """Listen, and answer from a thread of its own.
 
         Raises:
-            InputError: the line cannot be had.
+            InputError: the line cannot be opened.
         """
         try:
             self._line.open()

@@ -30,7 +30,7 @@ def slave_of(path: Path, port: int | None = None) -> Slave:
         port: another TCP port, or channel of the loopback CAN bus, than the file's; 0 takes any free one.
 
     Raises:
-        InputError: a fault in the slave file or its valve file, or the bus cannot be had.
+        InputError: a fault in the slave file or its valve file, or the bus cannot be opened.
     """
     bus = load_slave(path).bus
     if isinstance(bus, CanopenBus):

@@ -69,7 +69,7 @@ def test_help_needs_nothing_but_the_standard_library() -> None:
         text=True,
         check=True,
     ).stdout.split()
-    assert not {"numpy", "numba", "pydantic", "pyModbusTCP", "scipy", "sim", "matplotlib"} & set(loaded)
+    assert not {"numpy", "numba", "pydantic", "pymodbus", "scipy", "sim", "matplotlib"} & set(loaded)
 
 
 def test_a_gateway_without_the_model_side_is_told_what_is_missing(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -12,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from pymodbus.client import ModbusTcpClient
 
 from config.codes import Fault, Mode
 from config.device import ModbusTcpDevice
@@ -21,6 +21,7 @@ from config.registers import BY_NAME
 from drivers import driver_for
 from positioner.cli.parts.children import port_in, running
 from positioner.dcs import Dcs
+from tests.independent import independent_client, refused_with
 
 pytestmark = pytest.mark.real_time
 
@@ -81,23 +82,21 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 
 def test_an_independent_client_reads_and_writes_the_registers_as_the_map_says(shared: Site) -> None:
-    client = ModbusTcpClient("127.0.0.1", port=shared.port)
-    assert client.connect()  # type: ignore[no-untyped-call]
-    try:
-        float_test, long_test = BY_NAME["float_test"], BY_NAME["long_test"]
-        words = client.read_input_registers(float_test.address, count=2).registers
-        assert client.convert_from_registers(words, client.DATATYPE.FLOAT32) == 1234.5
-        words = client.read_holding_registers(long_test.address, count=2).registers
-        assert client.convert_from_registers(words, client.DATATYPE.UINT32) == 0x12345678
-        words = client.convert_to_registers(0.25, client.DATATYPE.FLOAT32)
-        assert not client.write_registers(BY_NAME["reference"].address, words).isError()
-        assert client.read_holding_registers(0, count=3).registers == [*words, 2500]
+    with independent_client(shared.port) as client:
+        assert client.read_input(BY_NAME["float_test"].address, 2) == words_of(">f", 1234.5)
+        assert client.read_holding(BY_NAME["long_test"].address, 2) == [0x1234, 0x5678]
+        words = words_of(">f", 0.25)
+        client.write(BY_NAME["reference"].address, words)
+        assert client.read_holding(0, 3) == [*words, 2500]
         for bad in (float("nan"), 1.5, -0.1):
-            refused = client.write_registers(0, client.convert_to_registers(bad, client.DATATYPE.FLOAT32))
-            assert (refused.isError(), refused.exception_code) == (True, 3)
-        assert client.read_holding_registers(0, count=2).registers == words, "nothing changed"
-    finally:
-        client.close()  # type: ignore[no-untyped-call]
+            with refused_with(3):
+                client.write(0, words_of(">f", bad))
+        assert client.read_holding(0, 2) == words, "nothing changed"
+
+
+def words_of(layout: str, value: float) -> list[int]:
+    packed = struct.pack(layout, value)
+    return list(struct.unpack(f">{len(packed) // 2}H", packed))
 
 
 def test_it_holds_the_pressure_it_found_and_moves_only_when_told(shared: Site) -> None:

@@ -1,6 +1,9 @@
 """Slave and daemon as processes with Modbus/TCP Security on both sides; `certificates`, and `get`, `set` with roles."""
 
 import json
+import socket
+import ssl
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -8,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from pymodbus.client import ModbusTlsClient
+from modbus_tk.modbus_tcp import TcpQuery
 
 from config.codes import Mode
 from config.daemon_file import load_daemon
@@ -16,7 +19,6 @@ from config.errors import Unfulfilled
 from config.registers import BY_NAME
 from config.roles import Role
 from config.tls_table import Tls
-from fieldbus.modbus.tls import client_context
 from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.authority import Authority, Owner
@@ -132,17 +134,23 @@ def test_get_and_set_move_the_valve_with_the_certificates_of_the_command(
 
 
 def test_an_independent_client_gets_in_by_the_same_certificates(site: Site) -> None:
-    context = client_context(site.tls("observer"))
-    context.check_hostname = False  # this client cannot
-    client = ModbusTlsClient("127.0.0.1", port=site.port, sslctx=context)
-    assert client.connect()  # type: ignore[no-untyped-call]
-    try:
-        words = client.read_input_registers(BY_NAME["float_test"].address, count=2).registers
-        assert client.convert_from_registers(words, client.DATATYPE.FLOAT32) == 1234.5
-        refused = client.write_registers(0, [0, 0])
-        assert (refused.isError(), refused.exception_code) == (True, 1)
-    finally:
-        client.close()  # type: ignore[no-untyped-call]
+    """TLS by the standard library alone, frames by modbus-tk."""
+    context = ssl.create_default_context(cafile=site.tls("observer").authority)
+    context.load_cert_chain(site.tls("observer").certificate, site.tls("observer").key)
+    with (
+        socket.create_connection(("127.0.0.1", site.port), timeout=20) as plain,
+        context.wrap_socket(plain, server_hostname="127.0.0.1") as line,
+    ):
+
+        def ask(pdu: bytes) -> bytes:
+            query = TcpQuery()
+            line.sendall(query.build_request(pdu, 1))
+            answer: bytes = query.parse_response(line.recv(260))
+            return answer
+
+        read = struct.pack(">BHH", 4, BY_NAME["float_test"].address, 2)
+        assert ask(read) == b"\4\4" + struct.pack(">f", 1234.5)
+        assert ask(struct.pack(">BHHBHH", 16, 0, 2, 4, 0, 0)) == b"\x90\1"
 
 
 def test_handshakes_and_refused_clients_do_not_touch_the_cycle(site: Site) -> None:

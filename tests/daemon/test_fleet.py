@@ -20,8 +20,9 @@ from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers import driver_for
 from drivers.boundary import Capabilities, NoConnection, NoReply, Reading
+from fieldbus.modbus.register_answers import RegisterAnswers
 from fieldbus.modbus.rtu import ECHO, framed, is_whole
-from fieldbus.modbus.server import RegisterAnswers, RegisterServer
+from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in, running
 from positioner.control.controller import Controller

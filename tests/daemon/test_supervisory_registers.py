@@ -4,6 +4,7 @@ import logging
 import math
 
 import pytest
+from pymodbus.constants import ExcCodes
 
 from config.codes import Fault
 from config.daemon_file import DaemonFile
@@ -11,7 +12,8 @@ from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers.boundary import Capabilities, NoConnection, Reading
-from fieldbus.modbus.server import ExceptionCode, RegisterError, RegisterServer
+from fieldbus.modbus.register_answers import RegisterError
+from fieldbus.modbus.server import RegisterServer
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
@@ -51,7 +53,7 @@ def panel() -> Panel:
     return Panel()
 
 
-def refused(panel: Panel, name: str, value: float) -> ExceptionCode:
+def refused(panel: Panel, name: str, value: float) -> ExcCodes:
     before = panel.cycle.requests
     with pytest.raises(RegisterError) as caught:
         panel.set(name, value)
@@ -130,12 +132,12 @@ def test_one_request_may_give_all_commands(panel: Panel) -> None:
     ],
 )
 def test_a_value_outside_its_range_is_an_illegal_value(panel: Panel, name: str, value: float) -> None:
-    assert refused(panel, name, value) is ExceptionCode.ILLEGAL_VALUE
+    assert refused(panel, name, value) is ExcCodes.ILLEGAL_VALUE
 
 
 @pytest.mark.parametrize("name", ["state", "position", "a_e", "cycles", "word_test"])
 def test_what_is_measured_cannot_be_written(panel: Panel, name: str) -> None:
-    assert refused(panel, name, 0) is ExceptionCode.ILLEGAL_ADDRESS
+    assert refused(panel, name, 0) is ExcCodes.ILLEGAL_ADDRESS
 
 
 @pytest.mark.parametrize(("address", "words"), [(0, [0]), (1, [0]), (1, [0, 0]), (15, [0]), (17, [0]), (600, [0])])
@@ -145,7 +147,7 @@ def test_a_part_of_a_value_or_nothing_at_all_is_an_illegal_address(
     before = panel.cycle.requests
     with pytest.raises(RegisterError) as caught:
         panel.registers.write(address, words, "test")
-    assert caught.value.code is ExceptionCode.ILLEGAL_ADDRESS
+    assert caught.value.code is ExcCodes.ILLEGAL_ADDRESS
     assert panel.cycle.requests == before
 
 
@@ -159,13 +161,13 @@ def test_one_bad_value_spoils_its_whole_request(panel: Panel) -> None:
 def test_references_that_disagree_in_one_request_are_refused(panel: Panel) -> None:
     with pytest.raises(RegisterError) as caught:
         panel.registers.write(0, [*BY_NAME["reference"].format.encode(0.5), 4000], "test")
-    assert caught.value.code is ExceptionCode.ILLEGAL_VALUE
+    assert caught.value.code is ExcCodes.ILLEGAL_VALUE
 
 
 def test_reading_beyond_the_map_is_an_illegal_address(panel: Panel) -> None:
     with pytest.raises(RegisterError) as caught:
         panel.registers.read("holding", SIZE - 1, 2)
-    assert caught.value.code is ExceptionCode.ILLEGAL_ADDRESS
+    assert caught.value.code is ExcCodes.ILLEGAL_ADDRESS
 
 
 def test_a_bad_write_is_one_line_in_the_log(panel: Panel, caplog: pytest.LogCaptureFixture) -> None:
@@ -207,7 +209,7 @@ def test_a_latched_fault_keeps_the_mode_until_acknowledged(panel: Panel, monkeyp
         assert (panel.get("fault"), panel.get("mode"), panel.get("quality")) == (Fault.NO_REPLY, 0, 2)
         assert panel.get("lost_replies") == 3
     panel.run(2)
-    assert refused(panel, "mode", 2) is ExceptionCode.DEVICE_BUSY
+    assert refused(panel, "mode", 2) is ExcCodes.DEVICE_BUSY
     panel.set("mode", 0)
     panel.set("acknowledge", 1)
     panel.run()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import pytest
+from pymodbus.constants import ExcCodes
 
 from config.device import SIMULATED_MAP, CommunicationAction, ModbusMap, ModbusTcpDevice, Place
 from config.slave_file import SlaveFile
@@ -19,7 +20,7 @@ from config.valve_file import shipped_valve
 from drivers.boundary import Driver, NoConnection, NoReply, Reading, Refused
 from drivers.in_memory import MemoryDriver
 from drivers.modbus_tcp import ModbusTcpDriver
-from fieldbus.modbus.server import ExceptionCode, RegisterServer
+from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
@@ -138,7 +139,7 @@ class DriverContract:
         for act in (bench.driver.write, bench.driver.exchange):
             with pytest.raises(Refused) as caught:
                 act(command_pa)
-            assert caught.value.code == ExceptionCode.ILLEGAL_VALUE
+            assert caught.value.code == ExcCodes.ILLEGAL_VALUE
             assert "\n" not in str(caught.value)
         assert (bench.device.command_pa, bench.device.samples) == (PUSH_PA, 1)
         assert bench.driver.exchange(PUSH_PA).sample_counter == 2, "and the driver goes on"

@@ -492,7 +492,8 @@ def test_the_slave_answers_its_unit_and_obeys_but_does_not_answer_all(slave_line
             break
     assert device.samples > 1
     assert answer(line, framed(5, b"\x08\0\1\0\0")) == framed(5, b"\x88\1")
-    assert answer(line, framed(5, b"\x2b\x0e\1\0")) == framed(5, b"\xab\1")
+    for unknown in (b"\x2b\x0e\1\0", b"\x41", b"\x64\0\0"):
+        assert answer(line, framed(5, unknown)) == framed(5, bytes((unknown[0] | 0x80, 1)))
 
 
 @pytest.mark.parametrize(

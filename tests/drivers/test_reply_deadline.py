@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from pyModbusTCP.constants import MB_NO_ERR, MB_TIMEOUT_ERR
 
 from config.device import ModbusRtuDevice, ModbusTcpDevice
 from config.roles import Role
@@ -22,8 +21,8 @@ from drivers.boundary import BadReply, NoConnection, NoReply
 from drivers.modbus_rtu import ModbusRtuDriver
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import client as modbus_client
-from fieldbus.modbus.client import PlainClient
-from fieldbus.modbus.connection import Connection, place
+from fieldbus.modbus.client import ModbusClient, NotConnected, ReplyTimeout
+from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.rtu import framed
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
@@ -84,37 +83,36 @@ class Dribbling:
 
 
 @pytest.fixture(params=["tcp", "tls"])
-def client(request: pytest.FixtureRequest) -> PlainClient:
-    made = modbus_client.modbus_client("127.0.0.1", 1, 1, TIMEOUT_S, tls("daemon") if request.param == "tls" else None)
-    assert isinstance(made, PlainClient)
-    return made
+def client(request: pytest.FixtureRequest) -> ModbusClient:
+    return ModbusClient("127.0.0.1", 1, 1, TIMEOUT_S, tls("daemon") if request.param == "tls" else None)
 
 
 @pytest.mark.parametrize("gap_s", [TIMEOUT_S / 30, TIMEOUT_S / 4, TIMEOUT_S])
 def test_a_reply_that_dribbles_is_given_up_when_the_time_out_of_the_first_byte_would_end(
-    client: PlainClient, gap_s: float, monkeypatch: pytest.MonkeyPatch
+    client: ModbusClient, gap_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(modbus_client, "time", clock)
     line = Dribbling(clock, gap_s)
-    client._sock = line  # type: ignore[assignment]
+    client._socket = line  # type: ignore[assignment]
     start_s = clock.now_s
-    assert client.custom_request(READ_11) is None
-    assert client.last_error == MB_TIMEOUT_ERR
+    with pytest.raises(ReplyTimeout, match="no reply within 200 ms"):
+        client.transact(READ_11)
     assert clock.now_s - start_s == pytest.approx(TIMEOUT_S), "31 bytes, so that it never was whole"
     assert not line.is_open
+    with pytest.raises(NotConnected, match="the connection is closed"):
+        client.transact(READ_11)
 
 
 def test_a_reply_in_pieces_that_is_whole_in_time_counts_and_the_next_has_all_of_its_time(
-    client: PlainClient, monkeypatch: pytest.MonkeyPatch
+    client: ModbusClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = Clock()
     monkeypatch.setattr(modbus_client, "time", clock)
     line = Dribbling(clock, TIMEOUT_S / 32)
-    client._sock = line  # type: ignore[assignment]
+    client._socket = line  # type: ignore[assignment]
     for _ in range(3):
-        assert client.custom_request(READ_11) == REPLY
-        assert client.last_error == MB_NO_ERR
+        assert client.transact(READ_11) == REPLY
     assert line.sent_with_s == [TIMEOUT_S] * 3
 
 
@@ -191,7 +189,7 @@ def test_a_device_that_dribbles_on_tcp_is_no_reply(
     def slowly(connection: Connection) -> None:
         line: socket.socket = connection.request
         for transaction, unit, pdu in connection._requests():
-            answer = connection.server.answer(unit, pdu, place(connection.client_address))
+            answer = connection.server.answer(unit, pdu, endpoint(connection.client_address))
             frame = struct.pack(">HHHB", transaction, 0, len(answer) + 1, unit) + answer
             bytewise.dribble(line.sendall, frame)
 

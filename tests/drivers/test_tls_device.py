@@ -21,7 +21,7 @@ from config.valve_file import shipped_valve
 from drivers.boundary import NoConnection, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus.server import RegisterServer
-from fieldbus.modbus.tls import Guard, client_context, identity_in
+from fieldbus.modbus.tls import Guard, NotAuthorized, client_context, identity_in
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
@@ -114,7 +114,9 @@ def test_the_host_name_is_checked_as_it_was_called(monkeypatch: pytest.MonkeyPat
         socket, "getaddrinfo", lambda host, *rest: found("127.0.0.1" if host.startswith("valve-") else host, *rest)
     )
     with device_with(guarded("elsewhere")) as (_, server):
-        driver_to(server, tls("daemon"), "valve-8").open()
+        driver = driver_to(server, tls("daemon"), "valve-8")
+        driver.open()
+        driver.close()
         with pytest.raises(NoConnection, match="Hostname mismatch, certificate is not valid for 'valve-9'"):
             driver_to(server, tls("daemon"), "valve-9").open()
 
@@ -187,7 +189,9 @@ def test_a_secured_driver_at_a_plain_device_is_told_so() -> None:
     with device_with(None) as (device, server):
         assert turned_away(server, tls("daemon")) in ("hung up in the TLS handshake", "Connection reset by peer")
         assert device.samples == 0
-        driver_to(server, None).open()
+        driver = driver_to(server, None)
+        driver.open()
+        driver.close()
 
 
 def test_an_observer_reads_and_moves_nothing(caplog: pytest.LogCaptureFixture) -> None:
@@ -210,7 +214,8 @@ def test_a_certificate_without_role_may_not_even_read(caplog: pytest.LogCaptureF
     without = ssl.PEM_cert_to_DER_cert((folder() / "device.pem").read_text())
     assert identity_in(without).role is Role.NONE
     guard = guarded()
-    assert guard.objection(identity_in(without), READ_ONE[7:]) == "function 3 needs the role observer"
+    with pytest.raises(NotAuthorized, match="function 3 needs the role observer"):
+        guard.authorize(identity_in(without), READ_ONE[7:])
 
 
 @pytest.mark.parametrize("text", [b"Engineer", b"engineer ", b"", b"none", b"engineer\0", b"admin"])

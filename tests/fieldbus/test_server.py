@@ -1,4 +1,4 @@
-"""The register server against the specification: by bytes, by an independent client (pymodbus), and by bad frames."""
+"""The register server against the specification: by bytes, by an independent client (modbus-tk), and by bad frames."""
 
 import socket
 import struct
@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 import pytest
-from pymodbus.client import ModbusTcpClient
+from pymodbus.constants import ExcCodes
 
 from config.errors import InputError
-from fieldbus.modbus.server import MOST_CLIENTS, ExceptionCode, RegisterError, RegisterServer, Table
+from fieldbus.modbus.register_answers import RegisterError, Table
+from fieldbus.modbus.server import MOST_CLIENTS, RegisterServer
+from tests.independent import independent_client, refused_with
 
 pytestmark = pytest.mark.real_time
 
@@ -26,14 +28,14 @@ class Bank:
 
     def read(self, table: Table, address: int, count: int) -> Sequence[int]:
         if address + count > SIZE:
-            raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+            raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
         return self.words[address : address + count] if table == "holding" else range(address, address + count)
 
     def write(self, address: int, words: Sequence[int], peer: str) -> None:
         if self.broken:
             raise ZeroDivisionError
         if address < 10 or address + len(words) > SIZE:
-            raise RegisterError(ExceptionCode.ILLEGAL_ADDRESS)
+            raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
         self.peers.append(peer)
         self.words[address : address + len(words)] = words
 
@@ -152,17 +154,23 @@ def test_a_fault_of_the_registers_is_exception_4_and_the_server_lives(server: Re
 
 
 def test_an_independent_client_agrees(server: RegisterServer, bank: Bank) -> None:
-    with ModbusTcpClient("127.0.0.1", port=server.port) as client:
-        assert client.write_registers(20, [1, 2, 3], device_id=7).registers == []
-        assert client.write_register(23, 4, device_id=7).registers == [4]
-        assert client.read_holding_registers(20, count=4, device_id=7).registers == [1, 2, 3, 4]
-        assert client.read_input_registers(50, count=2, device_id=7).registers == [50, 51]
-        both = client.readwrite_registers(read_address=20, read_count=2, write_address=21, values=[9], device_id=7)
-        assert both.registers == [1, 9]
-        assert client.read_coils(0, count=1, device_id=7).exception_code == ExceptionCode.ILLEGAL_FUNCTION
-        assert client.read_holding_registers(199, count=2, device_id=7).exception_code == ExceptionCode.ILLEGAL_ADDRESS
-        host, port = client.socket.getsockname()
-    assert set(bank.peers) == {f"{host}:{port}"}, "a write names its client"
+    with independent_client(server.port, unit=7) as client:
+        assert client.write(20, [1, 2, 3]) == (20, 3)
+        assert client.write_one(23, 4) == (23, 4)
+        assert client.read_holding(20, 4) == [1, 2, 3, 4]
+        assert client.read_input(50, 2) == [50, 51]
+        assert client.write_and_read(21, [9], 20, 2) == [1, 9]
+        with refused_with(ExcCodes.ILLEGAL_FUNCTION):
+            client.read_coils(0, 1)
+        with refused_with(ExcCodes.ILLEGAL_ADDRESS):
+            client.read_holding(199, 2)
+
+
+def test_a_write_names_its_client(line: socket.socket, bank: Bank) -> None:
+    line.sendall(frame(bytes.fromhex("06 000a 0001")))
+    reply(line)
+    host, port = line.getsockname()
+    assert bank.peers == [f"{host}:{port}"]
 
 
 @pytest.mark.parametrize("unit", [0, 7, 255])
@@ -257,7 +265,7 @@ def test_stop_ends_connections_and_frees_the_port(server: RegisterServer, bank: 
     reply(line)
     port = server.port
     server.stop()
-    line.settimeout(0.3)  # pyModbusTCP by itself would notice within a second
+    line.settimeout(0.3)
     assert line.recv(1) == b""
     again = RegisterServer(bank, "127.0.0.1", port, 7)
     again.start()

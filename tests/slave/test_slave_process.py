@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from pymodbus.client import ModbusTcpClient
 
 from config.device import SIMULATED_MAP
 from sim.slave.clocks import MOST_CATCH_UP_S
+from tests.independent import IndependentClient, independent_client
 
 pytestmark = pytest.mark.real_time
 
@@ -47,17 +47,17 @@ def end(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, st
     return process.returncode, out, error
 
 
-def sample(client: ModbusTcpClient) -> tuple[float, float, int, int, int]:
-    words = client.read_input_registers(0, count=COMMAND).registers
+def sample(client: IndependentClient) -> tuple[float, float, int, int, int]:
+    words = client.read_input(0, COMMAND)
     return struct.unpack(">ffIQH", struct.pack(f">{COMMAND}H", *words))
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_it_serves_in_lockstep_until_told_to_end(tmp_path: Path, number: signal.Signals) -> None:
     text = "[clock]\nmode = 'lockstep'\nperiod_s = 0.002\n"
-    with slave(tmp_path / "slave.toml", text) as (process, port), ModbusTcpClient("127.0.0.1", port=port) as client:
+    with slave(tmp_path / "slave.toml", text) as (process, port), independent_client(port) as client:
         for _ in range(20):
-            client.write_registers(COMMAND, [0x4788, 0xB800])  # 70 kPa
+            client.write(COMMAND, [0x4788, 0xB800])  # 70 kPa
         position_m, pressure_pa, counter, time_us, status = sample(client)
         assert (pressure_pa, counter, time_us, status) == (70e3, 20, 40_000, 0)
         assert position_m > 0.01
@@ -67,7 +67,7 @@ def test_it_serves_in_lockstep_until_told_to_end(tmp_path: Path, number: signal.
 def test_real_time_runs_on_by_itself_and_acts_on_silence(tmp_path: Path) -> None:
     text = "[communication]\ntimeout_s = 0.02\naction = 'fill'\n[supply]\nmaximum_pa = 90e3\n"
     with slave(tmp_path / "slave.toml", text) as (process, port):
-        with ModbusTcpClient("127.0.0.1", port=port) as client:
+        with independent_client(port) as client:
             first = last = sample(client)
             for _ in range(100_000):
                 if last[3] >= first[3] + 50_000:
@@ -104,7 +104,7 @@ def test_help_does_not_load_the_model() -> None:
     code = (
         "import sys\nfrom positioner.cli import sim\nimport argparse\nparser = argparse.ArgumentParser()\n"
         "sim.add_arguments(parser)\nparser.format_help()\n"
-        "print([name for name in sys.modules if name in ('sim', 'numpy', 'pydantic', 'pyModbusTCP')])"
+        "print([name for name in sys.modules if name in ('sim', 'numpy', 'pydantic', 'pymodbus')])"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
     assert shown.stdout == "[]\n"

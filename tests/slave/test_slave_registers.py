@@ -6,16 +6,17 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from pymodbus.client import ModbusTcpClient
 
 from config.device import SIMULATED_MAP, ModbusMap, Place
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
+from fieldbus.modbus.client import ModbusClient
 from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep, RealTime
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from tests.independent import independent_client
 
 pytestmark = pytest.mark.real_time
 
@@ -165,17 +166,19 @@ def test_a_float_is_never_torn_between_writers_and_readers(served: Bench) -> Non
 
     def write(pressure_pa: float) -> None:
         words = PLACES["command_pa"].format.encode(pressure_pa)
-        with ModbusTcpClient("127.0.0.1", port=served.server.port) as client:
-            while writing.is_set():
-                assert not client.write_registers(COMMAND, words).isError()
+        client = ModbusClient("127.0.0.1", served.server.port, 1, 20.0)
+        client.open()
+        while writing.is_set():
+            client.write_registers(COMMAND, words)
+        client.close()
 
     writers = [threading.Thread(target=write, args=(each,)) for each in TWO_PA]
     for writer in writers:
         writer.start()
     seen = set()
-    with ModbusTcpClient("127.0.0.1", port=served.server.port) as client:
+    with independent_client(served.server.port) as client:
         for _ in range(1500):
-            words = client.read_holding_registers(0, count=COMMAND + 2).registers
+            words = client.read_holding(0, COMMAND + 2)
             _, pressure_pa, counter, time_us, _, command_pa = struct.unpack(
                 ">ffIQHf", struct.pack(f">{COMMAND + 2}H", *words)
             )
@@ -193,12 +196,10 @@ def run_over_tcp(commands_pa: list[float], seed: int) -> list[bytes]:
     bench = Bench(clock={"mode": "lockstep"}, sensor={"noise_std_m": 1e-5, "seed": seed})
     bench.server.start()
     replies = []
-    with ModbusTcpClient("127.0.0.1", port=bench.server.port) as client:
+    with independent_client(bench.server.port) as client:
         for command_pa in commands_pa:
             words = PLACES["command_pa"].format.encode(command_pa)
-            reply = client.readwrite_registers(
-                read_address=0, read_count=SAMPLE, write_address=COMMAND, values=words
-            ).registers
+            reply = client.write_and_read(COMMAND, words, 0, SAMPLE)
             replies.append(struct.pack(f">{SAMPLE}H", *reply))
     bench.server.stop()
     return replies

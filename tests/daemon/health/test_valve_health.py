@@ -4,13 +4,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from pymodbus.constants import ExcCodes
 
 from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status
 from config.daemon_file import DaemonFile
 from config.registers import BY_NAME
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
-from fieldbus.modbus.server import ExceptionCode, RegisterError
+from fieldbus.modbus.register_answers import RegisterError
 from positioner.control.requests import Requests
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
@@ -146,7 +147,7 @@ def test_the_engineer_sets_the_baseline_and_not_before_there_is_friction() -> No
     panel = Panel()
     with pytest.raises(RegisterError) as refused:
         panel.set("health_baseline", 1)
-    assert refused.value.code is ExceptionCode.DEVICE_BUSY
+    assert refused.value.code is ExcCodes.DEVICE_BUSY
     panel = Panel(LAW)
     panel.run(0.01)
     assert panel.get("friction_baseline") != panel.get("friction_baseline"), "a number from a file is no baseline"
