@@ -114,9 +114,7 @@ class SupervisoryRegisters:
                     ExcCodes.ILLEGAL_ADDRESS, f"{register.name if register else at}: nothing to write there"
                 )
             if register.address != at or register.end > end:
-                raise WriteRejected(
-                    ExcCodes.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words"
-                )
+                raise WriteRejected(ExcCodes.ILLEGAL_ADDRESS, f"{register.name}: takes {register.format.words} words")
             value = register.format.decode(words[at - address : register.end - address])
             if problem := register.problem_with(value):
                 raise WriteRejected(ExcCodes.ILLEGAL_VALUE, problem)

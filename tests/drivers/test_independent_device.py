@@ -22,7 +22,10 @@ from drivers.modbus_rtu import ModbusRtuDriver
 from drivers.modbus_tcp import ModbusTcpDriver
 from positioner.cli.parts.pseudo_line import pseudo_line
 
-pytestmark = [pytest.mark.real_time, pytest.mark.filterwarnings("ignore:isSet:DeprecationWarning", "ignore:setDaemon:DeprecationWarning")]
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.filterwarnings("ignore:isSet:DeprecationWarning", "ignore:setDaemon:DeprecationWarning"),
+]
 
 UNIT = 9
 TIMEOUT_S = 10.0
