@@ -81,7 +81,7 @@ class Composition:
         return min((each.step_s for each in self.effects), default=inf)
 
     def changed(self, theta: Vector, parameters: Mapping[str, float]) -> Vector:
-        """Return theta with some parameters, by name, replaced.
+        """Return theta, (parameters,) in the order of `names`, with some of them replaced by name.
 
         Raises:
             InputError: an unknown name, or a value that is not physical (ranges, static_n >= coulomb_n).

@@ -60,7 +60,7 @@ def respond(
 
 
 def at_rest(composition: Composition, theta: Vector, time_s: float, position_m: float, pressure_pa: float) -> Vector:
-    """Return the state at rest at a position, the command pressure_pa long held.
+    """Return the state, (state_size,), at rest at a position, m, the command pressure_pa, Pa, long held.
 
     Raises:
         ValueError: a number that is not finite.
@@ -81,7 +81,9 @@ def follow(
     step_s: float,
     tolerance: float = TOLERANCE,
 ) -> Response:
-    """Carry the state, in place, through the commands; `sim.karnopp` says what the tolerance is of.
+    """Carry the state, (state_size,), in place through n commands, Pa, (n,) or one for all; columns of (n + 1,).
+
+    `sim.karnopp` says what the tolerance is of; the periods, s, are (n,) or one for all.
 
     Raises:
         ValueError: as `respond`.

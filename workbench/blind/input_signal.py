@@ -52,7 +52,7 @@ Move = Callable[[Leg, np.random.Generator], Column]
 
 
 def excitation(valve: ValveParameters, generator: np.random.Generator, count: int) -> Column:
-    """Return `count` commands, Pa; the first and the last passage begin with the valve closed.
+    """Return the commands, Pa, (count,); the first and the last passage begin with the valve closed.
 
     Args:
         valve: what is known of the valve: how far the commands go.
@@ -80,7 +80,7 @@ def excitation(valve: ValveParameters, generator: np.random.Generator, count: in
 
 
 def lead_in(command_pa: Column, count: int) -> Column:
-    """Return the commands, at most `count`, that precede the last passage: after them the first one begins alike."""
+    """Return the commands, Pa, at most `count`, that precede the last passage: after them the first begins alike."""
     repeated = command_pa.size - round(FIRST * command_pa.size)
     return command_pa[max(0, repeated - count) : repeated]
 
@@ -119,17 +119,20 @@ def _through(points_pa: Sequence[float] | Column, at: Sequence[float] | Column, 
 
 
 def step(leg: Leg, _: np.random.Generator) -> Column:
-    """Jump."""
+    """Jump; Pa, (leg.count,)."""
     return np.full(leg.count, leg.end_pa)
 
 
 def ramp(leg: Leg, _: np.random.Generator) -> Column:
-    """Go straight."""
+    """Go straight; Pa, (leg.count,)."""
     return _through([leg.begin_pa, leg.end_pa], [0.0, 1.0], leg.count)
 
 
 def creep(leg: Leg, generator: np.random.Generator) -> Column:
-    """Jump on the way, then go on by eleven stairs of a part of the break-away excess, or a little more."""
+    """Jump on the way, then go on by eleven stairs of a part of the break-away excess, or a little more.
+
+    Pa, (leg.count,).
+    """
     way_pa = leg.end_pa - leg.begin_pa
     stair_pa = min(generator.uniform(0.3, 1.5) * leg.excess_pa, 0.05 * abs(way_pa))
     stairs_pa = leg.end_pa - np.sign(way_pa) * stair_pa * np.arange(11, -1, -1)
@@ -137,14 +140,14 @@ def creep(leg: Leg, generator: np.random.Generator) -> Column:
 
 
 def staircase(leg: Leg, generator: np.random.Generator) -> Column:
-    """Jump by four to seven stairs of different heights."""
+    """Jump by four to seven stairs of different heights; Pa, (leg.count,)."""
     heights = np.cumsum(generator.uniform(0.3, 1.7, generator.integers(4, 8)))
     stairs = leg.begin_pa + (leg.end_pa - leg.begin_pa) * heights / heights[-1]
     return np.asarray(stairs[np.arange(leg.count) * stairs.size // leg.count])
 
 
 def interrupted(leg: Leg, generator: np.random.Generator) -> Column:
-    """Go straight with two rests on the way, late enough for the stem to be moving."""
+    """Go straight with two rests on the way, late enough for the stem to be moving; Pa, (leg.count,)."""
     places = np.sort(generator.uniform(0.6, 0.9, 2))
     waits = generator.uniform(0.1, 0.3, 2)
     levels = leg.begin_pa + (leg.end_pa - leg.begin_pa) * np.array([0.0, *np.repeat(places, 2), 1.0])
@@ -154,7 +157,10 @@ def interrupted(leg: Leg, generator: np.random.Generator) -> Column:
 
 
 def sawtooth(leg: Leg, generator: np.random.Generator) -> Column:
-    """Go there by three teeth, turning back after each by a part of the dead band or a little more than it."""
+    """Go there by three teeth, turning back after each by a part of the dead band or a little more than it.
+
+    Pa, (leg.count,).
+    """
     ahead = leg.begin_pa + (leg.end_pa - leg.begin_pa) * np.array([0.75, 0.9, 1.0])
     back = ahead - np.sign(leg.end_pa - leg.begin_pa) * generator.uniform(0.3, 1.4, 3) * leg.band_pa
     points = np.array([leg.begin_pa, *np.column_stack([ahead, back]).ravel(), leg.end_pa])

@@ -46,14 +46,14 @@ class Trial:
     period_s: float
 
     def answer_m(self, composition: Composition, theta: Vector, step_s: float = STEP_S) -> Column:
-        """Return what a clean valve indicates at the samples, m."""
+        """Return what a clean valve indicates at the samples, m, (n,); theta, (parameters,), as `Composition.names`."""
         vector = theta.copy()
         state = self._before(composition, vector)
         follow(composition, vector, state, self.lead_in_pa, self.period_s, step_s)
         return follow(composition, vector, state, self.command_pa[:-1], self.period_s, step_s).indicated_m
 
     def with_disturbances_m(self, composition: Composition, generator: np.random.Generator) -> Column:
-        """Return what a dirty valve indicates at the samples, m, before the transmitter."""
+        """Return what a dirty valve indicates at the samples, m, (n,), before the transmitter."""
         parts = max(1, round(self.period_s / DISTURBED_EVERY_S))
         h = self.period_s / parts
         commands = np.repeat(np.concatenate([self.lead_in_pa, self.command_pa[:-1]]), parts)
@@ -71,7 +71,7 @@ class Trial:
         return np.array(indicated_m[self.lead_in_pa.size * parts :: parts])
 
     def recording(self, indicated_m: Column, sensor: Sensor) -> Recording:
-        """Return the recording that a transmitter makes of it."""
+        """Return the recording that a transmitter makes of indicated positions, m, (n,)."""
         transmitter = Transmitter(sensor)
         columns = {
             "time_s": np.arange(self.command_pa.size) * self.period_s,
@@ -82,7 +82,7 @@ class Trial:
 
     @property
     def lead_in_pa(self) -> Column:
-        """The commands before the recorded ones."""
+        """The commands before the recorded ones, Pa, (lead-in samples,)."""
         return lead_in(self.command_pa, round(LEAD_IN_S / self.period_s))
 
     def _before(self, composition: Composition, theta: Vector) -> Vector:

@@ -39,7 +39,7 @@ class FrictionBalance:
 def forces(
     valve: ValveParameters, time_s: Column, position_m: Column, pressure_pa: Column, load_n: Column, noise_m: float
 ) -> Forces:
-    """Reconstruct the friction of an unbroken stretch without NaN; none for a stretch shorter than nine samples."""
+    """Reconstruct the friction of an unbroken stretch without NaN, arrays of (n,); none of fewer than nine samples."""
     if time_s.size < PARABOLA:
         return Forces(*np.empty((5, 0)))
     velocity = velocity_m_per_s(time_s, position_m)

@@ -13,12 +13,12 @@ BLOCK_S = 1.0
 
 
 def valid_rows(record: Record, simulated_m: Column) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-    """Return which rows count: judged and simulated."""
+    """Return which rows count, (n,): valid in the record, and simulated, m, (n,) with NaN where not."""
     return record.judged & np.isfinite(simulated_m)
 
 
 def fit_percent(record: Record, simulated_m: Column) -> float:
-    """Return the fit in per cent."""
+    """Return 100 (1 - ||y - y_hat|| / ||y - mean y||), Ljung's fit, of simulated positions, m, (n,)."""
     rows = valid_rows(record, simulated_m)
     measured_m = record.position_m[rows]
     around = float(np.linalg.norm(measured_m - measured_m.mean()))
@@ -27,12 +27,12 @@ def fit_percent(record: Record, simulated_m: Column) -> float:
 
 
 def rms(values: Column) -> float:
-    """Return the root of the mean square; NaN of nothing."""
+    """Return the root of the mean square of (n,) values, in their unit; NaN of nothing."""
     return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
 
 
 def robust(time_s: Column, values: Column) -> float:
-    """Return the median of the rms over blocks of 1 s."""
+    """Return the median of the rms over blocks of 1 s, in the values' unit; time, s, and values (n,)."""
     block = np.floor((time_s - time_s[0]) / BLOCK_S).astype(np.int64)
     _, member = np.unique(block, return_inverse=True)
     return float(np.median(np.sqrt(np.bincount(member, values**2) / np.bincount(member))))

@@ -48,7 +48,7 @@ class SlipEvents:
 
 
 def phases(position_m: Column, noise_m: float, found: Sequence[Slip], valve: ValveFile) -> NDArray[np.int64]:
-    """Return the phase of each sample of an unbroken stretch, an index into PHASES."""
+    """Return the phase of each sample of an unbroken stretch, an index into PHASES, (n,) as the positions, m."""
     way = directions(position_m, noise_m)
     phase = np.select([way > 0, way < 0], [UP, DOWN], STUCK).astype(np.int64)
     for i, slip in enumerate(found):
@@ -71,7 +71,7 @@ def matched(
     simulated: tuple[Sequence[Slip], Column],
     noise_m: float,
 ) -> SlipEvents:
-    """Match the slips of an unbroken stretch, each given with the positions, m, they were found in."""
+    """Match the slips of an unbroken stretch, each given with the positions, m, (n,), they were found in."""
     (ours, measured_m), (theirs, simulated_m) = measured, simulated
     begins = time_s[[each.first for each in ours]] if ours else time_s[:1]
     between_s = float(np.median(np.diff(begins))) if begins.size > 1 else float(time_s[-1] - time_s[0])

@@ -58,7 +58,7 @@ class Spectrum:
 
 
 def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
-    """Return the profile of values over something, both of equal length and finite."""
+    """Return the mean of values, (n,), in bins of equal width of another series, (n,), both finite; empty bins are left out."""
     span = float(np.ptp(over)) if over.size else 0.0
     member = (
         np.minimum(((over - over.min()) / span * bins).astype(np.int64), bins - 1)
@@ -76,14 +76,17 @@ def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
 
 
 def autocorrelation(residual_m: Column, period_s: float) -> Correlation:
-    """Return lags 0 to 25 of an evenly sampled residual."""
+    """Return rho at lags 0 to 25, (26,), of an evenly sampled residual, m, (n,), with the 99 % band (Ljung, 16.6)."""
     rho = _correlated(residual_m, residual_m)
     lag = np.arange(min(LAGS + 1, residual_m.size))
     return Correlation(lag, np.asarray(lag * period_s, np.float64), rho[lag], BAND_99 / residual_m.size**0.5)
 
 
 def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -> Correlation:
-    """Return lags -25 to 25 between input and residual; at positive lags the input comes first."""
+    """Return rho at lags -25 to 25, (51,), between input, Pa, and residual, m, (n,) each; the input leads at positive ones.
+
+    The band, 99 %, is that of Ljung, System Identification, 16.6.
+    """
     n = residual_m.size
     reach = min(LAGS, n - 1)
     lag = np.arange(-reach, reach + 1)
@@ -106,6 +109,6 @@ def _correlated(first: Column, second: Column) -> Column:
 
 
 def spectrum(residual_m: Column, period_s: float) -> Spectrum:
-    """Return Welch's estimate for an evenly sampled residual."""
+    """Return Welch's estimate of the density, m^2/Hz, for an evenly sampled residual, m, (n,)."""
     frequency, density = welch(residual_m, 1.0 / period_s, nperseg=min(1024, residual_m.size))
     return Spectrum(frequency, density)

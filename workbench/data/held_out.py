@@ -71,7 +71,7 @@ def _part(recording: Recording, first: int) -> Part:
 
 
 def residual_m(part: Part, simulated_m: Column) -> Column:
-    """Return simulated less measured position, NaN where it does not count."""
+    """Return simulated less measured position, m, (n,), NaN where it does not count."""
     return np.where(part.counted, simulated_m - part.record.position_m, np.nan)
 
 

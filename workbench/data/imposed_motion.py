@@ -61,7 +61,7 @@ class Rows:
         return self.position_m.size
 
     def turned(self) -> "Rows":
-        """Return the rows with the position counted the other way."""
+        """Return the same n rows with the position counted the other way."""
         velocity = None if self.velocity_m_per_s is None else -self.velocity_m_per_s
         return replace(
             self,

@@ -38,7 +38,12 @@ class Slip:
 
 
 def velocity_m_per_s(time_s: Column, position_m: Column) -> Column:
-    """Return the velocity at each sample; NaN next to what is not a number, 0 at the ends."""
+    """Return the velocity at each sample, m/s, (n,); NaN next to what is not a number, 0 at the ends.
+
+    Args:
+        time_s: s, (n,).
+        position_m: m, (n,).
+    """
     velocity = np.zeros(position_m.size)
     w = REACH
     velocity[w:-w] = (position_m[2 * w :] - position_m[: -2 * w]) / (time_s[2 * w :] - time_s[: -2 * w])
@@ -46,7 +51,7 @@ def velocity_m_per_s(time_s: Column, position_m: Column) -> Column:
 
 
 def directions(position_m: Column, noise_m: float) -> Directions:
-    """Return +1 where the stem moves up, -1 down, 0 where it cannot be told from rest."""
+    """Return +1 where the stem moves up, -1 down, 0 where it may be at rest; (n,) as the positions, m."""
     across = np.zeros(position_m.size)
     across[REACH:-REACH] = position_m[2 * REACH :] - position_m[: -2 * REACH]
     across[~np.isfinite(across)] = 0.0
@@ -54,7 +59,7 @@ def directions(position_m: Column, noise_m: float) -> Directions:
 
 
 def slips(position_m: Column, noise_m: float) -> tuple[Slip, ...]:
-    """Return the slips of an unbroken stretch, in order."""
+    """Return the slips of an unbroken stretch of positions, m, (n,), in order."""
     way = directions(position_m, noise_m)
     edges = np.flatnonzero(np.diff(way)) + 1
     firsts = np.concatenate([[0], edges])

@@ -139,12 +139,12 @@ class Balance:
 
     @property
     def time_s(self) -> Column:
-        """Time since the recording's start."""
+        """Time since the recording's start, s, (rows,)."""
         return self.rows.position_m * 0.0 if self.rows.time_s is None else self.rows.time_s
 
     @property
     def velocity(self) -> Column:
-        """Velocity, m/s; none in a static curve."""
+        """Velocity, m/s, (rows,); 0 in a static curve."""
         return self.rows.position_m * 0.0 if self.rows.velocity_m_per_s is None else self.rows.velocity_m_per_s
 
     @property
@@ -154,7 +154,7 @@ class Balance:
         return names if self.rows.velocity_m_per_s is not None else tuple(n for n in names if n not in NEEDS_MOTION)
 
     def friction_state(self, yield_m: float | None) -> Column:
-        """Return z."""
+        """Return z, (rows,): the direction, or that of a packing that yields over so many metres before it slips."""
         if yield_m is None:
             return self.rows.direction
         if yield_m not in self._slips:
@@ -325,18 +325,21 @@ def _stroke_logs(stroke: NDArray[np.int64], error_n: Column) -> Column:
 
 
 def balanced_n(rows: Rows, valve: ValveParameters) -> Column:
-    """Return the force that is balanced, N: the load of a bench, A p of a static curve."""
+    """Return the force that is balanced, N, (rows,): the load of a bench, A p of a static curve."""
     return valve.diaphragm_area_m2 * rows.pressure_pa if rows.load_n is None else rows.load_n
 
 
 def carried_n(rows: Rows, parameters: Mapping[str, float]) -> Column:
-    """Return what spring, constant force and, on a bench, pressure carry of the balanced force, N: no friction."""
+    """Return k_s x + F_0, less A p on a bench, N, (rows,): the balanced force without friction."""
     force_n = parameters["spring_n_per_m"] * rows.position_m + parameters["constant_n"]
     return force_n if rows.load_n is None else force_n - parameters["diaphragm_area_m2"] * rows.pressure_pa
 
 
 def floor_of(rows: Rows, residual_n: Column) -> float | None:
-    """Return the scatter of a residual at the same place, way and recording, where more than one stroke passes."""
+    """Return the scatter, N, of a residual, N, (rows,), at the same place, way and recording.
+
+    None where no place is passed by more than one stroke.
+    """
     if rows.velocity_m_per_s is None:
         return None
     span_m = max(float(np.ptp(rows.position_m)), np.finfo(float).tiny)
@@ -351,5 +354,5 @@ def floor_of(rows: Rows, residual_n: Column) -> float | None:
 
 
 def median_error_n(error_n: Column) -> float:
-    """Return the median error as a standard deviation, N."""
+    """Return the median of |error|, (n,), as a standard deviation, N."""
     return float(NORMAL * np.median(np.abs(error_n)))

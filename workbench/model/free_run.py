@@ -89,7 +89,7 @@ class FreeRun:
         self._starts = [initial_state(record, first, end) for first, end in record.segments]
 
     def run(self, theta: Vector) -> Run:
-        """Simulate; theta as `composition.names`."""
+        """Simulate; theta, (parameters,), as `composition.names`."""
         vector = np.array(theta[self._kept])
         load_n = self.record.load_n
         drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
@@ -105,13 +105,13 @@ class FreeRun:
         return Run(*rows)
 
     def position_m(self, theta: Vector) -> Column:
-        """Return the indicated position, a value a sample."""
+        """Return the indicated position, m, (n,)."""
         return self.run(theta).indicated_m
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         stem_m = begin.position_m
         for _ in range(3):
-            held_pa = balanced_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
+            held_pa = equilibrium_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
             state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
             stem_m += begin.position_m - read(state).indicated
         if begin.velocity_m_per_s:
@@ -120,8 +120,8 @@ class FreeRun:
         return state
 
 
-def balanced_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
-    """Return the pressure nearest to a command with which the forces are in balance."""
+def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
+    """Return the pressure, Pa, nearest to a command with which the forces are in balance; theta, (parameters,)."""
     middle_n = theta[SPRING] * position_m + theta[VISCOUS] * velocity_m_per_s
     if velocity_m_per_s:
         return float((middle_n + theta[COULOMB] * np.sign(velocity_m_per_s)) / theta[AREA])

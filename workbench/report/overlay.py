@@ -53,7 +53,7 @@ def overlay(
     shades: Sequence[Shade],
     slips: SlipEvents | None = None,
 ) -> Figure:
-    """Return the figure; arrays of one length, NaN where there is nothing."""
+    """Return the figure; time, s, command, Pa, and positions, m, are (n,), NaN where there is nothing."""
     traces: list[Trace] = [*_grounds(time_s, shades)]
     traces.append(_position(time_s, measured_m, "measured", MEASURED, "y"))
     for each in models:
@@ -109,7 +109,7 @@ def _axes(has_ground: bool) -> Figure:
 
 
 def phase_shades(phase: NDArray[np.int64], judged: Mask) -> list[Shade]:
-    """Return a ground for each phase but rest."""
+    """Return a ground for each phase but rest; indices into PHASES and mask, (n,) each."""
     return [
         Shade(name, SHADES[name], judged & (phase == i))
         for i, name in enumerate(PHASES)

@@ -27,7 +27,7 @@ class Drawn:
 
 
 def running_s(time_s: Column) -> Column:
-    """Return the time since the start; where the clock is set back, time goes on by a period."""
+    """Return the time since the start, s, (n,); where the clock is set back, time goes on by a period."""
     steps = np.diff(time_s)
     forward = steps[steps > 0.0]
     period_s = float(np.median(forward)) if forward.size else 0.0
@@ -35,7 +35,7 @@ def running_s(time_s: Column) -> Column:
 
 
 def drawn(time_s: Column, value: Column, most: int = MOST) -> Drawn:
-    """Return a series as it is drawn, broken where `workbench.data.record` breaks it; time as in the recording."""
+    """Return a series, (n,), as it is drawn, broken where `workbench.data.record` breaks it; time, s, as recorded."""
     steps = np.diff(time_s)
     forward = steps[steps > 0.0]
     longest_s = GAP * float(np.quantile(forward, 0.95)) if forward.size else np.inf
@@ -73,11 +73,11 @@ def stretch(count: int, most: int = MOST) -> int:
 
 
 def rounded(values: Column, decimals: int) -> list[float | None]:
-    """Return numbers for JSON; None for what is not a number."""
+    """Return n numbers for JSON, of (n,); None for what is not a number."""
     kept = np.round(values, decimals).tolist()
     return [each if np.isfinite(each) else None for each in kept]
 
 
 def significant(values: Column, digits: int = 5) -> list[float | None]:
-    """Return numbers for JSON, rounded to significant digits; None for what is not a number."""
+    """Return n numbers for JSON, of (n,), rounded to significant digits; None for what is not a number."""
     return [float(f"{each:.{digits}g}") if np.isfinite(each) else None for each in values.tolist()]

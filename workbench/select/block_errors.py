@@ -116,7 +116,7 @@ def indistinguishable(best: Column, other: Column) -> bool:
 
 
 def independent_share(error_m: Column) -> float:
-    """Return the share of samples that are independent, at most 1; the error, m, clipped at 5 robust deviations."""
+    """Return the share of independent samples, at most 1; the error, m, (n,), is clipped at 5 robust deviations."""
     e = clipped(error_m)
     pairs = np.isfinite(e[1:]) & np.isfinite(e[:-1])
     power = float(np.nanmean(e**2)) if pairs.any() else 0.0

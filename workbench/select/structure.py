@@ -28,7 +28,7 @@ Matrix = npt.NDArray[np.float64]
 
 
 def structure(record: Record, residual_m: Column) -> float:
-    """Return the cross-validated R^2; 0 for fewer than 100 samples."""
+    """Return the cross-validated R^2 of a residual, m, (n,), NaN where it does not count; 0 of under 100 samples."""
     rows = np.flatnonzero(np.isfinite(residual_m))
     if rows.size < FEWEST:
         return 0.0
@@ -47,7 +47,7 @@ def structure(record: Record, residual_m: Column) -> float:
 
 
 def clipped(error_m: Column) -> Column:
-    """Return the error about its median, clipped at 5 of its robust deviations; NaN stays."""
+    """Return the error, m, (n,), about its median, clipped at 5 of its robust deviations; NaN stays."""
     middle = float(np.nanmedian(error_m))
     deviation = 1.4826 * float(np.nanmedian(np.abs(error_m - middle)))
     return np.clip(error_m - middle, -CLIPPED * deviation, CLIPPED * deviation)
