@@ -27,6 +27,7 @@ from math import nan, sqrt
 import numpy as np
 
 from config.codes import Refusal
+from config.noise import white_noise_m
 from positioner.estimation.array import Array
 from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
 from positioner.estimation.estimates import Estimate, Estimates, no_estimate, no_estimates
@@ -34,7 +35,6 @@ from positioner.estimation.likelihood import LikelihoodFit, fit_motions
 from positioner.estimation.linear_problem import Prior
 from positioner.estimation.motion_preparation import CLEAR
 from positioner.estimation.motion_segment import MotionSegment
-from positioner.estimation.running_noise import PositionNoise
 from positioner.estimation.segmentation import Segmentation, find_motions
 
 MOST_STRETCHES = 8
@@ -115,7 +115,7 @@ def identify(
     whole = np.isfinite(time_s) & np.isfinite(position_m) & np.isfinite(pressure_pa)
     t, x, u = time_s[whole], position_m[whole], pressure_pa[whole]
     if settings.noise_std_m is None:
-        noise_std_m = measured_noise_m(x)
+        noise_std_m = white_noise_m(x)
         if noise_std_m == 0.0 and len(x) > 1:  # rounding hides it at rest
             noise_std_m = _resolution_m(x) / sqrt(12)
     else:
@@ -164,13 +164,6 @@ def even_instants(time_s: Array) -> Array | None:
     off = np.abs(time_s - even_s) / period_s
     jitters = off.std() > LEAST_JITTER and off.max() < LARGEST_JITTER and np.diff(number).min() > 0
     return np.asarray(even_s) if jitters else None
-
-
-def measured_noise_m(position_m: Array) -> float:
-    """Return the standard deviation of the position's white noise, as `PositionNoise` finds it."""
-    noise = PositionNoise()
-    noise.add_all(position_m, max(8, min(64, len(position_m) // 4)))
-    return noise.std_m
 
 
 def _resolution_m(position_m: Array) -> float:

@@ -12,10 +12,10 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from config.noise import quantum_m
 from config.recording import Column, Recording
 from positioner.response.dead_band import dead_band_and_resolution, responded
 from positioner.response.figure import Figure, undetermined
-from positioner.response.rest_level import quantum
 from positioner.response.step_detection import StepChange, find_steps
 from positioner.response.step_figures import FIGURES, StepFigures, figures_of
 
@@ -115,11 +115,11 @@ def _steps(segment: _InputSegment, *, follows: bool) -> list[StepChange]:
 
 def _response(name: str, found: list[tuple[_InputSegment, list[StepChange]]], notes: list[str]) -> ResponseFigures:
     is_reference = name == "reference_m"
-    quantum_m = quantum(np.concatenate([segment.position_m for segment, _ in found]))
-    if quantum_m:
-        notes.append(f"positions are whole multiples of {quantum_m:.3g} m")
+    rounding_m = quantum_m(np.concatenate([segment.position_m for segment, _ in found]))
+    if rounding_m:
+        notes.append(f"positions are whole multiples of {rounding_m:.3g} m")
     steps = tuple(
-        figures_of(segment.time_s, segment.position_m, step, quantum_m, is_reference=is_reference)
+        figures_of(segment.time_s, segment.position_m, step, rounding_m, is_reference=is_reference)
         for segment, steps in found
         for step in steps
     )

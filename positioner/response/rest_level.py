@@ -5,7 +5,8 @@
             quantum / sqrt 12)                                                          rounding
 
 Medians, so that a few wild samples change nothing. A level is a median over n samples, of standard deviation
-1.2533 σ / sqrt n.
+1.2533 σ / sqrt n. Not the third differences of `config.noise`: a rest may have five samples and holds no motion, and
+what drifts slowly there widens a level as noise does.
 """
 
 from dataclasses import dataclass
@@ -52,15 +53,3 @@ def _noise(t: Column, x: Column, quantum_m: float) -> float:
     straight = np.polynomial.Polynomial.fit(t, x, 1)(t)
     slow = _TO_SIGMA * float(np.median(np.abs(x - straight)))
     return max(white, slow, quantum_m / sqrt(12))
-
-
-def quantum(position_m: Column) -> float:
-    """Return the step of a transmitter that rounds, m: all differences are its whole multiples; 0 when it does not."""
-    steps = np.abs(np.diff(position_m))
-    steps = steps[steps > 1e-12 * np.ptp(position_m)]
-    if not steps.size:
-        return 0.0
-    smallest = float(steps.min())
-    multiples = steps[steps < 1000 * smallest] / smallest
-    many = len(multiples) >= 0.5 * len(steps) and len(multiples) >= 10
-    return smallest if many and bool(np.all(np.abs(multiples - np.round(multiples)) < 0.02)) else 0.0

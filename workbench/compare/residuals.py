@@ -58,7 +58,7 @@ class Spectrum:
 
 
 def profile(over: Column, values: Column, bins: int = BINS) -> Profile:
-    """Return the mean of values, (n,), in bins of equal width of another series, (n,), both finite; empty bins are left out."""
+    """Return the mean of values, (n,), in even bins of another series, (n,), both finite; empty bins are left out."""
     span = float(np.ptp(over)) if over.size else 0.0
     member = (
         np.minimum(((over - over.min()) / span * bins).astype(np.int64), bins - 1)
@@ -83,7 +83,7 @@ def autocorrelation(residual_m: Column, period_s: float) -> Correlation:
 
 
 def cross_correlation(command_pa: Column, residual_m: Column, period_s: float) -> Correlation:
-    """Return rho at lags -25 to 25, (51,), between input, Pa, and residual, m, (n,) each; the input leads at positive ones.
+    """Return rho at lags -25 to 25, (51,), of input, Pa, and residual, m, (n,) each; positive: the input leads.
 
     The band, 99 %, is that of Ljung, System Identification, 16.6.
     """

@@ -1,13 +1,13 @@
 """What no model can explain: the sensor's noise, its rounding, and how well the valve repeats itself.
 
-    d_k = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-3),   var d = 20 sigma^2     a smooth motion hardly shows in d
-    sigma = median over blocks of sqrt(mean d^2 / 20), at least q / sqrt 12 for a quantum q
+    sigma = median of the rms of blocks of 16 third differences (`config.noise`), at least q / sqrt 12 for a quantum q
 
 A record whose command repeats after a lag L shows the position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2.
 """
 
 import numpy as np
 
+from config.noise import noise_by_rms, quantum_m
 from config.recording import Column
 
 BLOCK = 16
@@ -21,22 +21,8 @@ def noise_std_m(position_m: Column) -> float:
     blocks = third[: third.size // BLOCK * BLOCK].reshape(-1, BLOCK)
     if not len(blocks):
         return 0.0
-    white = float(np.median(np.sqrt(np.mean(blocks**2, axis=1) / 20.0)))
+    white = float(np.median(noise_by_rms(blocks)))
     return max(white, quantum_m(position_m) / 12**0.5)
-
-
-def quantum_m(position_m: Column) -> float:
-    """Return the step to which the position is rounded, in m; 0 if it is not."""
-    levels = np.unique(position_m[np.isfinite(position_m)])
-    steps = np.diff(levels)
-    if steps.size < 2:
-        return float(steps[0]) if steps.size else 0.0
-    # Levels a rounding error apart are one level.
-    steps = steps[steps > 1e-9 * float(np.ptp(levels))]
-    quantum = float(np.median(steps[steps < 1.5 * float(steps.min())]))
-    small = steps[steps < 10.5 * quantum] / quantum
-    on_grid = np.abs(small - np.round(small)) < 0.02
-    return quantum if small.size > 0.1 * steps.size and on_grid.mean() > 0.95 else 0.0
 
 
 def repeat_lag(command_pa: Column) -> int | None:
