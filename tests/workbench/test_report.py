@@ -139,7 +139,8 @@ def test_the_ranking_has_the_diagnosis_s_numbers(diagnosed_page: Page, diagnosed
 
 
 def test_what_no_record_tells_apart_is_said_so(diagnosed_page: Page, diagnosed: tuple[Diagnosis, Subject]) -> None:
-    assert diagnosed[0].verdict == "one_of"
+    assert (diagnosed[0].verdict, diagnosed[0].missing) == ("one_of", ("preload",))
+    assert diagnosed[0].indistinguishable == (("preload", "sensor_offset"),)
     assert diagnosed[0].experiment is None
     (row,) = diagnosed_page.tables["table-indistinguishable"][1:]
     assert {row[0][0], row[1][0]} == {"preload", "sensor_offset"}

@@ -1,150 +1,158 @@
-"""What follows from models and steps made by hand: what is accepted, which are rivals, the verdict and its sentence."""
+"""The verdict of a diagnosis, its sentence and its JSON, from steps made by hand: no fit is needed for what follows."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from config.valve_file import EffectTable, ValveFile
-from sim.effect import shipped_effect, shipped_effects
-from tests.workbench.valves import SEED
-from workbench.fit.fitting import Fit, Fitted
-from workbench.select.block_errors import BlockErrors
+from config.recording import Column, Recording
+from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, model_of
+from workbench.data.held_out import Split, split
+from workbench.select.diagnosis import Diagnosis
+from workbench.select.diagnosis_json import as_json
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
-from workbench.select.forward_selection import without_missing
-from workbench.select.verdict import Verdict, verdict
-from workbench.select.verdict_sentence import rivals_sentence
+from workbench.select.verdict import verdict
+from workbench.select.verdict_sentence import rivals_sentence, verdict_sentence
 
-LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
-FLOOR_M = 5e-5
-MOTION_STD_M = 2e-2
+POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
+EXPLAINED = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M)
 
 
-def model(
-    *effects: str,
-    rmse_m: float = 1e-3,
-    cost: float = 1e5,
-    structure: float = 0.5,
-    trusted: bool = True,
-    at_end: str = "",
-) -> EvaluatedModel:
-    """A fitted valve of 2000 samples, off by so much in each second give or take a twentieth."""
-    keys = [f"{name}.{key}" for name in effects for key in LIBRARY[name].parameters]
-    fitted = {key: Fitted(0.0, 1.0, -1.0, 1.0, key == at_end, key != at_end) for key in ("spring_n_per_m", *keys)}
-    tables = tuple(EffectTable.model_validate({"name": each}) for each in effects)
-    valve = ValveFile(valve=SEED.valve, effect=tables)
-    fit = cast(Fit, SimpleNamespace(valve=valve, parameters=fitted, cost=cost, count=2000, trusted=trusted))
-    logs = np.log(rmse_m) + 0.05 * np.random.default_rng(0).standard_normal(60)
-    errors = BlockErrors(rmse_m, rmse_m, rmse_m, rmse_m, logs[:30], logs, structure, 1.0)
-    return EvaluatedModel(fit, errors, errors.at_floor(FLOOR_M))
+@pytest.fixture(scope="module")
+def parts() -> Split:
+    """Swings over 60 mm, whose noise is the floor; no command repeats itself."""
+    time_s: Column = np.asarray(0.01 * np.arange(1200), np.float64)
+    position_m = 0.05 + 0.03 * np.sin(1.3 * time_s) + FLOOR_M * np.random.default_rng(1).standard_normal(1200)
+    return split([Recording({"time_s": time_s, "command_pa": 8e5 * position_m, "position_m": position_m})])
 
 
-BARE = model()
-"""Twenty floors off."""
-EXPLAINED: dict[str, Any] = {"rmse_m": FLOOR_M, "cost": 1e3, "structure": 0.0}
-BETTER: dict[str, Any] = {"rmse_m": 5e-4, "cost": 5e4}
+def step(before: EvaluatedModel, number: int = 1, **models: EvaluatedModel) -> EffectStep:
+    return judged_step(before, models, number, LIBRARY)
 
 
-def stepped(before: EvaluatedModel = BARE, **models: EvaluatedModel | str) -> EffectStep:
-    return judged_step(before, models, 1, LIBRARY)
+def diagnosed(parts: Split, *steps: EffectStep) -> Diagnosis:
+    added = steps[-1].added
+    best = added.model if added and added.model else steps[-1].before
+    found = verdict(best, steps, parts.motion_std_m)
+    sentence = verdict_sentence(found, best, steps, LIBRARY, parts)
+    return Diagnosis(
+        steps=steps,
+        verdict=found,
+        base=steps[0].before,
+        best=best,
+        preview=(),
+        experiment=None,
+        split=parts,
+        sentence=sentence,
+    )
 
 
-def reasons(step: EffectStep) -> dict[str, str]:
-    return {each.name: each.rejection_reason for each in step.candidates}
+def test_what_explains_all_is_missing(parts: Split) -> None:
+    found = diagnosed(parts, step(POOR, ip_lag=model_of("ip_lag"), sensor_lag=POOR))
+    assert (found.verdict, found.missing, found.indistinguishable) == ("missing", ("ip_lag",), ())
+    assert found.sentence == (
+        "Missing: ip_lag; the held-out error falls from 1 to 0.05 mm, and nothing is left to explain."
+    )
 
 
-def test_the_best_by_evidence_is_added_and_what_is_worse_is_no_rival() -> None:
-    step = stepped(ip_lag=model("ip_lag", **BETTER), stribeck=model("stribeck", **EXPLAINED))
-    assert step.added is not None
-    assert step.added.name == "stribeck"
-    assert [each.name for each in step.candidates] == ["stribeck", "ip_lag"]
-    assert [each.name for each in step.indistinguishable] == ["stribeck"]
-    assert reasons(step) == {"stribeck": "", "ip_lag": ""}
+def test_two_that_explain_all_one_after_the_other_are_both_missing(parts: Split) -> None:
+    half = model_of("ip_lag", cost=5.0 * AT_FLOOR, error_m=5.0 * FLOOR_M)
+    found = diagnosed(parts, step(POOR, ip_lag=half), step(half, 2, backlash=model_of("ip_lag", "backlash")))
+    assert (found.verdict, found.missing) == ("missing", ("ip_lag", "backlash"))
+    assert found.sentence.startswith("Missing: ip_lag and backlash; the held-out error falls from 1 to 0.05 mm")
 
 
-def test_what_could_not_be_fitted_stands_last_with_its_reason() -> None:
-    step = stepped(ip_lag="no sample", stribeck=model("stribeck", **BETTER))
-    assert [each.name for each in step.candidates] == ["stribeck", "ip_lag"]
-    assert reasons(step)["ip_lag"] == "no sample"
+def test_what_another_does_as_well_is_one_of_them_and_what_would_tell_is_said(parts: Split) -> None:
+    found = diagnosed(parts, step(POOR, dead_time=model_of("dead_time"), sensor_lag=model_of("sensor_lag")))
+    assert found.verdict == "one_of"
+    assert found.indistinguishable == (("dead_time", "sensor_lag"),)
+    assert " dead_time or sensor_lag: the shape of a slip: the dead time leaves it as it is" in found.sentence
 
 
-def test_a_parameter_at_the_end_of_its_range_is_not_physical() -> None:
-    drag = model("quadratic_drag", **EXPLAINED, at_end="quadratic_drag.drag_ns2_per_m2")
-    step = stepped(quadratic_drag=drag)
-    assert step.added is None
-    assert reasons(step)["quadratic_drag"].startswith("not physical: the recording wants quadratic_drag.drag")
+def test_of_what_no_record_tells_apart_it_is_said_so(parts: Split) -> None:
+    found = diagnosed(parts, step(POOR, sensor_offset=model_of("sensor_offset"), preload=model_of("preload")))
+    assert (found.verdict, found.missing) == ("one_of", ("preload",))
+    assert " preload or sensor_offset: no record of pressure and position tells." in found.sentence
 
 
-def test_one_class_goes_by_its_first_member_unless_its_search_failed() -> None:
-    slightly = {**EXPLAINED, "cost": 1.005e3}
-    step = stepped(sensor_offset=model("sensor_offset", **EXPLAINED), preload=model("preload", **slightly))
-    assert step.added is not None
-    assert step.added.name == "preload"
-    assert [each.name for each in step.indistinguishable] == ["preload", "sensor_offset"]
-    failed = stepped(sensor_offset=model("sensor_offset", **EXPLAINED), preload=model("preload", **BETTER))
-    assert failed.added is not None
-    assert failed.added.name == "sensor_offset"
+def test_a_valve_that_explains_all_is_adequate(parts: Split) -> None:
+    found = diagnosed(parts, step(EXPLAINED, ip_lag=EXPLAINED))
+    assert (found.verdict, found.missing, found.suspected) == ("adequate", (), ())
+    assert found.best is found.base
+    assert found.sentence == "Nothing is missing: no effect lowers the held-out error of 0.06 mm as it must."
 
 
-def test_the_bare_valve_by_another_name_is_never_added_and_refuses_what_does_no_better() -> None:
-    step = stepped(sensor_gain=model("sensor_gain", **EXPLAINED), sensor_lag=model("sensor_lag", **EXPLAINED))
-    assert step.added is None
-    assert step.bare_equivalent is not None
-    assert step.bare_equivalent.name == "sensor_gain"
-    assert reasons(step) == {
-        "sensor_gain": "no record of pressure and position tells it from spring_n_per_m",
-        "sensor_lag": "explains no better than sensor_gain, the bare valve with other parameters",
-    }
+def test_of_an_adequate_valve_what_is_suspected_is_said(parts: Split) -> None:
+    suspect = model_of("spring_hardening", cost=1.1 * AT_FLOOR, error_m=1.1 * FLOOR_M, scatter=0.14)
+    found = diagnosed(parts, step(EXPLAINED, spring_hardening=suspect))
+    assert (found.verdict, found.missing, found.suspected) == ("adequate", (), ("spring_hardening",))
+    (candidate,) = found.candidates
+    said = f" Suspected, not proved: spring_hardening; of spring_hardening, {candidate.rejection_reason}. A longer"
+    assert said in found.sentence
+    assert "standard errors, more than 3 needed" in said
 
 
-def test_where_all_is_explained_the_rule_is_harder_and_what_it_rejects_is_suspected() -> None:
-    before = model(rmse_m=FLOOR_M, cost=1000.0, structure=0.0)
-    shifted = model("ip_lag", rmse_m=0.9 * FLOOR_M, cost=980.0, structure=0.0)
-    logs = before.errors.logs - np.where(np.arange(30) % 5, 0.0, 0.45)  # 2.7 of its standard errors
-    narrowly = replace(shifted, errors=replace(shifted.errors, logs=logs))
-    step = stepped(before, ip_lag=narrowly)
-    assert "standard errors, more than 3 needed" in reasons(step)["ip_lag"]
-    assert [each.name for each in step.suspected] == ["ip_lag"]
-    assert stepped(ip_lag=narrowly).added is not None, "the same beside a model that leaves something"
+def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:
+    found = diagnosed(parts, step(EXPLAINED, sensor_gain=model_of("sensor_gain", cost=0.5 * AT_FLOOR, error_m=3e-5)))
+    assert (found.verdict, found.missing) == ("adequate", ())
+    assert found.sentence == (
+        "No effect is missing, but a parameter that was kept is off: with sensor_gain, the bare valve by another name, "
+        "the held-out error falls from 0.06 to 0.03 mm. Fit again with the mass free."
+    )
 
 
-def test_a_rival_that_is_still_accepted_after_the_added_one_is_missing_too() -> None:
-    step = stepped(ip_lag=model("ip_lag", **BETTER), dead_time=model("dead_time", **BETTER))
-    assert {each.name for each in step.indistinguishable} == {"ip_lag", "dead_time"}
-    following = stepped(model("ip_lag", **BETTER), dead_time=model("ip_lag", "dead_time", **EXPLAINED))
-    assert step.added is not None
-    assert [each.name for each in without_missing(step, following, LIBRARY).indistinguishable] == [step.added.name]
+def test_what_the_library_lacks_is_left_unexplained(parts: Split) -> None:
+    found = diagnosed(parts, step(POOR, ip_lag=POOR))
+    assert (found.verdict, found.missing) == ("unexplained", ())
+    assert found.sentence.startswith("Something is missing that the library does not have. The held-out error is 1 mm.")
+    assert "a repeated segment of the command shows it" in found.sentence
 
 
-MISSING = stepped(stribeck=model("stribeck", **EXPLAINED), ip_lag=model("ip_lag", **BETTER))
-ONE_OF = stepped(stribeck=model("stribeck", **EXPLAINED), ip_lag=model("ip_lag", **EXPLAINED))
-NOTHING = stepped(ip_lag=model("ip_lag"))
+def test_what_explains_a_part_is_named_though_something_is_left(parts: Split) -> None:
+    part = model_of("ip_lag", cost=5.0 * AT_FLOOR, error_m=5.0 * FLOOR_M)
+    found = diagnosed(parts, step(POOR, ip_lag=part), step(part, 2, backlash=part))
+    assert (found.verdict, found.missing) == ("unexplained", ("ip_lag",))
+    assert " ip_lag explains a part: the held-out error falls from 1 to 0.25 mm." in found.sentence
 
 
-@pytest.mark.parametrize(
-    ("best", "step", "said"),
-    [
-        (model(**EXPLAINED), NOTHING, "adequate"),
-        (model("stribeck", **EXPLAINED), MISSING, "missing"),
-        (model("stribeck", **EXPLAINED), ONE_OF, "one_of"),
-        (BARE, NOTHING, "unexplained"),
-        (model(rmse_m=FLOOR_M, structure=0.5), NOTHING, "unexplained"),
-        (model(trusted=False), NOTHING, "untrusted"),
-        (model("stribeck", **EXPLAINED, trusted=False), MISSING, "missing"),
-    ],
-)
-def test_the_verdict_follows_from_the_best_model_and_the_steps(
-    best: EvaluatedModel, step: EffectStep, said: Verdict
-) -> None:
-    assert verdict(best, [step], MOTION_STD_M) == said
+def test_a_residual_that_hangs_on_the_state_is_not_explained_by_reaching_the_floor(parts: Split) -> None:
+    structured = model_of(structure=0.9)
+    assert structured.at_floor
+    assert diagnosed(parts, step(structured, ip_lag=structured)).verdict == "unexplained"
+
+
+def test_searches_that_disagree_and_explain_nothing_are_not_trusted(parts: Split) -> None:
+    lone = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M, agreement=1)
+    assert not lone.fit.trusted
+    found = diagnosed(parts, step(lone, ip_lag=lone))
+    assert found.verdict == "untrusted"
+    assert found.sentence.startswith("Not to be trusted: the searches end at different errors.")
+    explained = replace(lone, errors=EXPLAINED.errors, at_floor=True)
+    assert diagnosed(parts, step(explained, ip_lag=explained)).verdict == "adequate", "it explains all"
+
+
+def test_a_valve_pushed_at_random_is_not_called_adequate(parts: Split) -> None:
+    """It repeats itself to 6 mm, so that the bare valve is as good as any model: a quarter of the motion is left."""
+    scatters = replace(parts, floor_m=6e-3)
+    errors = model_of(error_m=6e-3).errors
+    assert not errors.follows(parts.motion_std_m)
+    as_good_as_any = EvaluatedModel(EXPLAINED.fit, errors, errors.at_floor(scatters.floor_m))
+    assert as_good_as_any.explained
+    found = diagnosed(scatters, step(as_good_as_any, stribeck=as_good_as_any))
+    assert (found.verdict, found.missing) == ("unexplained", ())
+    assert "The valve itself scatters: a repeated command repeats the position to 6 mm, where the" in found.sentence
 
 
 def test_a_model_that_leaves_a_tenth_of_the_motion_explains_nothing() -> None:
-    best = model(**EXPLAINED)
-    assert verdict(best, [NOTHING], 10.1 * FLOOR_M) == "adequate"
-    assert verdict(best, [NOTHING], 9.9 * FLOOR_M) == "unexplained"
+    steps = [step(EXPLAINED, ip_lag=EXPLAINED)]
+    left_m = EXPLAINED.errors.test_block_m
+    assert [verdict(EXPLAINED, steps, factor * left_m) for factor in (10.1, 9.9)] == ["adequate", "unexplained"]
+
+
+def test_an_adequate_valve_that_scatters_is_told_so_and_one_that_does_not_is_not(parts: Split) -> None:
+    found = [diagnosed(replace(parts, floor_m=floor_m), step(EXPLAINED, ip_lag=EXPLAINED)) for floor_m in (1e-3, 1e-4)]
+    assert [each.verdict for each in found] == ["adequate", "adequate"]
+    assert ["scatters" in each.sentence for each in found] == [True, False]
 
 
 def test_rivals_are_told_with_what_would_tell_them_apart() -> None:
@@ -152,3 +160,21 @@ def test_rivals_are_told_with_what_would_tell_them_apart() -> None:
     assert "measured actuator pressure" in rivals_sentence(["ip_lag", "sensor_lag"], LIBRARY)
     assert "no record of pressure and position tells" in rivals_sentence(["preload", "sensor_offset"], LIBRARY)
     assert rivals_sentence(["stribeck", "area_variation"], LIBRARY) == " Equally good: stribeck, area_variation."
+
+
+def test_the_json_has_the_verdict_and_every_candidate(parts: Split) -> None:
+    rivals = step(POOR, dead_time=model_of("dead_time"), sensor_lag=model_of("sensor_lag"), backlash=POOR)
+    broken = judged_step(POOR, {"stribeck": "the recording holds too little"}, 1, LIBRARY)
+    said = as_json(diagnosed(parts, rivals))
+    assert (said["verdict"], said["missing"]) == ("one_of", ["dead_time"])
+    assert said["indistinguishable"] == [["dead_time", "sensor_lag"]]
+    assert said["suspected"] == []
+    assert said["best"]["test_rmse_m"] == FLOOR_M
+    assert said["base"]["test_rmse_m"] == 20.0 * FLOOR_M
+    assert {each["name"]: each["accepted"] for each in said["candidates"]} == {
+        "dead_time": True,
+        "sensor_lag": True,
+        "backlash": False,
+    }
+    (unfitted,) = as_json(diagnosed(parts, broken))["candidates"]
+    assert (unfitted["why_not"], unfitted["test_rmse_m"]) == ("the recording holds too little", None)

@@ -1,0 +1,93 @@
+"""Fits and models made by hand: what a search might have come to, for all that follows from its numbers alone.
+
+A model has one block error throughout, so that two differ by what is written here and by nothing else. `scatter`
+makes the blocks differ in turn by a factor of e^scatter up and down, which leaves the mean and widens its error.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from config.valve_file import EffectTable, ValveFile
+from sim.effect import shipped_effect, shipped_effects
+from tests.workbench.valves import SEED
+from workbench.fit.fitting import Fit, Fitted, Search
+from workbench.select.block_errors import BlockErrors
+from workbench.select.effect_candidates import EvaluatedModel
+
+LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
+FLOOR_M = 5e-5
+SAMPLES, FITTED_BLOCKS, HELD_OUT_BLOCKS = 2000, 20, 16
+AT_FLOOR = 0.5 * SAMPLES
+"""The cost of white residuals."""
+
+
+def valve_with(*effects: str) -> ValveFile:
+    tables = [
+        EffectTable.model_validate(
+            {"name": name, **dict(zip(LIBRARY[name].parameters, LIBRARY[name].off(SEED.valve), strict=True))}
+        )
+        for name in effects
+    ]
+    return ValveFile(valve=SEED.valve, effect=tuple(tables))
+
+
+def fitted(value: float, *, physical: bool = True) -> Fitted:
+    return Fitted(value, 0.1, value - 0.2, value + 0.2, not physical, physical)
+
+
+def fit_of(
+    *effects: str,
+    cost: float = AT_FLOOR,
+    rms_m: float = FLOOR_M,
+    found: Mapping[str, Fitted] | None = None,
+    **more: int,
+) -> Fit:
+    """Return a fit with four parameters of the valve, and one for each of the effects unless they are given."""
+    parameters = {f"parameter_{i}": fitted(1.0) for i in range(4)}
+    parameters |= {f"{name}.parameter": fitted(1.0) for name in effects} if found is None else found
+    return Fit(
+        valve=valve_with(*effects),
+        parameters=parameters,
+        rms_m=rms_m,
+        floor_m=FLOOR_M,
+        cost=cost,
+        count=SAMPLES,
+        starts=(Search(cost, rms_m, {}),),
+        agreement=more.get("agreement", 3),
+        condition=10.0,
+        undetermined=(),
+        notes=(),
+        from_pressure=False,
+        seeds=(),
+    )
+
+
+def errors_of(error_m: float = FLOOR_M, *, scatter: float = 0.0, structure: float = 0.0) -> BlockErrors:
+    in_turn = np.where(np.arange(FITTED_BLOCKS + HELD_OUT_BLOCKS) % 2, 1.0, -1.0)
+    logs = np.log(error_m) + scatter * in_turn
+    return BlockErrors(
+        train_rmse_m=error_m,
+        test_rmse_m=error_m,
+        train_block_m=error_m,
+        test_block_m=error_m,
+        logs=logs[FITTED_BLOCKS:],
+        all_logs=logs,
+        structure=structure,
+        independent_share=1.0,
+    )
+
+
+def model_of(
+    *effects: str,
+    cost: float = AT_FLOOR,
+    error_m: float = FLOOR_M,
+    scatter: float = 0.0,
+    structure: float = 0.0,
+    agreement: int = 3,
+    found: Mapping[str, Fitted] | None = None,
+) -> EvaluatedModel:
+    """Return a model that leaves this cost where it was fitted and this error where it was not."""
+    errors = errors_of(error_m, scatter=scatter, structure=structure)
+    fit = fit_of(*effects, cost=cost, rms_m=error_m, found=found, agreement=agreement)
+    return EvaluatedModel(fit, errors, errors.at_floor(FLOOR_M))

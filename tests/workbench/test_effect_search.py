@@ -1,0 +1,160 @@
+"""The forward search, on fits made by hand: when it ends, and what it makes of searches that failed."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from config.recording import Column, Recording
+from config.valve_file import ValveFile
+from sim.effect import Effect
+from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, fit_of, model_of, valve_with
+from workbench.data.held_out import split
+from workbench.fit.fitting import Fit
+from workbench.select import effect_search
+from workbench.select.block_errors import BlockErrors
+from workbench.select.effect_candidates import EffectStep, judged_step
+from workbench.select.effect_search import EffectSearch
+from workbench.select.experiment import Experiment
+
+Effects = frozenset[str]
+Ends = Callable[[Effects, Effects], float]
+"""From the effects a fit begins with, and those it is to add, to the error that it comes to, in floors."""
+
+
+def names(step: EffectStep) -> list[str]:
+    return [each.name for each in step.candidates]
+
+
+@pytest.fixture
+def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep, ...]]:
+    """Search with a library of these names, each fit coming to what the test says."""
+
+    def searched(ends: Ends, *library: str, local_minimum: float = np.inf, workers: int = 2) -> tuple[EffectStep, ...]:
+        def fit(_: Recording, valve: ValveFile, *, effects: Sequence[str] = (), **__: object) -> Fit:
+            there = tuple(each.name for each in valve.effect)
+            floors = ends(frozenset(there), frozenset(effects))
+            return fit_of(*there, *effects, cost=floors * AT_FLOOR, rms_m=floors * FLOOR_M)
+
+        def block_errors(found: Fit, _: object) -> BlockErrors:
+            return errors_of(found.rms_m)
+
+        monkeypatch.setattr(effect_search, "fit", fit)
+        monkeypatch.setattr(effect_search, "block_errors", block_errors)
+        monkeypatch.setattr(EffectSearch, "_local_minimum", lambda *_: local_minimum)
+        search = search_of({name: LIBRARY[name] for name in library}, workers)
+        return search.steps(search.base(valve_with()))
+
+    return searched
+
+
+def search_of(library: Mapping[str, Effect], workers: int = 2) -> EffectSearch:
+    time_s: Column = np.asarray(0.01 * np.arange(1200), np.float64)
+    position_m = 0.05 + 0.03 * np.sin(1.3 * time_s) + FLOOR_M * np.random.default_rng(1).standard_normal(1200)
+    parts = split([Recording({"time_s": time_s, "command_pa": 8e5 * position_m, "position_m": position_m})])
+    return EffectSearch(parts, library, seed=0, workers=workers, progress=lambda _what, _done: None)
+
+
+def test_it_ends_with_the_effect_that_explains_all(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    (step,) = searched(lambda there, added: 1.0 if "ip_lag" in there | added else 20.0, "backlash", "ip_lag")
+    assert step.added
+    assert step.added.name == "ip_lag"
+    assert names(step) == ["ip_lag", "backlash"]
+
+
+def test_it_ends_where_nothing_is_accepted(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    first, last = searched(lambda there, added: 5.0 if "ip_lag" in there | added else 20.0, "backlash", "ip_lag")
+    assert first.added
+    assert last.added is None
+    assert last.before is first.added.model
+    assert names(last) == ["backlash"], "what is there is not tried again"
+
+
+def test_the_steps_do_not_depend_on_the_workers(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    """Nor on which fit is done first."""
+
+    def ends(there: Effects, added: Effects) -> float:
+        time.sleep(0.02 * ("stribeck" in added))
+        return 100.0 / 3.0 ** len(there | added)
+
+    library = ("stribeck", "ip_lag", "backlash")
+    alone, together = ([names(step) for step in searched(ends, *library, workers=workers)] for workers in (1, 3))
+    assert alone == together
+
+
+def test_it_adds_three_at_most(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    library = ("ip_lag", "backlash", "stribeck", "quadratic_drag")
+    steps = searched(lambda there, added: 100.0 / 3.0 ** len(there | added), *library)
+    assert [step.added is not None for step in steps] == [True, True, True]
+
+
+def test_what_stood_in_for_a_failed_search_does_not_stay(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    """Alone, the search for the true effect ends too high, so that another is added; beside it the true one is found.
+
+    From there the true one alone is searched once more, and explains all.
+    """
+
+    def ends(there: Effects, added: Effects) -> float:
+        if "spring_hardening" in there:
+            return 1.0
+        if "spring_hardening" in added:
+            return 1.0 if "flow_force" in there else 8.0
+        return 5.0 if "flow_force" in there | added else 20.0
+
+    (step,) = searched(ends, "flow_force", "spring_hardening")
+    assert step.added
+    assert step.added.name == "spring_hardening"
+    assert step.added.model
+    assert step.added.model.effects == ("spring_hardening",)
+    assert step.added.model.explained
+
+
+def test_a_rival_that_is_accepted_after_the_added_one_is_missing_too(
+    searched: Callable[..., tuple[EffectStep, ...]],
+) -> None:
+    first, last = searched(lambda there, added: 25.0 / 5.0 ** len(there | added), "ip_lag", "backlash")
+    assert last.added
+    assert {each.name for each in first.indistinguishable} == {"ip_lag"}, "the other did as well, and comes after it"
+
+
+def test_an_optimisers_failure_does_not_look_like_physics(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    """From the parameters of the valve with the effect, the one without comes as low: its own search had failed."""
+    made = iter([20.0, 1.0])
+    steps = searched(lambda there, added: 1.0 if there | added else next(made), "ip_lag", local_minimum=AT_FLOOR)
+    (step,) = steps
+    assert step.added is None
+    assert step.before.explained, "the base as it was fitted again"
+
+
+def test_what_the_base_left_behind_is_refitted_from_it(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    """No effect makes a valve worse: a search that ends above the base has failed, and is made anew from a better."""
+    bases, backlashes = iter([20.0, 4.0]), iter([19.0, 4.0])
+
+    def ends(there: Effects, added: Effects) -> float:
+        if "backlash" in added:
+            return next(backlashes)
+        return 3.9 if there | added else next(bases)
+
+    first = searched(ends, "backlash", "ip_lag", local_minimum=4.0 * AT_FLOOR)[0]
+    errors_m = {each.name: each.model.errors.test_rmse_m for each in first.candidates if each.model}
+    assert errors_m["backlash"] == pytest.approx(4.0 * FLOOR_M)
+
+
+def test_the_experiment_is_for_the_first_set_that_a_record_can_tell_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+
+    def experiment(fits: Sequence[Fit], *_: object, **__: object) -> Experiment:
+        asked.append([each.valve.effect[0].name for each in fits])
+        return Experiment("staircase", 7.0, np.arange(4.0), np.ones(4))
+
+    monkeypatch.setattr(effect_search, "experiment", experiment)
+    search = search_of(LIBRARY)
+    before = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
+    one_class, two = (
+        judged_step(before, {name: model_of(name) for name in rivals}, 1, LIBRARY)
+        for rivals in (("preload", "sensor_offset"), ("preload", "sensor_offset", "dead_time"))
+    )
+    assert search.experiment([one_class]) is None
+    assert search.experiment([one_class, two]) is not None
+    assert [sorted(each) for each in asked] == [["dead_time", "preload"]]
