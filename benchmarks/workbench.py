@@ -20,7 +20,7 @@ from workbench.blind.hiding import hide
 from workbench.data.held_out import split
 from workbench.data.record import Record
 from workbench.model.free_run import FINE, Accuracy, FreeRun
-from workbench.select.preview import preview
+from workbench.select.tangent_preview import preview
 
 RUNS = 20
 DURATION_S, PERIOD_S, SEED = 60.0, 0.005, 20001

@@ -33,7 +33,7 @@ from config.errors import InputError
 from sim import first_order_lag, karnopp
 from sim.effect import Effect, execute
 from sim.karnopp import MEMORY, Vector
-from sim.wiring import wiring
+from sim.kernel_source import kernel_source
 
 BASE = Path(karnopp.__file__)
 SHARED = (first_order_lag,)
@@ -184,4 +184,4 @@ def _text(effects: Sequence[Effect]) -> str:
     files = (__file__, *(str(each.__file__) for each in SHARED))
     parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
     head = f"# numba {numba.__version__}, {parts}, effects {digests}"
-    return "\n".join([head, BASE.read_text(encoding="utf-8"), wiring(effects) if effects else "", ""])
+    return "\n".join([head, BASE.read_text(encoding="utf-8"), kernel_source(effects) if effects else "", ""])

@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(arguments: argparse.Namespace, compared: "Comparison") -> list[str]:
-    from workbench.compare.sentences import shortened
+    from workbench.compare.comparison_sentences import shortened
 
     verdict = "adequate" if compared.adequate else "not adequate"
     repeated = "" if compared.repeatability_m is None else f", repeatability {_mm(compared.repeatability_m)}"

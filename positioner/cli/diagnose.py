@@ -8,7 +8,7 @@ from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
     from workbench.select.diagnosis import Diagnosis
-    from workbench.select.preview import TangentScore
+    from workbench.select.tangent_preview import TangentScore
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
 EXAMPLE = "positioner diagnose rec.csv --valve seed --test other.csv --json diagnosed.json"

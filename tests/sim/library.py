@@ -14,8 +14,8 @@ from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim import karnopp
 from sim.composition import BASE, Composition
 from sim.effect import Effect, execute, shipped_effect, shipped_effects
+from sim.kernel_source import kernel_source
 from sim.valve import Valve
-from sim.wiring import wiring
 
 SEED = load_valve(shipped_valve("seed"))
 EFFECTS = {name: shipped_effect(name, "test") for name in shipped_effects()}
@@ -50,7 +50,7 @@ def plain(effects: Sequence[Effect]) -> Callable[[Sequence[float], Series, float
     """Return the model with its effects as plain Python: (effects' parameters, commands, period, step) -> path."""
     module = ModuleType("plain_kernel")
     sys.modules["plain_kernel"] = module
-    text = Path(karnopp.__file__).read_text() + (wiring(effects) if effects else "")
+    text = Path(karnopp.__file__).read_text() + (kernel_source(effects) if effects else "")
     exec(compile(text, "plain_kernel", "exec", dont_inherit=True), module.__dict__)
     for i, each in enumerate(effects):
         part: dict[str, Any] = {"__name__": f"plain_{each.name}"}

@@ -19,7 +19,7 @@ from workbench.select.block_errors import (
 )
 from workbench.select.effect_acceptance import Gain
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
-from workbench.select.structure import STRUCTURED, structure
+from workbench.select.residual_structure import STRUCTURED, structure
 from workbench.select.verdict_sentence import reduction_sentence
 
 LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.compare.phases import SlipEvents
-from workbench.compare.sentences import Findings, sentences, shortened
+from workbench.compare.comparison_sentences import Findings, sentences, shortened
+from workbench.compare.slip_matching import SlipEvents
 from workbench.data.motion import Slip
 
 SLIPS = tuple(Slip(i, i + 1, 0.0, 1e-3 * (-1) ** i, (-1) ** i) for i in range(25))

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from config.recording import Column, Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
+from workbench.compare.comparison_sentences import Findings, sentences
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
 from workbench.compare.measures import fit_percent, rms, robust, valid_rows
-from workbench.compare.phases import PHASES, SlipEvents, matched, phases
+from workbench.compare.phases import PHASES, phases
 from workbench.compare.residuals import (
     Correlation,
     Profile,
@@ -26,7 +27,7 @@ from workbench.compare.residuals import (
     profile,
     spectrum,
 )
-from workbench.compare.sentences import Findings, sentences
+from workbench.compare.slip_matching import SlipEvents, matched
 from workbench.data.motion import Slip, slips, velocity_m_per_s
 from workbench.data.record import Record, ready, require_units
 from workbench.model.free_run import FreeRun, Run

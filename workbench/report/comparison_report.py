@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.compare.comparison import ADEQUATE, Comparison, Phase
-from workbench.compare.sentences import shortened
+from workbench.compare.comparison_sentences import shortened
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
 from workbench.report.overlay import Simulated, overlay, phase_shades
 from workbench.report.page import (

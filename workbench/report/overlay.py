@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column
-from workbench.compare.phases import PHASES, STUCK, SlipEvents
+from workbench.compare.phases import PHASES, STUCK
+from workbench.compare.slip_matching import SlipEvents
 from workbench.report.charts import GRID, INK, MEASURED, QUIET, Figure, Trace, axis, layout, line
 from workbench.report.plot_series import drawn, rounded, running_s
 

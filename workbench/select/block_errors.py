@@ -17,7 +17,7 @@ import numpy as np
 from config.recording import Column
 from workbench.data.held_out import Split, residual_m
 from workbench.fit.fitting import Fit
-from workbench.select.structure import clipped, structure
+from workbench.select.residual_structure import clipped, structure
 
 BLOCK_S = 1.0
 AT_FLOOR, RARELY_OFF = 1.25, 1.75
@@ -49,7 +49,7 @@ class BlockErrors:
     all_logs: Column
     """l_b of the fitted and the held-out blocks, (blocks,)."""
     structure: float
-    """How much of the residual hangs on the state, fitted or held out, whichever is more (`structure`)."""
+    """How much of the residual hangs on the state, fitted or held out, whichever is more (`residual_structure`)."""
     independent_share: float
     """Share of the fitted samples that are independent."""
 

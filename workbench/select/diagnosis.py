@@ -16,7 +16,7 @@ from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
-from workbench.select.preview import TangentScore, preview
+from workbench.select.tangent_preview import TangentScore, preview
 from workbench.select.verdict import Verdict, verdict
 from workbench.select.verdict_sentence import verdict_sentence
 

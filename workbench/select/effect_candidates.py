@@ -13,7 +13,7 @@ from workbench.select.block_errors import BlockErrors, indistinguishable
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
-from workbench.select.structure import STRUCTURED
+from workbench.select.residual_structure import STRUCTURED
 
 AT_END = 0.2
 """Of the weakest start: nearer to the end of its range a parameter is at it."""

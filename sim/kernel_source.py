@@ -16,7 +16,7 @@ LEVELS = {name: name for name in ("F_c", "F_s", "direction")}
 MOVED = {name: name for name in ("F_e", "stiffness", "x", "v")}
 
 
-def wiring(effects: Sequence[Effect]) -> str:
+def kernel_source(effects: Sequence[Effect]) -> str:
     """Return the text of the places, filled."""
     at = {place: [i for i, each in enumerate(effects) if place in each.functions] for place in PLACES}
     remembering = {i for i, each in enumerate(effects) if each.memory}

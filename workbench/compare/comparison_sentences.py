@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from config.recording import Column
 from workbench.compare.measures import BLOCK_S
-from workbench.compare.phases import PHASES, MatchedSlip, SlipEvents
+from workbench.compare.phases import PHASES
+from workbench.compare.slip_matching import MatchedSlip, SlipEvents
 from workbench.data.motion import Slip
 
 CERTAIN = 3.5
