@@ -27,7 +27,7 @@ def test_there_is_a_recipe_for_all_that_is_added_often() -> None:
 def test_a_recipe_can_be_followed(name: str, tmp_path: Path) -> None:
     tree = tmp_path / "tree"
     for room in ROOMS:
-        shutil.copytree(ROOT / room, tree / room, ignore=shutil.ignore_patterns("__pycache__", "img"))
+        shutil.copytree(ROOT / room, tree / room, ignore=shutil.ignore_patterns("img"))
     shutil.copy(ROOT / "pyproject.toml", tree)
     commands = []
     for language, file, text in BLOCK.findall(RECIPES[name]):
@@ -67,7 +67,7 @@ def install(tree: Path) -> None:
 def run(command: str, tree: Path) -> None:
     """Run a command line in the tree, with the tree's own packages."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    environment = {**os.environ, "PYTHONPATH": str(tree), "PATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(tree), "PATH": path}
     done = subprocess.run(
         ["sh", "-c", command], cwd=tree, env=environment, capture_output=True, text=True, check=False, timeout=120
     )
