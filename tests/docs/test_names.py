@@ -176,6 +176,16 @@ def test_every_link_leads_somewhere(document: Path) -> None:
         assert "://" in target or (folder / target).exists(), target
 
 
+def test_each_decision_has_its_number_and_names_others_that_exist() -> None:
+    records = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    numbers = {path.name[:4] for path in records}
+    assert len(numbers) == len(records)
+    for path in records:
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith(f"# {int(path.name[:4])}. ")
+        assert set(re.findall(r"\b00\d\d\b", text)) <= numbers, path.name
+
+
 @pytest.mark.parametrize(
     ("span", "problem"),
     [
