@@ -12,5 +12,11 @@ from positioner.estimation.acceptance import Ratios
 
 
 def balance_pa(reference_m: float, direction: int, ratios: Ratios) -> float:
-    """Return the pressure, Pa, that balances the stem at the reference, m, moving up (+1) or down (-1)."""
+    """Return the pressure, Pa, that balances the stem at the reference, m, moving up (+1) or down (-1): (23), (24).
+
+    >>> round(balance_pa(0.05, 1, Ratios(b_over_c=-800e3, k_over_c=-22e3)))
+    62000
+    >>> round(balance_pa(0.05, -1, Ratios(b_over_c=-800e3, k_over_c=-22e3)))
+    18000
+    """
     return -(ratios.b_over_c * reference_m + direction * ratios.k_over_c)

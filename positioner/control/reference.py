@@ -16,7 +16,11 @@ class Reference:
     delta_m: float = 0.0
 
     def follow(self, asked_m: float) -> "Reference":
-        """Return the reference after it was asked for; asking for the same again changes nothing."""
+        """Return the reference, m, after it was asked for; asking for the same again changes nothing.
+
+        >>> Reference(0.0625).follow(0.03125).follow(0.03125)
+        Reference(value_m=0.03125, delta_m=-0.03125)
+        """
         if asked_m == self.value_m:
             return self
         return Reference(asked_m, asked_m - self.value_m)

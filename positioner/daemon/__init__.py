@@ -2,4 +2,12 @@
 
 One blocking thread owns the driver and runs `cycle`; the supervisory server and the recorder have threads of their
 own. They meet only in immutable snapshots that are replaced whole: the cycle waits for nobody.
+
+    service                       assembles it from its file, starts and ends it
+    cycle, pacing, link           one cycle, when it begins, and the driver with its connection
+    snapshot                      what a cycle leaves for the others
+    supervisory_registers         what the DCS reads and writes
+    refinement_process            fits in a process of its own
+    recorder, logs                recordings and log lines, written beside the cycle
+    cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
 """

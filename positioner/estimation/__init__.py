@@ -2,6 +2,17 @@
 
 `Identification` takes a sample and gives `Estimates`; `accept` decides which of them are applied. Needs numpy only;
 time comes in with the samples.
+
+    online, sample_window, estimates, acceptance    sample by sample; the estimates, and which of them are applied
+    algebraic, weighted, validity                   the seed's identifier, solved with weights, and what is valid of it
+    derivatives, friction_estimator                 velocity and acceleration; what the acceleration leaves for friction
+    motion_detector, running_noise                  does the stem move; the noise of its sensor
+    recording_estimates, batch                      from a whole recording: find its motions, fit them, check the fit
+    segmentation, motion_segment                    the motions in a record; one of them
+    likelihood, likelihood_search                   the fit by maximum likelihood: result and search
+    motion_preparation, linear_problem              its rows and its least squares
+    stem_response, array                            the stem's exact response, which is fitted; the type of all arrays
+    refiner, passive, breakaway_force               who runs a fit; from ordinary moves, one after another; F_s/A
 """
 
 from config.codes import Refusal

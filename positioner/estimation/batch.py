@@ -103,14 +103,17 @@ class BatchResult:
 def identify(
     time_s: Array, position_m: Array, pressure_pa: Array, settings: BatchSettings, prior: Prior | None = None
 ) -> BatchResult:
-    """Identify the valve from a record.
+    """Identify the valve from a record, by the maximum likelihood of `likelihood`.
 
     Args:
-        time_s: N strictly increasing time stamps.
-        position_m: N positions; NaN counts as missing.
-        pressure_pa: N pressures; NaN counts as missing.
-        settings: see there.
+        time_s: (N,), strictly increasing time stamps.
+        position_m: (N,); NaN counts as missing.
+        pressure_pa: (N,); NaN counts as missing.
+        settings: how it is done.
         prior: what is known beforehand.
+
+    Returns:
+        The estimates and how they were found; where nothing could be fitted, without a fit and with the reason.
     """
     whole = np.isfinite(time_s) & np.isfinite(position_m) & np.isfinite(pressure_pa)
     t, x, u = time_s[whole], position_m[whole], pressure_pa[whole]
@@ -149,7 +152,7 @@ def identify(
 
 
 def even_instants(time_s: Array) -> Array | None:
-    """Return the even instants about which time stamps jitter; None when they do not, or are not even at all.
+    """Return the even instants about which time stamps jitter, (N,) both, s; None when they do not, or are not even.
 
     Samples that are missing leave their instants out.
     """

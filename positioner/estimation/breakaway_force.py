@@ -19,19 +19,24 @@ WALK_PER_SQRT_S = 3e-3
 
 
 def from_interval(low_pa: float, high_pa: float, std_pa: float = 0.0) -> Estimate:
-    """Return F_s/A of an interval whose ends are known to a standard deviation."""
+    """Return F_s/A, Pa, of an interval, Pa, whose ends are known to a standard deviation, Pa."""
     return Estimate((low_pa + high_pa) / 2, hypot((high_pa - low_pa) / sqrt(12), std_pa), Refusal.VALID)
 
 
 def intersection(one: Estimate, other: Estimate) -> Estimate:
-    """Return what two events leave: the intersection of their intervals, or what lies between them."""
+    """Return what two events leave: the intersection of their intervals, or what lies between them.
+
+    >>> both = intersection(from_interval(20e3, 30e3), from_interval(26e3, 40e3))
+    >>> round(both.value)
+    28000
+    """
     low = max(each.value - sqrt(3) * each.std for each in (one, other))
     high = min(each.value + sqrt(3) * each.std for each in (one, other))
     return from_interval(min(low, high), max(low, high))
 
 
 def after_event(before: Estimate, event: Estimate, elapsed_s: float) -> Estimate:
-    """Return what is known after an event, some time after what was known before; either may be no number."""
+    """Return what is known after an event, elapsed_s after what was known before; either may be no number (NaN)."""
     if not isfinite(before.value):
         return event
     aged = Estimate(before.value, hypot(before.std, WALK_PER_SQRT_S * before.value * sqrt(elapsed_s)), Refusal.VALID)

@@ -37,8 +37,14 @@ SHORTEST = 6
 def weights(time_s: Array) -> Array:
     """Return the weights (3, N) whose sums with N positions are velocity and acceleration at the last, and slope.
 
+    (19), (21) and the straight line's slope, exact for polynomials on the grid there is; in 1/s, 1/s^2 and 1/s.
+
     Args:
-        time_s: N >= 6 increasing time stamps.
+        time_s: (N,), N >= 6 increasing time stamps, s.
+
+    >>> t = np.linspace(0.0, 0.05, 51)
+    >>> (weights(t) @ (3.0 * t + 5.0 * t**2)).round(6).tolist()
+    [3.5, 10.0, 3.25]
     """
     half = (time_s[-1] - time_s[0]) / 2
     powers = np.ones((4, len(time_s)))

@@ -31,7 +31,7 @@ def friction(
     pressure_pa: float,
     theta: Array,
 ) -> float:
-    """Return k_e by (22), in m/s^2, of one instant or of means; theta = (a, b, c)."""
+    """Return k_e by (22), in m/s^2, of one instant or of means; theta = (a, b, c), (3,), in 1/s, 1/s^2, m/(s^2 Pa)."""
     a, b, c = theta.tolist()
     left_over = acceleration_m_per_s2 - a * velocity_m_per_s - b * position_m - c * pressure_pa
     return direction * float(left_over)

@@ -29,9 +29,9 @@ class LikelihoodFit:
     """The most likely parameters.
 
     Attributes:
-        p: ln τ, ln μ, g in m/Pa, q in m.
-        covariance: of p, 4 x 4; as good as infinite where nothing is known.
-        root: R, 4 x 4, of the information about p that beginnings leave, R'R / σ_x^2; as in `Prior`.
+        p: (4,), ln τ, ln μ, g in m/Pa, q in m.
+        covariance: of p, (4, 4); as good as infinite where nothing is known.
+        root: R, (4, 4), of the information about p that beginnings leave, R'R / σ_x^2; as in `Prior`.
         residual_std_m: of the positions.
         count: samples used.
         correlation: of neighbouring residuals: how much they are not white, in standard deviations of it.
@@ -52,14 +52,14 @@ class LikelihoodFit:
 
     @property
     def theta(self) -> Array:
-        """Return a in 1/s, b in 1/s^2, c in m/(s^2 Pa), k in m/s^2, b/c in Pa/m, k/c in Pa."""
+        """Return (6,): a in 1/s, b in 1/s^2, c in m/(s^2 Pa), k in m/s^2, b/c in Pa/m, k/c in Pa."""
         tau, mu = np.exp(self.p[:2]).tolist()
         g, q = self.p[2:].tolist()
         return np.array([-tau / mu, -1 / mu, g / mu, q / mu, -1 / g, q / g])
 
     @property
     def theta_covariance(self) -> Array:
-        """Return the covariance of `theta`, 6 x 6, to first order."""
+        """Return the covariance of `theta`, (6, 6), to first order, in the products of its units."""
         a, b, c, k, slope, friction = self.theta.tolist()
         g = float(self.p[2])
         gradient = np.array(
@@ -88,9 +88,9 @@ def fit_motions(
     Args:
         segments: motions of one direction each.
         held: whether the pressure is held between the samples; else it is linear.
-        guess: (ln τ, ln μ), τ in s and μ in s^2, to start from beside those of the grid.
+        guess: (2,), ln τ and ln μ, τ in s and μ in s^2, to start from beside those of the grid.
         prior: what is known beforehand.
-        near: (ln τ, ln μ) near enough to need no search.
+        near: (2,), ln τ and ln μ near enough to need no search.
 
     Returns:
         The fit; None when the samples are fewer than the unknowns, or carry no motion.

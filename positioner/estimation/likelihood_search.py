@@ -29,7 +29,7 @@ LARGEST_DAMPING = 1e8
 
 
 def grid_search(motions: list[PreparedMotion], guess: Array | None, prior: Prior | None) -> Array | None:
-    """Return the best (ln τ, ln μ), τ in s, μ in s^2, of a coarse grid and of the guess; the prior's if there is one.
+    """Return the best p, (2,), ln τ and ln μ in s and s^2, of a coarse grid and of the guess; or the prior's.
 
     None when at every one of them pressure would close the valve.
     """
@@ -51,7 +51,10 @@ def grid_search(motions: list[PreparedMotion], guess: Array | None, prior: Prior
 
 
 def gauss_newton(motions: list[PreparedMotion], p: Array, prior: Prior | None) -> Array:
-    """Return (ln τ, ln μ, starts) at the minimum of S near p: Gauss-Newton, the step damped until S falls."""
+    """Return p = (ln τ, ln μ, starts), (2 + starts,), at the minimum of S near p, by damped Gauss-Newton.
+
+    A start is a share 0 to 1 of its interval (`StartInterval`).
+    """
     damping = 1e-3
     unknown = len(p)
     problem = linear_problem(motions, p, prior)
@@ -82,7 +85,13 @@ def gauss_newton(motions: list[PreparedMotion], p: Array, prior: Prior | None) -
 
 
 def with_start_in_gap(segment: MotionSegment, motion: PreparedMotion, p: Array) -> PreparedMotion:
-    """Return the motion begun at the likeliest of the commands that a gap may hide; as it is when there is no gap."""
+    """Return the motion begun at the likeliest of the commands that a gap may hide; as it is when there is no gap.
+
+    Args:
+        segment: that the motion was prepared from.
+        motion: with a start that is known but for the gap.
+        p: (2,), ln τ and ln μ to search from.
+    """
     if motion.free_velocity:
         return motion
     first = int(np.searchsorted(segment.time_s, motion.time_s[0], side="right"))

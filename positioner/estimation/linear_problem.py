@@ -23,7 +23,7 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is known beforehand of (ln τ, ln μ, g, q): a mean (4), and a root R (4, 4) of the information R'R / σ_x^2.
+    """What is known beforehand of (ln τ, ln μ, g, q): mean (4,), root R (4, 4) of the information R'R / σ_x^2.
 
     R may be singular: what it does not know, it does not pull at.
     """
@@ -56,7 +56,7 @@ class LinearProblem:
 
 
 def linear_problem(motions: list[PreparedMotion], p: Array, prior: Prior | None) -> LinearProblem:
-    """Return the linear problem at p = (ln τ, ln μ, shares of the start intervals), τ in s and μ in s^2."""
+    """Return the linear problem at p, (2 + starts,): ln τ and ln μ in s and s^2, shares of the start intervals."""
     blocks = [_columns(each, p) for each in started(motions, p)]
     starts = [each.start_interval for each in motions if each.start_interval is not None]
     rows = sum(len(each) for each in blocks) + len(starts) + (4 if prior is not None else 0)
@@ -102,7 +102,7 @@ def sensitivities(
 
 
 def started(motions: list[PreparedMotion], p: Array) -> list[PreparedMotion]:
-    """Return the motions, each that has a start interval begun at its share of it, p[2:]."""
+    """Return the motions, each with a start interval begun at its share of it, p[2:] of p, (2 + starts,)."""
     shares = iter(p[2:].tolist())
     return [each if each.start_interval is None else each.start_interval.begin(each, next(shares)) for each in motions]
 

@@ -43,7 +43,7 @@ class MotionDetector:
 
 
 def motion_start(position_m: Array, direction: int, noise_m: float) -> int:
-    """Return the index at which a motion in the given direction began within a window that ends in it.
+    """Return the index at which a motion, direction +1 or -1, began within a window, (N,), m, that ends in it.
 
     It is the last sample that does not yet stand out of the window's extreme, which noise alone puts some two to
     three standard deviations beyond the resting place.

@@ -7,7 +7,7 @@ from positioner.estimation.array import Array
 
 @dataclass(frozen=True, slots=True)
 class MotionSegment:
-    """Samples of one motion, SI units, N of each.
+    """Samples of one motion, (N,) each, SI units.
 
     Attributes:
         direction: +1 up, -1 down.

@@ -15,7 +15,7 @@ from positioner.estimation.linear_problem import Prior
 
 @dataclass(frozen=True, slots=True)
 class RefinementJob:
-    """Samples to identify the valve from; see `batch.identify`."""
+    """Samples to identify the valve from, (N,) each, SI units; see `batch.identify`."""
 
     time_s: Array
     position_m: Array

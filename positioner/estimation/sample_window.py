@@ -11,7 +11,7 @@ _TURNS = 8
 
 
 class SampleWindow:
-    """A ring of samples that is always one contiguous stretch.
+    """A ring of samples that is always contiguous in memory.
 
     Args:
         window_s: the time it holds; N follows from the median period of its first samples.
@@ -73,17 +73,17 @@ class SampleWindow:
 
     @property
     def time_s(self) -> Array:
-        """Time stamps, oldest first."""
+        """Time stamps, (N,), s, oldest first."""
         return self._data[0, self._end - self._count : self._end]
 
     @property
     def position_m(self) -> Array:
-        """Positions, oldest first."""
+        """Positions, (N,), m, oldest first."""
         return self._data[1, self._end - self._count : self._end]
 
     @property
     def pressure_pa(self) -> Array:
-        """Pressures, oldest first."""
+        """Pressures, (N,), Pa, oldest first."""
         return self._data[2, self._end - self._count : self._end]
 
     def oldest(self) -> tuple[float, float, float, float, float]:

@@ -57,9 +57,9 @@ def find_motions(
     """Find the motions of a record.
 
     Args:
-        time_s: N increasing time stamps.
-        position_m: N measured positions.
-        pressure_pa: N pressures, as in `MotionSegment`.
+        time_s: (N,), increasing time stamps.
+        position_m: (N,), measured.
+        pressure_pa: (N,), as in `MotionSegment`.
         noise_std_m: of the positions.
         threshold_m_per_s: velocity below which the stem counts as stopped.
     """
@@ -94,8 +94,18 @@ def _window(period_s: float, noise_std_m: float, threshold_m_per_s: float, count
 
 
 def slopes(time_s: Array, position_m: Array, window: int) -> Array:
-    """Return the straight line's slope over `window` samples about each sample, m/s; at the ends that of the first
-    and the last window."""
+    """Return the straight line's slope over `window` samples about each sample, (N,), m/s.
+
+    At the ends it is that of the first and of the last window.
+
+    Args:
+        time_s: (N,), increasing.
+        position_m: (N,).
+        window: samples, 2 to N.
+
+    >>> slopes(np.arange(5.0), 2.0 * np.arange(5.0), 3).tolist()
+    [2.0, 2.0, 2.0, 2.0, 2.0]
+    """
     t, x = time_s - time_s[0], position_m - position_m[0]
 
     def sums(values: Array) -> Array:

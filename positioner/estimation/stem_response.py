@@ -39,7 +39,11 @@ _FADED = -36.0
 
 
 def roots(tau_s: float, mu_s2: float) -> Modes:
-    """Return λ_1, λ_2 in 1/s; never quite equal."""
+    """Return λ_1, λ_2, (2,), in 1/s: the roots of μ λ^2 + τ λ + 1, never quite equal.
+
+    >>> roots(tau_s=0.03, mu_s2=2e-4).round(6).tolist()
+    [-50.0, -100.0]
+    """
     discriminant = tau_s * tau_s - 4 * mu_s2
     if abs(discriminant) < _EQUAL * tau_s * tau_s:
         discriminant = _EQUAL * tau_s * tau_s
@@ -56,8 +60,8 @@ def responses(
     """Return X_g (m per m/Pa), X_q, X_0 (1) and X_1 (s) at N + 1 instants, the first of which is the start.
 
     Args:
-        time_s: N + 1 increasing instants.
-        pressure_pa: at each; held: of the interval before each, the first then does not matter.
+        time_s: (N + 1,), increasing instants.
+        pressure_pa: (N + 1,), at each; held: of the interval before each, the first then does not matter.
         direction: +1 up, -1 down.
         tau_s: F_v/k_s.
         mu_s2: m/k_s.

@@ -13,7 +13,7 @@ White sensor noise ν of standard deviation σ enters every entry through a poly
 so e = ∫ K ν dτ with K = K_q - a K_p1 - b K_p2, and E[e e'] = σ^2 h ∫ K K' dτ (h: mean step, Σ h^2 / Σ h when uneven).
 θ in it is taken from the solution before; the first weighs each row by K_q alone. Noise of the pressure enters in the
 same way through c K_p3. What x is not linear between the samples counts as noise besides: a bend of the slope by Δ
-leaves out h^2 Δ / 12, whose mean square is taken for each stretch between two T_j. So the jerk is trusted as far as it
+leaves out h^2 Δ / 12, whose mean square is taken for each interval between two T_j. So the jerk is trusted as far as it
 is sampled.
 
     first order     cov θ = A E[e e'] A'
@@ -61,7 +61,7 @@ _NODES, _NODE_WEIGHTS = (_NODES + 1) / 2, _NODE_WEIGHTS / 2
 
 
 def kernel(feeds: Feeds, n: int, tau: Array, T: float) -> Array:
-    """Return K_n(τ; T), the weight of the signal at τ in level n of a chain at T."""
+    """Return K_n(τ; T), the weight of the signal at tau, (nodes,) both, in level n of a chain at T, in windows."""
     levels = enumerate(feeds[:n], start=1)
     terms = [g * tau**e * (T - tau) ** (n - level) / factorial(n - level) for level, (g, e) in levels]
     return np.asarray(np.sum(terms, axis=0))
@@ -121,10 +121,10 @@ def solve(
     """Solve (13) for a, b, c over windows of increasing length.
 
     Args:
-        windows: one at least; each begins at time zero.
+        windows: one at least; each begins at time zero, columns (4, 3).
         position_noise: standard deviation of the white noise of the position.
         pressure_noise: the same of the pressure.
-        guess: of a, b, c, to weigh the rows with; None: found in rounds.
+        guess: (3,), of a, b, c, to weigh the rows with; None: found in rounds.
         gaps: handed on.
 
     Returns:
@@ -146,7 +146,7 @@ def solve(
 
 
 def _kernels(ends: Array) -> tuple[Array, Array, "npt.NDArray[np.intp]"]:
-    """Return the kernels (4, rows, nodes) at nodes between the windows' ends, the nodes' lengths and stretches."""
+    """Return the kernels (4, rows, nodes) at nodes between the windows' ends, the nodes' lengths and intervals."""
     begins = np.concatenate(((0.0,), ends[:-1]))
     spans = (ends - begins)[:, None]
     tau = (begins[:, None] + spans * _NODES).ravel()
@@ -168,7 +168,7 @@ def _kernels(ends: Array) -> tuple[Array, Array, "npt.NDArray[np.intp]"]:
 
 
 def _densities(windows: Sequence[Window], position_noise: float, pressure_noise: float | None = None) -> Array:
-    """Return σ^2 h of each stretch between the windows' ends: of the position, or of the pressure if given."""
+    """Return σ^2 h of each interval between the windows' ends: of the position, or of the pressure if given."""
     ends = np.diff([0.0, *(each.end for each in windows)])
     squares = np.diff([0.0, *(each.squared_steps for each in windows)])
     if pressure_noise is not None:

@@ -67,7 +67,7 @@ class Scatter:
 
     @classmethod
     def of(cls, values: Array, true: float) -> "Scatter":
-        """Hold values against the truth."""
+        """Return the scatter of values, (n,), about the truth, in the same unit."""
         errors = values / true - 1
         return cls(float(errors.mean()), float(errors.std()), float(errors[-1]), float(np.abs(errors).max()))
 
@@ -171,7 +171,7 @@ def findings(run: ScenarioRun, file: ValveFile) -> SeedFindings:
 
 
 def seed_friction(run: ScenarioRun, seed_tracks: ParameterTracks) -> Array:
-    """Return k_e as the seed says: 500 samples, the trapezoidal rule, the measured position."""
+    """Return k_e, m/s^2, (samples,) of `tracks`, as the seed says: 500 samples, trapezoids, the measured position."""
     return friction(run, seed_tracks, corrected_filters(fir_length(run), run.period_s), run.measured_m)
 
 
@@ -202,7 +202,7 @@ def _kept_friction_errors(
 
 
 def by_the_seeds_law(run: ScenarioRun, file: ValveFile, ratios: Ratios) -> tuple[Array, Array]:
-    """Return time, s, and true position, m, of the same valve after the same S3, under the law with other ratios."""
+    """Return time, s, and true position, m, (n,) each, after the same S3 under the law with other ratios."""
     stroke_m = file.valve.stroke_m
     excitation_pa = run.command_pa[run.identifying]
     steps = [(S2_FROM_S - S1_FROM_S, UP_PU, 1), (UNTIL_S - S2_FROM_S, DOWN_PU, -1)]

@@ -94,13 +94,13 @@ def printed_filters(samples: int, period_s: float) -> Array:
 
 
 def corrected_filters(samples: int, period_s: float) -> Array:
-    """Return the same run on the window reversed in time, under which the odd derivative changes its sign."""
+    """Return (19) and (21) on the window reversed in time, (2, samples): the odd derivative changes its sign."""
     k_19, k_21 = printed_filters(samples, period_s)[:, ::-1]
     return np.array([-k_19, k_21])
 
 
 def exact_filters(samples: int, period_s: float) -> Array:
-    """Return the daemon's: exact for polynomials on the samples there are, where the trapezoidal rule is not."""
+    """Return the daemon's, (2, samples): exact for polynomials on the samples, where the trapezoidal rule is not."""
     return weights(period_s * np.arange(samples, dtype=np.float64))[:2]
 
 
@@ -137,7 +137,7 @@ def tracks(run: ScenarioRun) -> ParameterTracks:
 
 
 def friction(run: ScenarioRun, seed_tracks: ParameterTracks, filters: Array, position_m: Array) -> Array:
-    """Return k_e by (22), corrected, over that span, with a, b, c of the same time; figure 6.
+    """Return k_e, (samples,), m/s^2, by (22), corrected, over that span, with a, b, c of the same time; figure 6.
 
     Args:
         run: of the scenario.

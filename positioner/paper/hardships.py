@@ -33,7 +33,7 @@ LATE = 5
 
 @dataclass(frozen=True, slots=True)
 class Hardship:
-    """One row; shares of the true values, in the order of `NAMES`.
+    """One row; shares of the true values, (6,) each, in the order of `NAMES`.
 
     Attributes:
         bound: mean over the runs' own bounds.

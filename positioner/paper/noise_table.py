@@ -62,7 +62,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class SampledMotion:
-    """Time, true position and the pressure held up to each sample, SI units; `start` is the row at which it begins.
+    """Time, true position and the pressure held up to each sample, (n,), SI units; `start` is the row of its beginning.
 
     `known` says what is known of that beginning: 2 where and how fast, 1 how fast, 0 nothing.
     """
@@ -90,7 +90,7 @@ def motion(file: ValveFile, period_s: float) -> SampledMotion:
 
 
 def motion_at(file: ValveFile, time_s: Array, start: int) -> SampledMotion:
-    """Return the motion sampled, and commanded, at these instants; it begins at row `start`."""
+    """Return the motion sampled, and commanded, at instants, (n,), s; it begins at row `start`."""
     excitation = ALPHA_PA + BETA_PA * np.sin(OMEGA_RAD_PER_S * time_s[start:-1])
     held = np.concatenate((np.zeros(start), excitation))
     response = Valve.from_file(file).run(held, np.diff(time_s))
@@ -98,7 +98,7 @@ def motion_at(file: ValveFile, time_s: Array, start: int) -> SampledMotion:
 
 
 def true_values(file: ValveFile) -> Array:
-    """Return a, b, c, k, b/c, k/c."""
+    """Return a, b, c, k, b/c, k/c, (6,), SI units."""
     valve = file.valve
     m, A, k_s = valve.mass_kg, valve.diaphragm_area_m2, valve.spring_n_per_m
     return np.array(
@@ -107,7 +107,7 @@ def true_values(file: ValveFile) -> Array:
 
 
 def bound(file: ValveFile, moved: SampledMotion, noise_m: float) -> Array:
-    """Return the Cramér-Rao bounds, shares of the true values, six of them."""
+    """Return the Cramér-Rao bounds, (6,), shares of the true values; `noise_m` is the noise of the position."""
     true = true_values(file)
     rows = slice(moved.start, None)
     t, u = moved.time_s[rows], moved.pressure_pa[rows]

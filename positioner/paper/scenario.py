@@ -63,7 +63,7 @@ WHITE = Noise("white, 1e-4 p.u.", white_std_pu=1e-4)
 
 @dataclass(frozen=True, slots=True)
 class ScenarioRun:
-    """One run of the scenario, a row per sample, SI units; what is true is known to the simulator alone.
+    """One run of the scenario, columns (samples,), SI units; what is true is known to the simulator alone.
 
     Attributes:
         noise: of the position transmitter.

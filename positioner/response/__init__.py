@@ -2,6 +2,11 @@
 
 `respond(recording)` finds the steps and gives `ResponseFigures`: dead time, T63, T86, overshoot, travel and static gain
 of each step, dead band and resolution of the recording. A figure that cannot be determined says why. Needs numpy alone.
+
+    response_figures                the whole recording
+    step_detection, step_figures    its steps, and the figures of one
+    rest_level, figure              where the stem rests; a figure with its uncertainty, and when a level is crossed
+    dead_band                       dead band and resolution, from series of small steps
 """
 
 from positioner.response.figure import Figure

@@ -47,7 +47,18 @@ class LevelCrossing:
 
 
 def level_crossing(time_s: Column, rising: Column, level: float, noise: float) -> LevelCrossing | None:
-    """Return when a response, (n,), first rises through a level; None when it does not."""
+    """Return when a response, (n,), first rises through a level, time (n,) in s; None when it does not.
+
+    Args:
+        time_s: (n,), increasing.
+        rising: (n,), the response in any unit.
+        level: in that unit.
+        noise: standard deviation of the response, in that unit.
+
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> round(level_crossing(t, t, 0.632, 0.0).time_s, 3)
+    0.632
+    """
     above = rising >= level + BAND * noise
     if not above.any():
         return None

@@ -57,7 +57,7 @@ class ResponseFigures:
 
 @dataclass(frozen=True, slots=True)
 class _InputSegment:
-    """Rows without a break of the clock; positions and input finite."""
+    """Rows without a break of the clock, (n,) each, s, m and the unit of the input; positions and input finite."""
 
     time_s: Column
     position_m: Column

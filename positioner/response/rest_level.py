@@ -35,7 +35,7 @@ class RestLevel:
 
 
 def rest_at_the_end(time_s: Column, position_m: Column, quantum_m: float) -> RestLevel | None:
-    """Return where the stem rests in the last part of a hold; None with too few samples."""
+    """Return where the stem rests in the last part of a hold, (n,), s and m; None with fewer than five samples."""
     late = time_s >= time_s[-1] - REST_SHARE * (time_s[-1] - time_s[0])
     count = max(int(late.sum()), FEWEST)
     if len(position_m) < count:

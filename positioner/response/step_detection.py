@@ -34,7 +34,12 @@ class StepChange:
 
 
 def find_steps(time_s: Column, held: Column) -> list[StepChange]:
-    """Return the steps of an input, (n,), in order of time."""
+    """Return the steps of an input in order of time; time (n,), s, and input (n,), in any unit.
+
+    >>> held = np.repeat([0.02, 0.05, 0.04], 100)
+    >>> [(step.first, round(step.size, 3)) for step in find_steps(np.arange(300) * 0.01, held)]
+    [(100, 0.03), (200, -0.01)]
+    """
     if len(held) < 2 * FEWEST_HELD:
         return []
     tolerance = _tolerance(held)

@@ -67,7 +67,7 @@ FIGURES = ("travel_m", "static_gain", *TIMED, "final_error_m")
 def figures_of(
     time_s: Column, position_m: Column, step: StepChange, quantum_m: float, *, is_reference: bool
 ) -> StepFigures:
-    """Return the figures of one step; positions are finite."""
+    """Return the figures of one step of a recording, (n,), s and finite positions in m."""
     start_s = float(time_s[step.first])
     before = rest_at_the_end(time_s[step.before : step.first], position_m[step.before : step.first], quantum_m)
     after = rest_at_the_end(time_s[step.first : step.end], position_m[step.first : step.end], quantum_m)

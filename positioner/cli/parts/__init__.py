@@ -1,1 +1,8 @@
-"""What several commands share: child processes, a simulated plant of them, a daemon's address, series from files."""
+"""What several commands share.
+
+children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
+daemon_address                              where a daemon is
+csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
+diagnose_forces                             `diagnose` on a bench's recording
+authority, progress                         a test certificate authority; progress on a terminal
+"""

@@ -9,7 +9,7 @@ from config.recording import Column, read_table
 
 
 def read_series(path: Path, name: str) -> tuple[Column, Column]:
-    """Return time, s, and the column of that name; at least two rows.
+    """Return time, (n,), s, and the column of that name, (n,); at least two rows.
 
     Raises:
         InputError: as `read_table`; fewer than two rows; a value that is not a finite number.

@@ -2,6 +2,11 @@
 
 `Health.enter` takes each cycle, cheaply; `ne107_condition` gives the status on request; `HealthKeeper` stores the
 counts over restarts.
+
+    valve_health                            all of it, cycle by cycle
+    travel_accumulator, stiction_index      how far and how often the stem went; how often it did not
+    ne107                                   status and causes
+    health_keeper, health_file              logs the status, stores the counts
 """
 
 from positioner.daemon.health.health_file import HealthRecord
