@@ -1,8 +1,10 @@
 """What several commands share.
 
-children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
-daemon_address                              where a daemon is
-csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
-diagnose_forces                             `diagnose` on a bench's recording
-authority, progress                         a test certificate authority; progress on a terminal
+A command imports from here what it needs when it runs.
+
+    children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
+    daemon_address                              where a daemon is
+    csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
+    diagnose_forces                             `diagnose` on a bench's recording
+    authority, progress                         a test certificate authority; progress on a terminal
 """
