@@ -2,12 +2,15 @@
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from config import codes
 from config.codes import Code, Fault, InhibitReason
+from config.daemon_file import Control
 from docs import code_tables
+from workbench.select.verdict import Verdict
 
 DOCS = Path(__file__).parents[2] / "docs"
 STALE = "stale: run python -m docs.code_tables"
@@ -36,6 +39,12 @@ def test_numbers_in_the_text_say_what_the_code_says() -> None:
 def test_the_table_of_faults_has_every_code_of_a_fault() -> None:
     table = said("architecture.md").partition("\n## How a fault ends\n")[2].partition("\n## ")[0]
     assert set(re.findall(r"`Fault\.(\w+)`", table)) == {each.name for each in Fault} - {"NONE"}
+
+
+def test_the_documents_have_every_verdict_and_every_law() -> None:
+    assert re.findall(r"^\| `(\w+)` \|", said("diagnosis.md"), re.MULTILINE) == list(get_args(Verdict))
+    laws = get_args(Control.model_fields["law"].annotation)
+    assert re.findall(r'"(\w+)"', said("law.md").partition("chooses:")[2].partition("\n")[0]) == list(laws)
 
 
 @pytest.mark.parametrize("path", sorted(DOCS.rglob("*.md")), ids=lambda path: path.name)
