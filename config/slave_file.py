@@ -1,5 +1,6 @@
 """The file of a simulated slave: `positioner sim CONFIG.toml`."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -116,6 +117,29 @@ class Change(Schema):
         return self
 
 
+class DeviceFault(Schema):
+    """Table `[[fault]]`: what goes wrong with the device at a time, s, since it was switched on, and for how long.
+
+    drop      it answers nothing                                   (Modbus: as a gateway says it, exception 11)
+    freeze    it answers, but its measurements and its clock stand still
+    jump      its position transmitter is off by `by_m`
+    restart   its clock and its settings begin anew; it takes no time
+    """
+
+    kind: Literal["drop", "freeze", "jump", "restart"]
+    at_s: NonNegative
+    over_s: NonNegative = math.inf
+    by_m: float = 0.0
+
+    @model_validator(mode="after")
+    def _says_what_its_kind_needs(self) -> Self:
+        if (self.kind == "jump") != (self.by_m != 0.0):
+            raise ValueError("by_m, other than 0, belongs with kind 'jump' and with no other")
+        if self.kind == "restart" and self.over_s != math.inf:
+            raise ValueError("over_s: a restart takes no time")
+        return self
+
+
 class SlaveFile(Schema):
     """A whole slave file. `valve` is a path from this file's folder, or the name of a shipped valve."""
 
@@ -127,6 +151,14 @@ class SlaveFile(Schema):
     supply: Supply = Supply()
     communication: CommunicationTimeout = CommunicationTimeout()
     change: tuple[Change, ...] = ()
+    fault: tuple[DeviceFault, ...] = ()
+
+    @model_validator(mode="after")
+    def _bus_can_show_its_faults(self) -> Self:
+        shown = {each.kind for each in self.fault} & {"drop", "restart"}
+        if self.bus.kind == "canopen" and shown:
+            raise ValueError(f"fault: {', '.join(sorted(shown))} is for Modbus; on CANopen: freeze, jump")
+        return self
 
 
 def load_slave(path: Path) -> SlaveFile:

@@ -40,8 +40,9 @@ class DeviceRegisters:
         """Return words of one image of the device, brought up to date.
 
         Raises:
-            RegisterError: ILLEGAL_ADDRESS, some lie outside the map.
+            RegisterError: ILLEGAL_ADDRESS, some lie outside the map; GATEWAY_NO_RESPONSE, it drops (`faults`).
         """
+        self._require_answering()
         first = address - self._layout.address
         if not 0 <= first <= first + count <= self._layout.words:
             raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
@@ -53,8 +54,9 @@ class DeviceRegisters:
         """Obey the quantities written, all or none.
 
         Raises:
-            RegisterError: ILLEGAL_ADDRESS, not whole writable quantities; ILLEGAL_VALUE.
+            RegisterError: ILLEGAL_ADDRESS, not whole writable quantities; ILLEGAL_VALUE; GATEWAY_NO_RESPONSE.
         """
+        self._require_answering()
         written = self._quantities(address, words)
         device = self._device
         try:
@@ -69,6 +71,12 @@ class DeviceRegisters:
                 self._clock.command(written["command_pa"])
         except ValueError:
             raise RegisterError(ExcCodes.ILLEGAL_VALUE) from None
+
+    def _require_answering(self) -> None:
+        """Let a device that drops pass by the request: in lockstep a period goes by, or it would never answer again."""
+        if self._device.drops:
+            self._clock.idle()
+            raise RegisterError(ExcCodes.GATEWAY_NO_RESPONSE)
 
     def _quantities(self, address: int, words: Sequence[int]) -> dict[str, float]:
         """Return the values written, by name."""

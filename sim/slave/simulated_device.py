@@ -7,7 +7,8 @@ from one sample to the next. Who lets the time pass is told apart by who calls w
     command, advance the master commands when it likes, the grid runs on: real time. After `communication_timeout_s`
                      without a command the device holds, vents or fills, and says so in its status until the next.
 
-Attributes carry the names of `config.device.QUANTITIES`.
+Attributes carry the names of `config.device.QUANTITIES`. What goes wrong with it by its file is judged at each sample
+that it measures (`faults`); `drops` says whether it answers.
 """
 
 import math
@@ -18,6 +19,7 @@ import numpy as np
 from config.device import CommunicationAction, DeviceStatus
 from config.slave_file import SlaveFile
 from sim.parameter_changes import Changes
+from sim.slave.faults import Faults
 from sim.transmitter import Transmitter
 
 HEALTHY = DeviceStatus(0)
@@ -68,29 +70,30 @@ class Device:
         self._maximum_pa = max(file.supply.maximum_pa, float(np.float32(file.supply.maximum_pa)))
         self._transmitter = Transmitter(file.sensor)
         self._changes = Changes(file.change, parameters)
+        self._file = file
+        self._faults = Faults(file.fault)
         self._quiet_until_s = 0.0 if file.change else math.inf
-        self._samples = 0
-        self._last_heard = 0
-        self.status = HEALTHY
-        self.command_pa = file.initial.pressure_pa
-        self.communication_timeout_s = file.communication.timeout_s
-        self.communication_action = CommunicationAction[file.communication.action.upper()]
+        self._samples = self._shown = 0
+        self._measured_s = 0.0
+        self.position_m = self.pressure_pa = 0.0
+        self.drops = False
+        self._boot()
         self._measure()
 
     @property
     def samples(self) -> int:
-        """How many periods have passed since it was switched on; does not wrap."""
+        """How many periods have passed since it was switched on; does not wrap, and goes on over a restart."""
         return self._samples
 
     @property
     def sample_counter(self) -> int:
         """The number of the sample as 32 bits hold it."""
-        return self._samples & 0xFFFFFFFF
+        return self._shown & 0xFFFFFFFF
 
     @property
     def device_time_us(self) -> int:
         """When the sample was taken, on the device's clock."""
-        return self._samples * self._period_us
+        return self._shown * self._period_us
 
     def check(self, command_pa: float) -> None:
         """Refuse a command that the I/P cannot deliver.
@@ -150,6 +153,14 @@ class Device:
         self.communication_action = action
         self._last_heard = self._samples
 
+    def _boot(self) -> None:
+        """Begin with the settings of the file."""
+        self._started = self._last_heard = self._samples
+        self.status = HEALTHY
+        self.command_pa = self._file.initial.pressure_pa
+        self.communication_timeout_s = self._file.communication.timeout_s
+        self.communication_action = CommunicationAction[self._file.communication.action.upper()]
+
     def _until_lost(self) -> int:
         """Return in how many periods the silence will have been too long; 0 is now."""
         if self.communication_timeout_s == 0 or self.status is LOST:
@@ -183,5 +194,16 @@ class Device:
             left -= stretch
 
     def _measure(self) -> None:
-        self.position_m = self._transmitter.measure(self._valve.indicated_m)
+        now_s = self._samples * self._period_s
+        found = self._faults.at(now_s, self._measured_s)
+        self._measured_s = now_s
+        self.drops = found.drops
+        if found.restarts:
+            self._boot()
+        # The transmitter goes on in any case, so that a fault does not change the noise after it.
+        position_m = self._transmitter.measure(self._valve.indicated_m)
+        if found.freezes:
+            return
+        self._shown = self._samples - self._started
+        self.position_m = position_m + found.jump_m if found.jump_m else position_m
         self.pressure_pa = self._valve.pressure_pa
