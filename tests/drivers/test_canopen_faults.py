@@ -18,8 +18,10 @@ from config.errors import InputError
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
-from drivers.canopen import driver as canopen_driver
-from drivers.canopen.driver import CanopenDriver, NodeEvent, cause_of
+from drivers.canopen import pdo, watcher
+from drivers.canopen.driver import CanopenDriver
+from drivers.canopen.events import NodeEvent
+from drivers.canopen.watcher import cause_of
 from fieldbus.canopen.loopback import free_channel
 from fieldbus.canopen.objects import NodeState
 from sim.slave import canopen_slave
@@ -153,10 +155,11 @@ def test_a_node_that_talks_of_all_else_does_not_keep_the_driver_beyond_its_time_
         now_s[0] += 1e-3
         return frame(HEARTBEAT, b"\x05")
 
-    monkeypatch.setattr(canopen_driver, "time", Clock)
-    monkeypatch.setattr(driver, "_receive", babble)
+    for each in (pdo, watcher):
+        monkeypatch.setattr(each, "time", Clock)
+    monkeypatch.setattr(driver._bus, "receive", babble)
     start_s = now_s[0]
-    fails(NoReply, NodeEvent.SYNC_LOST, driver._sample)
+    fails(NoReply, NodeEvent.SYNC_LOST, driver._pdos.sample)
     assert now_s[0] - start_s == pytest.approx(PATIENT_S, abs=2e-3)
 
 
@@ -230,7 +233,7 @@ def test_late_answers_to_what_was_asked_before_are_passed_over(driver: CanopenDr
     node.fault = lambda identity, data: [(ANSWER, STALE)] * 40 * (data[0] == 0x80) + [(identity, data)]
     assert driver.open() == PUSH_PA
     node.fault = lambda identity, data: [(ANSWER, STALE)] if data[0] == 0x80 else [(identity, data)]
-    driver._config = driver._config.model_copy(update={"reply_timeout_s": 0.1})
+    driver._sdo._timeout_s = 0.1
     fails(NoConnection, NodeEvent.NO_NODE, driver.open)
 
 
@@ -368,9 +371,7 @@ def test_a_node_operated_locally_is_no_actuator_and_says_why(
     assert driver.exchange(PUSH_PA + 1e3).status == 0
     assert node.device.command_pa == PUSH_PA + 1e3
     told = [
-        (each.message, each.__dict__["fields"].get("why"))
-        for each in caplog.records
-        if each.name == "drivers.canopen.driver"
+        (each.message, each.__dict__["fields"].get("why")) for each in caplog.records if each.name == "drivers.canopen"
     ]
     assert told == [(NodeEvent.NOT_ACTIVE, "it is operated locally"), (NodeEvent.ACTIVE, None)]
 

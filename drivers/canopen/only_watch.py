@@ -1,0 +1,76 @@
+"""Reads a node that another drives, or nobody: by SDO alone (no NMT, no SYNC, nothing set)."""
+
+from config.canopen_device import CanopenDevice
+from drivers.boundary import Capabilities, Reading, Refused
+from drivers.canopen.events import NodeEvent
+from drivers.canopen.node_bus import SDO_ANSWER, NodeBus
+from drivers.canopen.readings import capabilities_of, reading_of
+from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, sheet_variable
+from drivers.canopen.watcher import NodeWatcher
+from fieldbus.canopen.eds import read_eds
+
+
+class WatchingDriver:
+    """A driver that commands nothing. The values of one reading may be of several samples.
+
+    Args:
+        config: bus, node id, data sheet, time-outs, where its quantities are.
+
+    Raises:
+        InputError: the data sheet cannot be read, or has not what the map names.
+    """
+
+    def __init__(self, config: CanopenDevice) -> None:
+        sheet = read_eds(config.eds, config.node)
+        for name, entry in config.map.entries.items():
+            sheet_variable(sheet, config, name, entry)
+        self._config = config
+        self._bus = NodeBus(config)
+        self._sdo = SdoTransfers(config, sheet, self._bus, NodeWatcher(config, self._bus))
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the device can do."""
+        return capabilities_of(self._config)
+
+    def open(self) -> float:
+        """Return the command the node holds, in Pa.
+
+        Raises:
+            DriverError: not there, or not the one of the data sheet; the bus is left.
+        """
+        self.close()
+        try:
+            self._bus.open((SDO_ANSWER + self._config.node,))
+            self._sdo.open()
+            return self._sdo.held_command_pa(self._config.map.command_pa)
+        except BaseException:
+            self.close()
+            raise
+
+    def read(self) -> Reading:
+        """Return a measurement.
+
+        Raises:
+            DriverError: an object could not be read.
+        """
+        sampled = self._config.map.sampled
+        return reading_of({name: self._sdo.get(entry) for name, entry in sampled.items()})
+
+    def write(self, command_pa: float) -> None:
+        """Command nothing.
+
+        Raises:
+            Refused: always.
+        """
+        said = f"{command_pa:g} Pa: only_watch is set"
+        raise Refused(f"{self._bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)
+
+    def exchange(self, command_pa: float) -> Reading:
+        """Command nothing; raises as `write`."""
+        self.write(command_pa)
+        return self.read()
+
+    def close(self) -> None:
+        """Leave the bus. Never raises."""
+        self._bus.close()

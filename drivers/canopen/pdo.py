@@ -1,0 +1,223 @@
+"""The PDOs of a node: their mapping, and one cycle of them (CiA 301, 7.2.2 PDO and 7.2.5 SYNC).
+
+    RPDO 1  0x200 + n            command, control word            obeyed at SYNC
+    SYNC    `sync_cob_id`        empty
+    TPDOs   0x180, 0x280, .. + n the quantities of one sample     sent at each SYNC (transmission type 1)
+
+What a PDO carries is set by SDO in its records (0x1400 and 0x1600, 0x1800 and 0x1A00 on), the quantities packed first
+fit into 8 bytes each. A TPDO too short, twice, or without SYNC cannot be trusted: the bus is left.
+"""
+
+import math
+import struct
+import time
+
+import can
+from canopen.objectdictionary import ObjectDictionary, ODVariable
+
+from config.canopen_device import CanopenDevice, Entry
+from config.errors import InputError
+from drivers.boundary import BadReply, NoReply
+from drivers.canopen.events import NodeEvent
+from drivers.canopen.node_bus import NodeBus
+from drivers.canopen.sdo import REALS, SdoTransfers, sheet_variable
+from drivers.canopen.watcher import NodeWatcher
+from fieldbus.canopen.objects import MOST_PDOS, Control, first_fit
+
+RPDO, TPDO, MAPPING = 0x1400, 0x1800, 0x200
+"""First communication records; the mapping of each lies 0x200 higher."""
+INVALID = 1 << 31
+"""Of a PDO's COB-ID."""
+EACH_SYNC = 1
+RPDO_ID, TPDO_ID = 0x200, 0x180
+
+
+class Pdo:
+    """The mapped objects of one PDO.
+
+    Args:
+        record: the index of its communication record.
+        cob_id: its arbitration id.
+        entries: where each of its quantities lies, by name.
+        variables: what the data sheet says of each.
+    """
+
+    def __init__(self, record: int, cob_id: int, entries: dict[str, Entry], variables: dict[str, ODVariable]) -> None:
+        self.record, self.cob_id = record, cob_id
+        self.names = tuple(entries)
+        self.entries = tuple(entries.values())
+        objects = [variables[name] for name in entries]
+        self.mapping = [each.index << 16 | each.subindex << 8 | len(each) for each in objects]
+        letters = (ODVariable.STRUCT_TYPES[each.data_type or 0].format.lstrip("<") for each in objects)
+        self.layout = struct.Struct("<" + "".join(letters))
+        self._is_plain = all(entry.scale == 1 and entry.offset == 0 for entry in self.entries)
+        self._is_real = objects[0].data_type in REALS
+
+    def values(self, data: bytes | bytearray) -> dict[str, float]:
+        """Return the quantities by name, in the map's units."""
+        raw = self.layout.unpack_from(data)
+        if not self._is_plain:
+            raw = tuple(entry.value(each) for entry, each in zip(self.entries, raw, strict=True))
+        return dict(zip(self.names, raw, strict=True))
+
+    def command(self, command_pa: float, control: Control) -> bytes:
+        """Return the bytes of a command, in Pa, and the control word if it is mapped.
+
+        Raises:
+            ValueError: the command is not a finite number, or its object cannot hold it.
+        """
+        raw = self.entries[0].raw(command_pa)
+        try:
+            return self.layout.pack(raw if self._is_real else round(raw), *(int(control),)[: len(self.names) - 1])
+        except (struct.error, OverflowError):
+            raise ValueError(f"{command_pa:g} does not fit") from None
+
+    def configure(self, sdo: SdoTransfers) -> None:
+        """Tell the node; raises as `SdoTransfers.download`."""
+        sdo.download(self.record, 1, self.cob_id | INVALID)
+        sdo.download(self.record, 2, EACH_SYNC)
+        sdo.download(self.record + MAPPING, 0, 0)
+        for n, mapped in enumerate(self.mapping, 1):
+            sdo.download(self.record + MAPPING, n, mapped)
+        sdo.download(self.record + MAPPING, 0, len(self.mapping))
+        sdo.download(self.record, 1, self.cob_id)
+
+
+class PdoExchange:
+    """The cycle of one node: command and SYNC out, the TPDOs of that SYNC back.
+
+    Args:
+        config: which quantities, and the reply time-out.
+        sheet: the data sheet, read for this node.
+        bus: the node's frames.
+        watcher: takes what else comes.
+
+    Raises:
+        InputError: the data sheet has not what the map names, or not enough TPDOs.
+    """
+
+    def __init__(self, config: CanopenDevice, sheet: ObjectDictionary, bus: NodeBus, watcher: NodeWatcher) -> None:
+        self._sheet, self._bus, self._watcher = sheet, bus, watcher
+        self._reply_timeout_s = config.reply_timeout_s
+        sampled, commanded = config.map.sampled, config.map.commanded
+        variables = {
+            name: sheet_variable(sheet, config, name, entry) for name, entry in {**sampled, **commanded}.items()
+        }
+        groups = self._grouped(config, {name: len(variables[name]) // 8 for name in sampled})
+        self._tpdos = {
+            self._tpdo_id(n): Pdo(TPDO + n, self._tpdo_id(n), {each: sampled[each] for each in names}, variables)
+            for n, names in enumerate(groups)
+        }
+        self._rpdo = Pdo(RPDO, RPDO_ID + bus.node, commanded, variables)
+        self._command = can.Message(arbitration_id=self._rpdo.cob_id, data=bytes(8), is_extended_id=False)
+        self._sync = can.Message(arbitration_id=config.sync_cob_id, is_extended_id=False)
+
+    @property
+    def tpdo_ids(self) -> tuple[int, ...]:
+        """The arbitration ids of the TPDOs in use."""
+        return tuple(self._tpdos)
+
+    def configure(self, sdo: SdoTransfers) -> None:
+        """Tell the node what its PDOs carry; those not needed become invalid. Raises as `SdoTransfers.download`."""
+        for pdo in (self._rpdo, *self._tpdos.values()):
+            pdo.configure(sdo)
+        for n in range(len(self._tpdos), MOST_PDOS):
+            if TPDO + n in self._sheet:
+                sdo.download(TPDO + n, 1, self._tpdo_id(n) | INVALID)
+
+    def prepare(self, command_pa: float, control: Control) -> None:
+        """Set the command that `send` sends.
+
+        Raises:
+            ValueError: the command is not a finite number, or its object cannot hold it.
+        """
+        data = self._rpdo.command(command_pa, control)
+        self._command.data, self._command.dlc = bytearray(data), len(data)
+
+    def catch_up(self) -> None:
+        """Take in what came since the last cycle.
+
+        Raises:
+            BadReply: a TPDO, which only SYNC may bring.
+            NoConnection: the node is lost.
+        """
+        self._bus.require_open()
+        self._watcher.refusal = None
+        while (message := self._bus.receive(0.0)) is not None:
+            if message.arbitration_id in self._tpdos:
+                said = "a TPDO without SYNC: another node has this id, or another master sends SYNC"
+                raise self._bus.closing_fault(BadReply, NodeEvent.NODE_ID_TAKEN, said)
+            self._watcher.consume(message)
+
+    def send_command(self) -> None:
+        """Send the RPDO.
+
+        Raises:
+            NoConnection: the bus is off.
+        """
+        self._bus.put(self._command)
+
+    def sample(self) -> dict[str, float]:
+        """Send SYNC and return the quantities of the sample that it brings, by name, in the map's units.
+
+        Raises:
+            NoReply: TPDOs are missing after the reply time-out, or heartbeats are.
+            BadReply: a TPDO too short or twice, or a number that is none.
+            NoConnection: the node is lost.
+        """
+        self._bus.put(self._sync)
+        values = self._received()
+        self._watcher.require_heartbeat()
+        if not all(map(math.isfinite, values.values())):
+            said = ", ".join(f"{name} {value}" for name, value in values.items())
+            raise BadReply(f"{self._bus.who}: a measurement that is no number: {said}")
+        return values
+
+    def _received(self) -> dict[str, float]:
+        """Wait for the TPDOs of the SYNC just sent."""
+        missing = dict(self._tpdos)
+        values: dict[str, float] = {}
+        rest_s = self._reply_timeout_s
+        end_s = time.monotonic() + rest_s
+        while missing:
+            message = self._bus.receive(max(0.0, rest_s))
+            rest_s = end_s - time.monotonic()
+            if message is not None and message.arbitration_id in missing:
+                values.update(self._unpacked(missing.pop(message.arbitration_id), message))
+                continue
+            if message is not None:
+                self._consume_other(message)
+            if rest_s <= 0:
+                raise self._silent(len(missing))
+        return values
+
+    def _unpacked(self, pdo: Pdo, message: can.Message) -> dict[str, float]:
+        if len(message.data) < pdo.layout.size:
+            said = f"TPDO {pdo.record - TPDO + 1} has {len(message.data)} bytes, mapped are {pdo.layout.size}"
+            raise self._bus.closing_fault(BadReply, NodeEvent.PDO_TOO_SHORT, said)
+        return pdo.values(message.data)
+
+    def _consume_other(self, message: can.Message) -> None:
+        if message.arbitration_id in self._tpdos:
+            said = "the same TPDO came twice after one SYNC"
+            raise self._bus.closing_fault(BadReply, NodeEvent.NODE_ID_TAKEN, said)
+        self._watcher.consume(message)
+
+    def _silent(self, missing: int) -> Exception:
+        """Return what it means that TPDOs are missing."""
+        event = NodeEvent.HEARTBEAT_LOST if self._watcher.is_silent else NodeEvent.SYNC_LOST
+        said = (
+            f"{missing} of {len(self._tpdos)} TPDOs missing {1e3 * self._reply_timeout_s:g} ms after SYNC, "
+            f"last heartbeat {1e3 * self._watcher.silence_s:.0f} ms ago"
+        )
+        return self._bus.closing_fault(NoReply, event, said)
+
+    def _grouped(self, config: CanopenDevice, sizes: dict[str, int]) -> list[list[str]]:
+        groups = first_fit(sizes)
+        offered = sum(TPDO + n in self._sheet for n in range(MOST_PDOS))
+        if len(groups) > offered:
+            raise InputError(str(config.eds), f"device.map: needs {len(groups)} TPDOs, the data sheet offers {offered}")
+        return groups
+
+    def _tpdo_id(self, n: int) -> int:
+        return TPDO_ID + 0x100 * n + self._bus.node

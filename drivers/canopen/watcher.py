@@ -1,0 +1,131 @@
+"""What a node says of itself, unasked: heartbeat, boot-up and emergencies (CiA 301, 7.2.8 and 7.2.7).
+
+    heartbeat   0x700 + n, one byte: 0 boot-up, 4 STOPPED, 5 OPERATIONAL, 127 PRE-OPERATIONAL
+    emergency   0x080 + n, error code (2 bytes), error register (1 byte), five of the manufacturer's own
+
+A node that boots, leaves OPERATIONAL or falls silent is lost: the bus is left, and the driver must be opened again.
+Emergencies are logged with their cause.
+"""
+
+import logging
+import math
+import struct
+import time
+
+import can
+
+from config.canopen_device import CanopenDevice
+from drivers.boundary import NoConnection, NoReply
+from drivers.canopen.events import NodeEvent
+from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NodeBus
+
+OPERATIONAL, BOOT_UP = 5, 0
+NMT_STATES = {0: "booting", 4: "STOPPED", 5: "OPERATIONAL", 127: "PRE-OPERATIONAL"}
+COMMAND_OUT_OF_RANGE = 0x6320
+EMERGENCIES = {
+    0x1000: "generic error",
+    0x2000: "current",
+    0x3000: "voltage",
+    0x4000: "temperature",
+    0x5000: "device hardware",
+    0x6000: "device software",
+    0x6300: "data set",
+    COMMAND_OUT_OF_RANGE: "a parameter is out of its range",
+    0x7000: "additional modules",
+    0x8000: "monitoring",
+    0x8100: "communication",
+    0x8110: "CAN overrun, frames were lost",
+    0x8120: "CAN in error passive mode",
+    0x8130: "life guard or heartbeat error",
+    0x8140: "recovered from bus off",
+    0x8150: "collision of CAN identifiers",
+    0x8200: "protocol error",
+    0x8210: "PDO not processed due to its length",
+    0x8220: "PDO longer than mapped",
+    0x8240: "unexpected length of SYNC",
+    0x8250: "no RPDO within the communication time-out",
+    0x9000: "external error",
+    0xF000: "additional functions",
+    0xFF00: "specific to the device",
+}
+"""Error codes of CiA 301; a class ends in 00 or 000."""
+
+
+def cause_of(code: int) -> str:
+    """Return what an emergency's error code means."""
+    classes = (code, code & 0xFF00, code & 0xF000)
+    return next((EMERGENCIES[each] for each in classes if each in EMERGENCIES), "not in CiA 301")
+
+
+class NodeWatcher:
+    """Consumer of a node's heartbeats and emergencies.
+
+    Args:
+        config: the heartbeat's time-out.
+        bus: the node's frames.
+    """
+
+    def __init__(self, config: CanopenDevice, bus: NodeBus) -> None:
+        self._bus = bus
+        self._heartbeat_timeout_s = config.heartbeat_timeout_s
+        self._heartbeat_id, self._emergency_id = HEARTBEAT + bus.node, EMERGENCY + bus.node
+        self._heard_s = -math.inf
+        self._was_operational = False
+        self.refusal: str | None = None
+        """Why the node refused a command since this was last set to None."""
+
+    @property
+    def silence_s(self) -> float:
+        """Time since the last heartbeat."""
+        return time.monotonic() - self._heard_s
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether heartbeats have been missing for longer than the time-out."""
+        return self.silence_s > self._heartbeat_timeout_s
+
+    def begin(self) -> None:
+        """The node was just started: its heartbeats count from now on."""
+        self._heard_s, self._was_operational = time.monotonic(), False
+
+    def consume(self, message: can.Message) -> None:
+        """Take in a frame; what is neither heartbeat nor emergency is passed over.
+
+        Raises:
+            NoConnection: the node booted, or is not OPERATIONAL any more.
+        """
+        code = self.consume_emergency(message)
+        if code is not None:
+            self.refusal = cause_of(code) if code == COMMAND_OUT_OF_RANGE else self.refusal
+        elif message.arbitration_id == self._heartbeat_id and len(message.data) == 1:
+            self._consume_heartbeat(message.data[0] & 0x7F)
+
+    def consume_emergency(self, message: can.Message) -> int | None:
+        """Log an emergency with its cause; return its code, None if the frame is something else."""
+        if message.arbitration_id != self._emergency_id or len(message.data) < 3:
+            return None
+        code, register = struct.unpack_from("<HB", message.data)
+        level, cause = (logging.WARNING, cause_of(code)) if code else (logging.INFO, "over")
+        self._bus.say(level, NodeEvent.EMERGENCY, code=code, cause=cause, register=register)
+        return int(code)
+
+    def require_heartbeat(self) -> None:
+        """Ask that the last heartbeat is not too old.
+
+        Raises:
+            NoReply: it is.
+        """
+        if self.is_silent:
+            said = f"the last came {1e3 * self.silence_s:.0f} ms ago"
+            raise self._bus.closing_fault(NoReply, NodeEvent.HEARTBEAT_LOST, said)
+
+    def _consume_heartbeat(self, state: int) -> None:
+        self._heard_s = time.monotonic()
+        if state == BOOT_UP:
+            said = "it booted, and must be configured anew"
+            raise self._bus.closing_fault(NoConnection, NodeEvent.NODE_RESTARTED, said)
+        # One that left before the node was started may come after; a node that was not started sends no TPDO.
+        self._was_operational |= state == OPERATIONAL
+        if state != OPERATIONAL and self._was_operational:
+            said = f"its heartbeat says {NMT_STATES.get(state, str(state))}"
+            raise self._bus.closing_fault(NoConnection, NodeEvent.NOT_OPERATIONAL, said)
