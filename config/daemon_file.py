@@ -21,7 +21,7 @@ from config.loading import Fraction, NonNegative, Positive, Schema, read_toml, v
 from config.tls_table import Tls
 
 
-class PositionedValve(Schema):
+class ValveTable(Schema):
     """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
 
     name: str = "valve"
@@ -30,7 +30,7 @@ class PositionedValve(Schema):
     """F_s / A where it is known: the excitation's constant part must exceed it."""
 
 
-class Cycle(Schema):
+class CycleTable(Schema):
     """Table `[cycle]`: in real time, or as fast as a device in lockstep answers, on the device's clock."""
 
     pace: Literal["real_time", "device"] = "real_time"
@@ -38,7 +38,7 @@ class Cycle(Schema):
     """Of the loop in real time; a device in lockstep has its own."""
 
 
-class PressureLimits(Schema):
+class PressureTable(Schema):
     """Table `[pressure]`: every command lies between these."""
 
     minimum_pa: NonNegative = 0.0
@@ -51,7 +51,7 @@ class PressureLimits(Schema):
         return self
 
 
-class Safety(Schema):
+class SafetyTable(Schema):
     """Table `[safety]`: what ends in the safe state, and what that is."""
 
     action: ActionName = "hold"
@@ -65,7 +65,7 @@ class Safety(Schema):
     heartbeat_action: ActionName = "hold"
 
 
-class Identification(Schema):
+class IdentificationTable(Schema):
     """Table `[identification]`: the window of the algebraic identifier, its derivative filters, the sensors' noise."""
 
     window_s: Positive = 0.8
@@ -84,7 +84,7 @@ class Identification(Schema):
         return self
 
 
-class Excitation(Schema):
+class ExcitationTable(Schema):
     """Table `[excitation]`: what S3 applies until the DCS writes otherwise, and how long at the most."""
 
     alpha_pa: NonNegative = 0.0
@@ -93,14 +93,14 @@ class Excitation(Schema):
     limit_s: Positive = 10.0
 
 
-class Law(Schema):
+class LawTable(Schema):
     """Table `[law]`: an earlier identification's ratios, so that a restart need not excite the valve again."""
 
     b_over_c_pa_per_m: Annotated[float, Field(lt=0)]
     k_over_c_pa: Annotated[float, Field(lt=0)]
 
 
-class Control(Schema):
+class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what the law for small moves may do."""
 
     law: Literal["seed", "breakaway"] = "seed"
@@ -110,7 +110,7 @@ class Control(Schema):
     """The most a pulse may push beyond the balance of the moving stem; F_c / A as identified where nobody says."""
 
 
-class Supervisory(Schema):
+class SupervisoryTable(Schema):
     """Table `[supervisory]`: where the DCS finds the registers. Port 0 takes any free one; the daemon says which."""
 
     host: str = "127.0.0.1"
@@ -120,7 +120,7 @@ class Supervisory(Schema):
     """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
 
 
-class Recorder(Schema):
+class RecorderTable(Schema):
     """Table `[recorder]`: recordings in a folder, a new file at a size, the oldest deleted beyond a number."""
 
     folder: str
@@ -128,7 +128,7 @@ class Recorder(Schema):
     keep_files: Annotated[int, Field(ge=1)] = 20
 
 
-class Health(Schema):
+class HealthTable(Schema):
     """Table `[health]`: what counts as wear, from where on it calls for maintenance, and where its counts are kept.
 
     A limit of 0 is none.
@@ -155,7 +155,7 @@ class Health(Schema):
         return self
 
 
-class Log(Schema):
+class LogTable(Schema):
     """Table `[log]`: JSON lines on standard error."""
 
     level: Literal["debug", "info", "warning", "error"] = "info"
@@ -164,19 +164,19 @@ class Log(Schema):
 class DaemonFile(Schema):
     """A whole daemon file."""
 
-    valve: PositionedValve
+    valve: ValveTable
     device: AnyDevice = ModbusTcpDevice()
-    cycle: Cycle = Cycle()
-    pressure: PressureLimits = PressureLimits()
-    safety: Safety = Safety()
-    identification: Identification = Identification()
-    excitation: Excitation = Excitation()
-    law: Law | None = None
-    control: Control = Control()
-    supervisory: Supervisory = Supervisory()
-    recorder: Recorder | None = None
-    health: Health = Health()
-    log: Log = Log()
+    cycle: CycleTable = CycleTable()
+    pressure: PressureTable = PressureTable()
+    safety: SafetyTable = SafetyTable()
+    identification: IdentificationTable = IdentificationTable()
+    excitation: ExcitationTable = ExcitationTable()
+    law: LawTable | None = None
+    control: ControlTable = ControlTable()
+    supervisory: SupervisoryTable = SupervisoryTable()
+    recorder: RecorderTable | None = None
+    health: HealthTable = HealthTable()
+    log: LogTable = LogTable()
 
 
 SHARED = frozenset({"supervisory", "log"})
@@ -221,7 +221,7 @@ def _alone(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, An
     if not isinstance(entry, dict):
         raise InputError(where, "is not a table")
     where = f"{where} ({entry['name']})" if "name" in entry else where
-    allowed = {*PositionedValve.model_fields, "unit", *OWN}
+    allowed = {*ValveTable.model_fields, "unit", *OWN}
     if unknown := entry.keys() - allowed:
         raise InputError(where, f"valve.{min(unknown)}: unknown key; allowed here: {', '.join(sorted(allowed))}")
     for key in ("name", "unit"):
@@ -231,7 +231,7 @@ def _alone(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, An
     supervisory = tables.get("supervisory", {})
     if "unit" in supervisory:
         raise InputError(where, "supervisory.unit: each of several valves has its own unit, in [[valve]]")
-    valve = {key: value for key, value in entry.items() if key in PositionedValve.model_fields}
+    valve = {key: value for key, value in entry.items() if key in ValveTable.model_fields}
     return {**tables, **own, "valve": valve, "supervisory": {**supervisory, "unit": entry["unit"]}}, where
 
 

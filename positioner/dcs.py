@@ -116,7 +116,7 @@ class Dcs:
         However it ends, eta is 1 again afterwards: S3 gives back the law.
 
         Args:
-            swing: alpha, beta, omega as far as they are to differ from what the daemon has.
+            excitation: alpha, beta, omega as far as they are to differ from what the daemon has.
             timeout_s: give up after this long.
             show: called with the progress, 0 to 1.
         """

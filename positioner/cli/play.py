@@ -19,7 +19,7 @@ EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.
 
 IDENTIFY_S = 1.5
 """Time given to the identification before the reference begins."""
-HAIR_S = 1e-9
+ROUNDING_S = 1e-9
 """What a sum of periods may fall short of a time by rounding."""
 
 
@@ -116,7 +116,7 @@ def _script(time_s: "Column", reference_m: "Column") -> "Script":
     from positioner.control.requests import QUIET
 
     def ask(snapshot: "Snapshot", requests: "Requests") -> "Requests":
-        elapsed_s = snapshot.sample.time_s - IDENTIFY_S + HAIR_S
+        elapsed_s = snapshot.sample.time_s - IDENTIFY_S + ROUNDING_S
         if elapsed_s < 0:
             identified = snapshot.decision.estimates.progress >= 1
             return replace(requests, eta=QUIET if identified else (0, 0, 0))

@@ -1,4 +1,4 @@
-"""`positioner sim`: the simulated valve slave alone, until it is told to end."""
+"""`positioner sim`: the simulated valve slave alone, until a signal ends it."""
 
 import argparse
 import signal
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until told to end.
+    """Serve until a signal ends it.
 
     Raises:
         InputError: a fault in a file, or the port is in use.

@@ -21,7 +21,7 @@ time of v = 0 is then looked for, in growing steps.
 
 The end d(z_p, z_h, T) depends on theta = (ln omega, ln zeta, beta_up, beta_down), beta the error of the balance in
 that direction: the stem obeys z + beta. Each pulse that moved it is a measurement of d, and theta follows by an
-extended Kalman filter: a braked end tells of omega and zeta, a slide of beta. For S = J P J' + R,
+extended Kalman filter: a braked end informs on omega and zeta, a slide on beta. For S = J P J' + R,
 
     theta' = theta + P J' (d_measured - d) / S,     P' = P - P J' J P / S + Q
 

@@ -1,7 +1,7 @@
 """What the DCS asks for. One immutable snapshot is read once a cycle.
 
 Events (a write of the mode, of the reference, an acknowledgement, a heartbeat) are counts that only grow, so that a
-cycle sees every one, and none twice.
+cycle takes every one, and none twice.
 """
 
 from dataclasses import dataclass

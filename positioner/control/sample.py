@@ -1,4 +1,4 @@
-"""One measurement, as the control core sees it. Time comes in as data."""
+"""One measurement, as the control core takes it. Time comes in as data."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ class Sample:
     """What one cycle knows of the valve. After a lost reply the last values stand, with quality LOST."""
 
     now_s: float
-    """Time of this cycle, on the clock that judges ages."""
+    """Time of this cycle, on the clock by which ages are measured."""
     time_s: float
     """Time of the measurement, on the device's clock where it has one."""
     position_m: float

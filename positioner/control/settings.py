@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from config.daemon_file import DaemonFile, Law
+from config.daemon_file import DaemonFile, LawTable
 from config.device import ActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
@@ -83,5 +83,5 @@ def _breakaway(file: DaemonFile) -> BreakawaySettings:
     )
 
 
-def _ratios(law: Law) -> Ratios:
+def _ratios(law: LawTable) -> Ratios:
     return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa)

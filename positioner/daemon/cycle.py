@@ -86,7 +86,7 @@ class Cycle:
 
 
 def run_in_turn(cycles: Sequence[Cycle], stop: Event) -> None:
-    """Run cycles, those of one line, one after another until told to stop."""
+    """Run cycles, those of one line, one after another until `stop` is set."""
     for cycle in cycles:
         cycle.prepare()
     while not stop.is_set():

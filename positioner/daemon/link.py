@@ -103,7 +103,7 @@ class Link:
         )
 
     def _count(self, reading: Reading) -> bool:
-        """Count the samples that were missed; return whether this one was seen before."""
+        """Count the samples that were missed; return whether this one came before."""
         before = self._reading
         if before is None:
             return False

@@ -88,7 +88,7 @@ class RealTimePace:
             pass
         return missed
 
-    def now_s(self, device_time_s: float | None) -> float:  # noqa: ARG002 - the gateway's clock judges ages
+    def now_s(self, device_time_s: float | None) -> float:  # noqa: ARG002 - ages are by the gateway's clock
         """Return the gateway's monotonic time."""
         return time.monotonic()
 

@@ -58,7 +58,7 @@ class ServedValve:
         return self.file.valve.name
 
     def served(self) -> SupervisoryRegisters:
-        """Make what the DCS sees of it."""
+        """Return its supervisory registers."""
         settings = self.settings
         return SupervisoryRegisters(
             self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name
@@ -71,7 +71,7 @@ class ServedValve:
 
 
 def serve(files: Sequence[DaemonFile], source: Path) -> int:
-    """Run the daemon of these valves until it is told to stop; return the exit status.
+    """Run the daemon of these valves until a signal stops it; return the exit status.
 
     The only valve's device must be there. Of several, one that is not there is a fault of that valve alone.
 

@@ -147,7 +147,7 @@ class Identifier:
         """Count what a straight line leaves out over this step; over the first it is as over the second."""
         if self._slope is not None:
             before = self._h_before
-            # A short step before tells noise, not slope: what follows it counts for less.
+            # A short step before gives noise, not slope: what follows it counts for less.
             left_out = h * h * min(h, before) / 6 * (slope - self._slope) / (h + before)
             self._bends += left_out * left_out * (2 if self._count == 1 else 1)
         self._slope, self._h_before = slope, h

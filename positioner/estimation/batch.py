@@ -4,7 +4,7 @@ The daemon's refinement and `positioner estimate` are this one function. What is
 
 - how the pressure goes between the samples, when nobody says: held (the value at a sample is that of the interval
   before it), held ahead (of the interval after it) or linear; each is fitted and the likeliest taken;
-- whether stamps that jitter tell when the samples were taken, or when they arrived of samples taken evenly: the stem
+- whether stamps that jitter are when the samples were taken, or when they arrived of samples taken evenly: the stem
   moves by more than its sensor's noise within a tenth of a period of its jerk. Both are fitted, the likelier taken;
 - a, b, c and k hang on μ = m/k_s, g and q do not. When the standard deviation of ln μ exceeds what is allowed, or more
   than three quarters of what is known of it hangs on a single sample, the mass is not identifiable: a, b, c, k are

@@ -1,6 +1,6 @@
 """A motion prepared for the fit: its rows from where it begins, averaged in blocks when long, and the rest before it.
 
-What a motion knows of its beginning is worth much, for m and F_v are told apart in the first milliseconds. When a held
+What a motion knows of its beginning is worth much, for m and F_v are separated in the first milliseconds. When a held
 pressure jumps, and the stem leaves its rest there, it starts at that instant with v_0 = 0 from where it rested, x_0, of
 which each sample at rest is a measurement. Where no single jump stands out, the stem breaks away by the drop from F_s
 to F_c, whose course (Stribeck, presliding) is no part of this model: then, and when the beginning was not measured, x_0
@@ -17,7 +17,7 @@ from positioner.estimation.motion_segment import MotionSegment
 MOST_ROWS = 8000
 """A longer motion is averaged in blocks. A block of length T_b shifts μ by T_b^2/24: with 8000 of them nothing."""
 START_ROWS = 300
-"""Rows of the search for a start, in blocks that grow from the beginning, where m and F_v are told apart."""
+"""Rows of the search for a start, in blocks that grow from the beginning, where m and F_v are separated."""
 CLEAR = 0.05
 """A jump of the pressure stands out when every other near it is a smaller share of it."""
 

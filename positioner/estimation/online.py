@@ -346,7 +346,7 @@ class Identification:
         return ValidityCheck(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
 
     def _publish(self, fresh: Estimates) -> None:
-        """Take fresh estimates, unless what an earlier stretch of motion has given is known better."""
+        """Take fresh estimates, unless an earlier motion gave estimates with a smaller variance."""
         relative_variance = fresh.relative_variance if fresh.acceptable else inf
         if relative_variance < self._relative_variance or not self.estimates.acceptable:
             self.estimates = replace(fresh, breakaway=self.estimates.breakaway)

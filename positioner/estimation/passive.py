@@ -1,6 +1,6 @@
 """Passive identification: a valve that ages, identified from its ordinary moves.
 
-A move of the DCS is some tens of milliseconds of motion between two rests. Alone it tells little of m and F_v, much of
+A move of the DCS is some tens of milliseconds of motion between two rests. Alone it says little of m and F_v, much of
 q = -F_c/k_s: the stem comes to rest where g u + q σ is. So each move is fitted with what was known before it as the
 prior (`likelihood`): the posterior is the next prior, a Kalman filter whose measurement is a whole motion. Between two
 moves Δt apart the parameters may have walked,
@@ -9,7 +9,7 @@ moves Δt apart the parameters may have walked,
 
 so that friction drifting by 3 % a minute is followed and the spring is not bent to explain it. One move knows only
 g u + q σ where it ended; the information is carried as its root, which may be singular, so that two moves of different
-ends or directions tell g and q apart. What is published is valid by the same rules as everywhere: information is the
+ends or directions separate g and q. What is published is valid by the same rules as everywhere: information is the
 gate, not the clock.
 """
 

@@ -1,6 +1,6 @@
 """The motions of one direction in a record: rest, reversal and the time at an end stop are left out.
 
-The straight line's slope over a window of length T about each sample tells whether the stem moves there. White noise σ
+The straight line's slope over a window of length T about each sample shows whether the stem moves there. White noise σ
 sampled every h leaves the slope a standard deviation of sqrt(12 h) σ / T^(3/2); T is chosen so that it is a fifth of
 the slowest motion that is to be detected, and no shorter than six samples:
 

@@ -21,7 +21,7 @@ from positioner.estimation.friction_estimator import Means, friction
 from positioner.estimation.weighted import Solution
 
 LARGEST_NOISE_SHARE = 0.05
-"""Beyond this share of noise in P, a, b and c are biased by more than their standard deviation tells."""
+"""Beyond this share of noise in P, a, b and c are biased by more than their standard deviation says."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -163,8 +163,8 @@ def _kernels(ends: Array) -> tuple[Array, Array, "npt.NDArray[np.intp]"]:
         found += tau_e * (coefficients.T @ powers)
         tau_e = tau_e * np.tile(tau, len(ends))
     shaped = found.reshape(len(CHAINS), len(ROWS), len(ends), len(tau)).transpose(0, 2, 1, 3)
-    stretches = np.repeat(np.arange(len(ends)), len(_NODES))
-    return shaped.reshape(len(CHAINS), len(ROWS) * len(ends), len(tau)), lengths, stretches
+    intervals = np.repeat(np.arange(len(ends)), len(_NODES))
+    return shaped.reshape(len(CHAINS), len(ROWS) * len(ends), len(tau)), lengths, intervals
 
 
 def _densities(windows: Sequence[Window], position_noise: float, pressure_noise: float | None = None) -> Array:

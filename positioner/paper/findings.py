@@ -29,7 +29,7 @@ from sim.valve import Valve
 SETTLED_S = 0.2
 """The steady state is the last part of a step."""
 LARGEST_MISMATCH = 0.01
-"""Share of a, b, c that would be seen in the seed's figures 3 to 5."""
+"""Share of a, b, c that would show in the seed's figures 3 to 5."""
 LARGEST_ERROR_PU = 0.01
 """The seed's own figure."""
 SEED_LAW_GRID_S = 1e-3

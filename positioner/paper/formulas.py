@@ -324,7 +324,7 @@ def largest_sample_pu(noise: Noise, run: ScenarioRun) -> float:
 
 
 def refusal_of_printed_static_friction(valve: ValveParameters) -> str:
-    """Return what is said to a person whose valve file has F_s as printed; empty if nothing is."""
+    """Return the error of a valve file with F_s as printed; empty if it is accepted."""
     try:
         validated(ValveParameters, valve.model_dump() | {"static_n": PRINTED_STATIC_N}, "F_s as printed")
     except InputError as error:

@@ -182,12 +182,12 @@ def _draw_tracking(path: Path, seed_tracks: Sequence[tuple[ScenarioRun, Paramete
 
 
 def _paint_states(axes: "Axes") -> None:
-    stretches = (
+    spans = (
         (State.S3_IDENTIFY, 0.0, S1_FROM_S),
         (State.S1_UP, S1_FROM_S, S2_FROM_S),
         (State.S2_DOWN, S2_FROM_S, UNTIL_S),
     )
-    for state, begin_s, end_s in stretches:
+    for state, begin_s, end_s in spans:
         axes.axvspan(begin_s, end_s, color=STATE_COLOURS[state], alpha=0.45, lw=0, zorder=0)
         axes.text((begin_s + end_s) / 2, 0.04, state.name[:2], ha="center", transform=axes.get_xaxis_transform())
     axes.grid(alpha=0.3)

@@ -81,7 +81,7 @@ def respond(recording: Recording) -> ResponseFigures:
 
 
 def _usable(recording: Recording, notes: list[str]) -> NDArray[np.bool_]:
-    """Return which rows tell anything, and note those that do not."""
+    """Return which rows are used, and note those that are not."""
     finite = np.isfinite(recording.position_m)
     if missing := int((~finite).sum()):
         notes.append(f"{missing} of {len(finite)} rows have no position and were left out")

@@ -19,7 +19,7 @@ from config.recording import Column
 _TO_SIGMA = 1.4826
 _OF_MEDIAN = 1.2533
 REST_SHARE = 0.2
-"""The last part of a hold that tells where the stem rests."""
+"""The last part of a hold from which the rest is taken."""
 FEWEST = 5
 """Samples that a rest needs."""
 

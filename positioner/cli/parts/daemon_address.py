@@ -32,14 +32,14 @@ def connected(arguments: argparse.Namespace) -> "Dcs":
     Raises:
         InputError: a fault in the daemon's file, or a valve is named without it.
     """
-    from config.daemon_file import Supervisory, load_daemon
+    from config.daemon_file import SupervisoryTable, load_daemon
     from config.errors import InputError
     from config.tls_table import Tls
     from positioner.dcs import Dcs
 
     if arguments.valve is not None and arguments.config is None:
         raise InputError("--valve", "needs --config, the daemon's file that names it; or say --unit")
-    where = load_daemon(arguments.config, arguments.valve).supervisory if arguments.config else Supervisory()
+    where = load_daemon(arguments.config, arguments.valve).supervisory if arguments.config else SupervisoryTable()
     host, port, unit = (
         getattr(where, key) if (said := getattr(arguments, key)) is None else said for key in ("host", "port", "unit")
     )

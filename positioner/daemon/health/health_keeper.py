@@ -1,4 +1,4 @@
-"""Looks after a valve's health beside the cycle: says in the log when its status changes, and keeps its counts.
+"""Keeps a valve's health beside the cycle: logs when its status changes, and keeps its counts.
 
 The counts are written a minute after the last time, at once when the baseline changed, and at the end: a crash costs a
 minute of them at the most.
@@ -81,7 +81,7 @@ class HealthKeeper:
         self._thread.join()
 
     def check(self) -> None:
-        """Look once: tell a new status, and write when it is time."""
+        """Check once: log a new status, and write the counts when it is time."""
         now = ne107_condition(self._decided(), self._health)
         if now != self._logged:
             self._logged = now
@@ -96,7 +96,7 @@ class HealthKeeper:
             self.store(record)
 
     def store(self, record: HealthRecord) -> None:
-        """Write a record if it is not the one last written; one line tells when that fails."""
+        """Write a record if it is not the one last written; one line of the log when that fails."""
         if self._file is None or record == self._written:
             return
         try:

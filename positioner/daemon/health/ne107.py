@@ -33,7 +33,7 @@ CLASS = {
 """The class of each cause, worst first."""
 
 FEWEST_MOVES = 5
-"""Moves judged before the stiction index says anything."""
+"""Moves judged before the stiction index counts."""
 
 
 @dataclass(frozen=True, slots=True)

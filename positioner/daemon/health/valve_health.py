@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 from config.codes import Mode, Quality, State
-from config.daemon_file import Health as HealthTable
+from config.daemon_file import HealthTable
 from positioner.control.controller import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -23,7 +23,7 @@ from positioner.estimation.acceptance import Applied
 
 @dataclass(frozen=True, slots=True)
 class HealthSettings:
-    """What health is judged by; a limit of 0 is none."""
+    """The limits of health; a limit of 0 is none."""
 
     stroke_m: float
     dead_band_m: float
