@@ -8,7 +8,7 @@ import pytest
 
 from config import codes
 from config.codes import Code, Fault, InhibitReason
-from config.daemon_file import Control
+from config.daemon_file import ControlTable
 from docs import code_tables
 from workbench.select.verdict import Verdict
 
@@ -43,7 +43,7 @@ def test_the_table_of_faults_has_every_code_of_a_fault() -> None:
 
 def test_the_documents_have_every_verdict_and_every_law() -> None:
     assert re.findall(r"^\| `(\w+)` \|", said("diagnosis.md"), re.MULTILINE) == list(get_args(Verdict))
-    laws = get_args(Control.model_fields["law"].annotation)
+    laws = get_args(ControlTable.model_fields["law"].annotation)
     assert re.findall(r'"(\w+)"', said("law.md").partition("chooses:")[2].partition("\n")[0]) == list(laws)
 
 
