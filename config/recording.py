@@ -12,12 +12,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.results.block import Block, Table
+from config.results.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 REQUIRED = ("time_s", "command_pa", "position_m")
 CLOCK_STEPS_TOLERATED = 0.01
@@ -26,9 +31,9 @@ CLOCK_STEPS_TOLERATED = 0.01
 Column = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """Columns of equal length by name, and what was said about them."""
+@dataclass(frozen=True, slots=True, repr=False)
+class Recording(Result):
+    """Columns of equal length, (n,), by name, and what was said about them."""
 
     columns: Mapping[str, Column]
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -66,8 +71,54 @@ class Recording:
         """
         write_recording(Path(path), self)
 
+    def blocks(self) -> list[Block]:
+        """Say how long it is, what its columns span, and what was said about it."""
+        rows = [
+            (name, *(f"{end:.6g}" for end in _span(column)), str(int((~np.isfinite(column)).sum())))
+            for name, column in self.columns.items()
+        ]
+        said = [f"{key}: {value}" for key, value in self.metadata.items()]
+        return [self._length(), Table(("column", "least", "greatest", "missing"), rows), *said]
+
+    def _length(self) -> str:
+        count = len(next(iter(self.columns.values()), ()))
+        if "time_s" not in self.columns or count < 2:
+            return f"{count} samples"
+        steps = np.diff(self.time_s)
+        return f"{count} samples over {np.sum(steps[steps > 0.0]):.6g} s, {1e3 * float(np.median(steps)):.4g} ms apart"
+
+    def frame_columns(self) -> Mapping[str, Column]:
+        """Return the columns."""
+        return self.columns
+
+    def plot(self) -> "Figure":
+        """Draw the position, and below it the command and the pressure, over time."""
+        from config.results.drawing import MEASURED, MODEL, QUIET, legend, line, panels
+
+        figure, (above, below) = panels((3.0, 1.6))
+        time_s = self.time_s - self.time_s[0]
+        if "reference_m" in self.columns:
+            line(above, time_s, 1e3 * self.columns["reference_m"], MODEL, "reference", drawstyle="steps-post")
+        line(above, time_s, 1e3 * self.position_m, MEASURED, "position")
+        if "command_pa" in self.columns:
+            line(below, time_s, 1e-3 * self.command_pa, QUIET, "command", drawstyle="steps-post")
+        if "pressure_pa" in self.columns:
+            line(below, time_s, 1e-3 * self.columns["pressure_pa"], MODEL, "pressure")
+        above.set_ylabel("position, mm")
+        below.set_ylabel("pressure, kPa")
+        below.set_xlabel("time, s")
+        legend(above)
+        legend(below)
+        return figure
+
     def __len__(self) -> int:
         return len(self.time_s)
+
+
+def _span(column: Column) -> tuple[float, float]:
+    """Return the least and the greatest number; NaN where there is none."""
+    finite = column[np.isfinite(column)]
+    return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
 
 
 def write_recording(path: Path, recording: Recording) -> None:

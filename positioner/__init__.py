@@ -37,7 +37,8 @@ if TYPE_CHECKING:
         Refused,
     )
     from positioner.estimation.recording_estimates import RecordingEstimates, estimate
-    from positioner.response.response_figures import ResponseFigures, respond
+    from positioner.response.response_figures import respond
+    from positioner.response.response_result import ResponseFigures
     from sim.simulation import simulate
     from workbench.blind.hiding import Hidden, hide
     from workbench.compare.comparison import Comparison, compare
@@ -67,7 +68,8 @@ _ROOMS = {
         "Refused",
     ),
     "positioner.estimation.recording_estimates": ("RecordingEstimates", "estimate"),
-    "positioner.response.response_figures": ("ResponseFigures", "respond"),
+    "positioner.response.response_figures": ("respond",),
+    "positioner.response.response_result": ("ResponseFigures",),
     "sim.simulation": ("simulate",),
     "workbench.blind.hiding": ("Hidden", "hide"),
     "workbench.compare.comparison": ("Comparison", "compare"),

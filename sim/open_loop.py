@@ -10,14 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from config.results.result import Brief
 from sim.composition import Composition
 from sim.karnopp import TOLERANCE, Vector
 
 STEP_S = 1e-5
 
 
-@dataclass(frozen=True, slots=True)
-class Response:
+@dataclass(frozen=True, slots=True, repr=False)
+class Response(Brief):
     """Arrays of n + 1 rows for n periods; see the head of this module."""
 
     time_s: Vector

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 
 if TYPE_CHECKING:
-    from workbench.select.diagnosis import Diagnosis
     from workbench.select.tangent_preview import TangentScore
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
@@ -52,7 +51,6 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.report import Subject, report_diagnosis, require_plotly
     from workbench.select.diagnosis import diagnose
     from workbench.select.diagnosis_json import as_json
-    from workbench.select.equivalence import undetectable
 
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
@@ -78,9 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if diagnosis.experiment:
         diagnosis.experiment.write(arguments.experiment)
-    print("\n".join(_lines(diagnosis, arguments.experiment)))
-    for each in undetectable(diagnosis.split, diagnosis.best.fit.valve):
-        print(f"\nnot detectable: {each.sentence}")
+        print(f"{arguments.experiment}: the experiment that would tell apart what the recordings do not")
+    print(diagnosis.summary())
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
@@ -95,32 +92,3 @@ def run(arguments: argparse.Namespace) -> int:
 def _tell_preview(suspects: "tuple[TangentScore, ...]") -> None:
     named = ", ".join(f"{each.name} {each.score:.2f}" for each in suspects[:PREVIEWED])
     print(f"tangent preview, not a verdict: {named}", flush=True)
-
-
-def _lines(diagnosis: "Diagnosis", path: Path) -> list[str]:
-    lines = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
-    for number, step in enumerate(diagnosis.steps, start=1):
-        base = step.before.errors
-        lines += [
-            "",
-            f"step {number}: error {1e3 * base.train_rmse_m:.4f} mm rms fitted, {1e3 * base.test_rmse_m:.4f} held out, "
-            f"floor {1e3 * diagnosis.split.floor_m:.4f}",
-            f"  {'effect':<20}{'fitted mm':>11}{'held out mm':>13}{'typical mm':>12}{'evidence':>10}{'std errors':>12}",
-        ]
-        for each in step.candidates:
-            if each.model is None or each.gain is None:
-                lines.append(f"  {each.name:<20}{each.rejection_reason}")
-                continue
-            errors, found = each.model.errors, each.gain
-            said = "accepted" if each.accepted else each.rejection_reason
-            lines.append(
-                f"  {each.name:<20}{1e3 * errors.train_rmse_m:>11.4f}{1e3 * errors.test_rmse_m:>13.4f}"
-                f"{1e3 * errors.test_block_m:>12.4f}{found.bic:>10.1f}{found.standard_errors:>12.1f}  {said}"
-            )
-    if diagnosis.experiment:
-        lines += [
-            "",
-            f"{path}: {diagnosis.experiment.name}; after a refit the rivals differ by "
-            f"{diagnosis.experiment.separation:.3g} times the noise",
-        ]
-    return lines

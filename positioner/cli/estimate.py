@@ -10,8 +10,6 @@ if TYPE_CHECKING:
 HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
 EXAMPLE = "positioner estimate rec.csv --json estimated.json"
 
-UNITS = {"a": "1/s", "b": "1/s^2", "c": "m/(Pa s^2)", "k": "m/s^2", "b_over_c": "Pa/m", "k_over_c": "Pa"}
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
@@ -37,8 +35,9 @@ def run(arguments: argparse.Namespace) -> int:
     held = None if arguments.pressure is None else arguments.pressure == "held"
     recording = Recording.read(arguments.recording)
     with naming({"noise_std_m": "--noise-m"}):
-        found = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held).found
-    print("\n".join(_lines(arguments.recording, found, len(recording))))
+        estimated = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held)
+    found = estimated.found
+    print(f"{arguments.recording}: {estimated.summary()}")
     if arguments.json is not None:
         try:
             arguments.json.write_text(json.dumps(as_json(found), indent=1, allow_nan=False) + "\n", encoding="utf-8")
@@ -47,26 +46,10 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if found.estimates.law_ready else 1
 
 
-def _lines(path: Path, found: "BatchResult", samples: int) -> list[str]:
-    lines = [f"{path}: {samples} samples, {found.segments} motions fitted, {found.left_out} left out"]
-    stamps = "; time stamps jitter: samples taken as even" if found.evened else ""
-    lines.append(f"  noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples{stamps}")
-    lines.append(f"  {'':10}{'value':>14}{'std':>12}  {'unit':12}")
-    for name, unit in UNITS.items():
-        each = getattr(found.estimates, name)
-        said = "" if each.valid else f"refused: {each.reason.text}"
-        lines.append(f"  {name:10}{each.value:14.6g}{each.std:12.3g}  {unit:12}{said}".rstrip())
-    each = found.estimates.breakaway
-    lines.append(f"  {'F_s/A':10}{each.value:14.6g}{each.std:12.3g}  {'Pa':12}{'' if each.valid else each.reason.text}")
-    if found.fit is not None:
-        lines.append(
-            f"  residuals {found.fit.residual_std_m:.3g} m; condition of the information {found.condition:.3g}"
-        )
-    return [line.rstrip() for line in lines]
-
-
 def as_json(found: "BatchResult") -> dict[str, object]:
     """Return the numbers: per name value, std, valid and reason; null where there is none."""
+    from positioner.estimation.recording_estimates import UNITS
+
     numbers: dict[str, object] = {name: _one(getattr(found.estimates, name)) for name in UNITS}
     return numbers | {
         "breakaway_pa": _one(found.estimates.breakaway),

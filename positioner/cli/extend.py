@@ -2,13 +2,8 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-
-if TYPE_CHECKING:
-    from workbench.select.extension import Extension
-    from workbench.select.extension_journal import Journal
 
 HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -60,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     journal = before.followed_by(extension)
     write_valve(arguments.out, extension.valve, journal.remarks)
     journal.write_beside(arguments.out)
-    print("\n".join(_lines(extension, journal)))
+    print(extension.summary())
     print(f"{arguments.out}: {journal.steps[-1].why}")
     if arguments.json is not None:
         whole = as_json(extension) | {"valve": str(arguments.out), "seconds": time.monotonic() - began_s}
@@ -68,19 +63,3 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.report is not None:
         report_journal(journal, arguments.report, extension.valve.valve.name)
     return 0 if extension.falls else 1
-
-
-def _lines(extension: "Extension", journal: "Journal") -> list[str]:
-    step = journal.steps[-1]
-    lines = [f"{'error, mm rms':<42}{'fitted':>10}{'held out':>10}"]
-    for what, train_m, test_m in (
-        ("as given", step.given_train_rmse_m, step.given_test_rmse_m),
-        ("refitted, nothing added", step.refitted_train_rmse_m, step.refitted_test_rmse_m),
-        (f"with {', '.join(step.effects)}", step.extended_train_rmse_m, step.extended_test_rmse_m),
-        ("floor: what no model undercuts", step.floor_m, step.floor_m),
-    ):
-        lines.append(f"{what:<42}{1e3 * train_m:>10.4f}{1e3 * test_m:>10.4f}")
-    for name, each in extension.extended.parameters.items():
-        outside = "" if each.physical else "   not physical: the recording wants it beyond its range"
-        lines.append(f"  {name} = {each.value:.6g} (std {each.std:.2g}){outside}")
-    return lines

@@ -28,6 +28,7 @@ import numpy as np
 
 from config.codes import Refusal
 from config.noise import white_noise_m
+from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
 from positioner.estimation.estimates import Estimate, Estimates, no_estimate, no_estimates
@@ -75,8 +76,8 @@ class BatchSettings:
     largest_relative_std: float = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class BatchResult:
+@dataclass(frozen=True, slots=True, repr=False)
+class BatchResult(Brief):
     """Result of the identification from a record.
 
     Attributes:

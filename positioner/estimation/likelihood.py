@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.likelihood_search import gauss_newton, grid_search, with_start_in_gap
 from positioner.estimation.linear_problem import Prior, linear_problem, sensitivities, started
@@ -24,8 +25,8 @@ from positioner.estimation.motion_preparation import PreparedMotion, prepared
 from positioner.estimation.motion_segment import MotionSegment
 
 
-@dataclass(frozen=True, slots=True)
-class LikelihoodFit:
+@dataclass(frozen=True, slots=True, repr=False)
+class LikelihoodFit(Brief):
     """The most likely parameters.
 
     Attributes:

@@ -3,22 +3,35 @@
 Where a pressure was measured in most rows it is used; else the command, a row's being in force until the next row.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from config.errors import InputError
 from config.recording import Recording
+from config.results.block import Block, Table
+from config.results.result import Result
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchResult, BatchSettings, identify
-from positioner.estimation.estimates import Estimates
+from positioner.estimation.estimates import Estimate, Estimates
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DEVIATIONS = 2.0
+"""Standard deviations drawn on either side of an estimate."""
 MEASURED = 0.5
 """Share of the rows with a pressure from which on it counts as measured."""
 
 
-@dataclass(frozen=True, slots=True)
-class RecordingEstimates:
+UNITS = {"a": "1/s", "b": "1/s^2", "c": "m/(Pa s^2)", "k": "m/s^2", "b_over_c": "Pa/m", "k_over_c": "Pa"}
+"""What is estimated, and in which unit."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class RecordingEstimates(Result):
     """The estimates of a recording of `samples` rows, and how they came about."""
 
     found: BatchResult
@@ -28,6 +41,61 @@ class RecordingEstimates:
     def estimates(self) -> Estimates:
         """a, b, c, k, b/c, k/c and the break-away pressure, each with its standard deviation or why it is refused."""
         return self.found.estimates
+
+    @property
+    def by_name(self) -> Mapping[str, tuple[Estimate, str]]:
+        """Each estimate with its unit, the break-away pressure F_s / A last."""
+        named = {name: (getattr(self.estimates, name), unit) for name, unit in UNITS.items()}
+        return named | {"F_s/A": (self.estimates.breakaway, "Pa")}
+
+    def blocks(self) -> list[Block]:
+        """Say what was fitted, and each estimate or why it is refused."""
+        found = self.found
+        stamps = "; time stamps jitter: samples taken as even" if found.evened else ""
+        rows = [
+            (name, f"{each.value:.6g}", f"{each.std:.3g}", unit, "" if each.valid else f"refused: {each.reason.text}")
+            for name, (each, unit) in self.by_name.items()
+        ]
+        quality = (
+            []
+            if found.fit is None
+            else [f"residuals {found.fit.residual_std_m:.3g} m; condition of the information {found.condition:.3g}"]
+        )
+        return [
+            f"{self.samples} samples, {found.segments} motions fitted, {found.left_out} left out",
+            f"noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples{stamps}",
+            Table(("", "value", "std", "unit", ""), rows),
+            *quality,
+        ]
+
+    def frame_columns(self) -> dict[str, list[object]]:
+        """Return a row an estimate: name, unit, value, standard deviation, valid or why not."""
+        named = [(name, unit, each) for name, (each, unit) in self.by_name.items()]
+        return {
+            "name": [name for name, _, _ in named],
+            "unit": [unit for _, unit, _ in named],
+            "value": [each.value for _, _, each in named],
+            "std": [each.std for _, _, each in named],
+            "valid": [each.valid for _, _, each in named],
+            "reason": ["" if each.valid else each.reason.text for _, _, each in named],
+        }
+
+    def plot(self) -> "Figure":
+        """Draw how well each is known: one and a half per cent is an interval from 98.5 to 101.5."""
+        from config.results.drawing import BETTER, FAINT, Interval, intervals
+
+        known = {name: each for name, (each, _) in self.by_name.items() if np.isfinite(each.std / each.value)}
+        shown = [
+            Interval(
+                name if each.valid else f"{name}, refused",
+                100.0,
+                100.0 * (1.0 - DEVIATIONS * abs(each.std / each.value)),
+                100.0 * (1.0 + DEVIATIONS * abs(each.std / each.value)),
+                BETTER if each.valid else FAINT,
+            )
+            for name, each in known.items()
+        ]
+        return intervals(shown, "two standard deviations about the estimate, %")[0]
 
 
 def estimate(

@@ -10,7 +10,8 @@ of each step, dead band and resolution of the recording. A figure that cannot be
 """
 
 from positioner.response.figure import Figure
-from positioner.response.response_figures import ResponseFigures, as_json, respond
+from positioner.response.response_figures import as_json, respond
+from positioner.response.response_result import ResponseFigures
 from positioner.response.step_figures import StepFigures
 
 __all__ = ["Figure", "ResponseFigures", "StepFigures", "as_json", "respond"]

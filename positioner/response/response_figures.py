@@ -14,45 +14,14 @@ from numpy.typing import NDArray
 
 from config.noise import quantum_m
 from config.recording import Column, Recording
-from positioner.response.dead_band import dead_band_and_resolution, responded
+from positioner.response.dead_band import dead_band_and_resolution
 from positioner.response.figure import Figure, undetermined
+from positioner.response.response_result import ResponseFigures
 from positioner.response.step_detection import StepChange, find_steps
 from positioner.response.step_figures import FIGURES, StepFigures, figures_of
 
 EXCITED = 3
 """The state column's number for S3."""
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """One figure over all steps that determine it."""
-
-    count: int
-    smallest: float
-    median: float
-    largest: float
-
-
-@dataclass(frozen=True, slots=True)
-class ResponseFigures:
-    """What a recording says of a valve's response, SI units."""
-
-    input: str
-    """The column that steps: `reference_m` or `command_pa`."""
-    steps: tuple[StepFigures, ...]
-    noise_m: float | None
-    static_gain: Figure
-    """Position over input between the outermost levels stepped to."""
-    dead_band: Figure
-    resolution: Figure
-    notes: tuple[str, ...]
-
-    def summary(self, name: str) -> Summary | None:
-        """Return one of `FIGURES` over the steps that the stem responded to; None when no step determines it."""
-        gain = self.static_gain.value
-        asked = [each for each in self.steps if gain and responded(each, gain)]
-        determined = [figure.value for each in asked if (figure := getattr(each, name)).value is not None]
-        return Summary(len(determined), min(determined), median(determined), max(determined)) if determined else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +121,7 @@ def _static_gain(steps: tuple[StepFigures, ...]) -> Figure:
 def as_json(response: ResponseFigures) -> Mapping[str, object]:
     """Return everything as plain values, None for what cannot be determined."""
     steps = [asdict(each) for each in response.steps]
-    summaries = {name: response.summary(name) for name in FIGURES}
+    summaries = {name: response.over_steps(name) for name in FIGURES}
     return {
         "input": response.input,
         "noise_m": response.noise_m,

@@ -20,6 +20,7 @@ from math import hypot, sqrt
 import numpy as np
 
 from config.recording import Column
+from config.results.result import Brief
 from positioner.response.figure import Figure, LevelCrossing, level_crossing, undetermined
 from positioner.response.rest_level import RestLevel, rest_at_the_end
 from positioner.response.step_detection import StepChange
@@ -34,8 +35,8 @@ GAP_PERIODS = 3.0
 """A gap between samples wider than this many of their median periods is a gap."""
 
 
-@dataclass(frozen=True, slots=True)
-class StepFigures:
+@dataclass(frozen=True, slots=True, repr=False)
+class StepFigures(Brief):
     """Figures of one step, SI units; the input in m (reference) or Pa (command)."""
 
     time_s: float

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from config.recording import Column, Recording
+from config.results.result import Brief
 from config.slave_file import Sensor
 from config.valve_file import EffectTable, ValveFile, ValveParameters, find_valve, load_valve
 from sim.composition import Composition
@@ -32,8 +33,8 @@ LEAST_TRAVEL = 0.1
 Draw = np.random.Generator
 
 
-@dataclass(frozen=True, slots=True)
-class Hidden:
+@dataclass(frozen=True, slots=True, repr=False)
+class Hidden(Brief):
     """Two recordings, what an engineer knows of the valve, and the answer."""
 
     base: ValveFile

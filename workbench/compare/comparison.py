@@ -6,15 +6,17 @@ command repeats itself), the residual does not depend on the input, and no slip 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column, Recording
+from config.results.block import Block, Table
+from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from workbench.compare.comparison_sentences import Findings, sentences
+from workbench.compare.comparison_sentences import Findings, sentences, shortened
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
 from workbench.compare.measures import fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
@@ -31,6 +33,9 @@ from workbench.compare.slip_matching import SlipEvents, matched
 from workbench.data.motion import Slip, slips, velocity_m_per_s
 from workbench.data.record import Record, ready, require_units
 from workbench.model.free_run import FreeRun, Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ADEQUATE = 1.5
 NUMERICAL = 1e-6
@@ -59,8 +64,8 @@ class PressureSide:
     stem_fit_percent: float
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+@dataclass(frozen=True, slots=True, repr=False)
+class Comparison(Result):
     """Everything a report draws; arrays of n rows as the recording, NaN where it is not judged."""
 
     adequate: bool
@@ -93,6 +98,58 @@ class Comparison:
     input_correlation: Correlation
     spectrum: Spectrum
     friction: FrictionBalance
+
+    def blocks(self) -> list[Block]:
+        """Say where the model fails, the gravest first, and by how much in each phase."""
+        return [
+            f"{'adequate' if self.adequate else 'not adequate'}: fit {self.fit_percent:.2f} %, error {_mm(self.rms_m)} "
+            f"rms, {_mm(self.robust_m)} robust, noise {_mm(self.noise_m)}"
+            + ("" if self.repeatability_m is None else f", repeatability {_mm(self.repeatability_m)}"),
+            *(f"  {sentence}" for sentence in self.sentences),
+            _phase_table(self.phases),
+            *self._slips_and_residual(),
+            *(f"recording: {note}" for note in shortened(self.notes)),
+        ]
+
+    def _slips_and_residual(self) -> list[str]:
+        slips, side = self.slips, self.pressure_side
+        lines = [
+            f"slips: {len(slips.matched)} matched, {len(slips.missed_s)} missed, {len(slips.spurious_s)} spurious",
+            f"residual: {self.autocorrelation.outside} of {len(self.autocorrelation.lag) - 1} lags outside the "
+            f"99 % band; with the command: {self.input_correlation.outside} of {len(self.input_correlation.lag)}",
+        ]
+        if side is not None:
+            lines.append(
+                f"measured pressure: the model's is off by {side.pressure_rms_pa:.4g} Pa rms; run from the measured "
+                f"one, the error is {_mm(side.stem_rms_m)} rms"
+            )
+        return lines
+
+    def frame_columns(self) -> dict[str, object]:
+        """Return a row a sample: time, command, position measured and simulated, residual, and the phase's name."""
+        return {
+            "time_s": self.time_s,
+            "command_pa": self.command_pa,
+            "measured_m": self.measured_m,
+            "simulated_m": self.simulated_m,
+            "residual_m": self.residual_m,
+            "phase": np.array(PHASES)[self.phase],
+        }
+
+    def plot(self) -> "Figure":
+        """Draw the position measured and simulated, and below it the error, over time."""
+        from config.results.drawing import MEASURED, MODEL, legend, line, panels
+
+        figure, (above, below) = panels((3.2, 1.6))
+        time_s = self.time_s - self.time_s[0]
+        line(above, time_s, 1e3 * self.measured_m, MEASURED, "measured")
+        line(above, time_s, 1e3 * self.simulated_m, MODEL, f"model, error {_mm(self.rms_m)} rms")
+        line(below, time_s, 1e3 * self.residual_m, MODEL)
+        above.set_ylabel("position, mm")
+        below.set_ylabel("error, mm")
+        below.set_xlabel("time, s")
+        legend(above)
+        return figure
 
 
 def compare(recording: Recording, valve: ValveFile) -> Comparison:
@@ -161,6 +218,21 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
             _all([each.measured_forces for each in segments]), _all([each.model_forces for each in segments])
         ),
     )
+
+
+def _phase_table(found: Sequence[Phase]) -> Table:
+    return Table(
+        ("phase", "samples", "rms mm", "mean mm", "share"),
+        [
+            (each.name, f"{each.count}", f"{1e3 * each.rms_m:.4f}", f"{1e3 * each.mean_m:.4f}", f"{each.share:.0%}")
+            for each in found
+            if each.count
+        ],
+    )
+
+
+def _mm(value_m: float) -> str:
+    return f"{1e3 * value_m:.4g} mm"
 
 
 def as_json(value: Any) -> Any:

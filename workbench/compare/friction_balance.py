@@ -11,13 +11,14 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from config.recording import Column
+from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.compare.residuals import Profile, profile
 from workbench.data.motion import PARABOLA, directions, velocity_m_per_s
 
 
-@dataclass(frozen=True, slots=True)
-class Forces:
+@dataclass(frozen=True, slots=True, repr=False)
+class Forces(Brief):
     """Moving samples: where, how fast, which way, at what pressure, and the friction, N."""
 
     position_m: Column
@@ -27,8 +28,8 @@ class Forces:
     friction_n: Column
 
 
-@dataclass(frozen=True, slots=True)
-class FrictionBalance:
+@dataclass(frozen=True, slots=True, repr=False)
+class FrictionBalance(Brief):
     """Mean friction, N, by velocity and by position, opening and closing: pairs of the measured and the model's."""
 
     over_velocity: tuple[Profile, Profile]

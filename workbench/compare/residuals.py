@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from config.recording import Column
+from config.results.result import Brief
 
 LAGS = 25
 BAND_99 = 2.576
@@ -23,8 +24,8 @@ BINS = 20
 FEWEST = 5
 
 
-@dataclass(frozen=True, slots=True)
-class Profile:
+@dataclass(frozen=True, slots=True, repr=False)
+class Profile(Brief):
     """Mean and its standard error over bins of something; bins with few samples are left out."""
 
     centre: Column
@@ -33,8 +34,8 @@ class Profile:
     count: NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True)
-class Correlation:
+@dataclass(frozen=True, slots=True, repr=False)
+class Correlation(Brief):
     """Correlation by lag, in samples and s, and the half-width of its 99 % band."""
 
     lag: NDArray[np.int64]
@@ -49,8 +50,8 @@ class Correlation:
         return int(seen[(self.lag != 0) | (np.abs(self.value) < 1.0 - 1e-12)].sum())
 
 
-@dataclass(frozen=True, slots=True)
-class Spectrum:
+@dataclass(frozen=True, slots=True, repr=False)
+class Spectrum(Brief):
     """Power spectral density of the residual, m^2/Hz."""
 
     frequency_hz: Column

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from config.recording import Column
+from config.results.result import Brief
 from workbench.data.motion import REACH, Slip
 
 WITHIN = 0.4
@@ -32,8 +33,8 @@ class MatchedSlip:
     farther_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class SlipEvents:
+@dataclass(frozen=True, slots=True, repr=False)
+class SlipEvents(Brief):
     """Slips matched, and the times of those that the model misses, and of its spurious ones."""
 
     matched: tuple[MatchedSlip, ...]

@@ -11,6 +11,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column, Recording
+from config.results.result import Brief
 from workbench.data.record import Mask, Record, ready, require_fittable
 
 HELD_OUT = 1.0 / 3.0
@@ -19,8 +20,8 @@ FEWEST = 40
 """Samples on either side."""
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+@dataclass(frozen=True, slots=True, repr=False)
+class Part(Brief):
     """A recording that is simulated, and which of its rows count."""
 
     recording: Recording
@@ -28,8 +29,8 @@ class Part:
     counted: Mask
 
 
-@dataclass(frozen=True, slots=True)
-class Split:
+@dataclass(frozen=True, slots=True, repr=False)
+class Split(Brief):
     """What a candidate is fitted on, and what it is judged on: the other recording, or the end of the whole one."""
 
     train: Part

@@ -24,6 +24,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from config.errors import InputError
 from config.recording import Column, Recording, read_table
+from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.motion import PARABOLA
 from workbench.data.noise import noise_std_m
@@ -42,8 +43,8 @@ FEWEST = 12
 """Rows that a balance needs."""
 
 
-@dataclass(frozen=True, slots=True)
-class Rows:
+@dataclass(frozen=True, slots=True, repr=False)
+class Rows(Brief):
     """n rows of the balance; `load_n` is None where no force is measured, time and velocity in a static curve."""
 
     position_m: Column

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from config.errors import InputError
 from config.noise import quantum_m
 from config.recording import CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
+from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.noise import noise_std_m, repeatability_m
 
@@ -36,8 +37,8 @@ UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
 Mask = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+@dataclass(frozen=True, slots=True, repr=False)
+class Record(Brief):
     """n samples ready for simulation; `segments` are half-open ranges of rows, the others are not simulated."""
 
     time_s: Column

@@ -12,25 +12,32 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from os import cpu_count
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from config.errors import InputError
 from config.loading import validated
 from config.recording import Column, Recording
+from config.results.block import Block
+from config.results.result import Result
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import BASE, STATIC, Composition
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 from workbench.compare.measures import fit_percent
+from workbench.compare.sentences import shortened
 from workbench.data.motion import slips
 from workbench.data.record import Record, ready, require_fittable, require_units
+from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.objective import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed
 from workbench.fit.uncertainty import Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import DEFAULT, free_parameters
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,20 +72,6 @@ S = TypeVar("S")
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
-    """A parameter with its standard deviation and 95 % interval, in its own unit."""
-
-    value: float
-    std: float
-    lower: float
-    upper: float
-    at_bound: bool
-    """It lies at the end of its physical range."""
-    physical: bool
-    """False if the recording wants it beyond that end."""
-
-
-@dataclass(frozen=True, slots=True)
 class Search:
     """What one search came to."""
 
@@ -87,8 +80,8 @@ class Search:
     parameters: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
+@dataclass(frozen=True, slots=True, repr=False)
+class Fit(Result):
     """A fitted valve, in the habits of scikit-learn: predict, score, and the attributes."""
 
     valve: ValveFile
@@ -124,6 +117,23 @@ class Fit:
         """Return 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than the mean."""
         record = ready(recording)
         return fit_percent(record, self._run(record)) / 100.0
+
+    def blocks(self) -> list[Block]:
+        """Say the error, whether the searches agree, and each parameter with its interval."""
+        agreement = "searches agree" if self.trusted else "search alone came so low: not to be trusted"
+        return [
+            f"error {1e3 * self.rms_m:.4g} mm rms, floor {1e3 * self.floor_m:.4g} mm; {self.agreement} {agreement}",
+            parameter_table(self.parameters),
+            *(f"recording: {note}" for note in shortened(self.notes)),
+        ]
+
+    def frame_columns(self) -> dict[str, list[object]]:
+        """Return a row a parameter: name, value, standard deviation, 95 % interval, at its bound, physical."""
+        return parameter_columns(self.parameters)
+
+    def plot(self) -> "Figure":
+        """Draw the parameters' 95 % intervals in per cent of their values."""
+        return draw_parameters(self.parameters)
 
     def _run(self, record: Record) -> Column:
         composition = Composition.from_file(self.valve)

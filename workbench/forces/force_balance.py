@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from config.recording import Column
+from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import shipped_effect
 from workbench.data.imposed_motion import Rows
@@ -52,8 +53,8 @@ OUTSIDE_STANDARD_ERRORS = 3.0
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class ForceFit:
+@dataclass(frozen=True, slots=True, repr=False)
+class ForceFit(Brief):
     """A balance fitted: its parameters and their jackknife deviations over what was left out, and its residuals."""
 
     effects: tuple[str, ...]

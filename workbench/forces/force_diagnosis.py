@@ -11,20 +11,27 @@ are those that have nothing left to explain then. One step more than is added sh
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from config.recording import Recording
+from config.results.block import Block, Table
+from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import Effect, shipped_effect
 from workbench.data.imposed_motion import Rows, rows_of
 from workbench.forces.force_balance import Balance, ForceFit, ForceModel, floor_of
 from workbench.select.block_errors import AT_FLOOR, indistinguishable, relative_error_reduction
+from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_acceptance import Gain
 from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSelection, ForwardStep, without_missing
 from workbench.select.verdict import Verdict
 from workbench.select.verdict_sentence import rivals_sentence
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class ForceCandidate(Candidate):
     """An effect fitted beside the balance before."""
 
@@ -35,8 +42,8 @@ class ForceCandidate(Candidate):
 ForceStep = ForwardStep[ForceFit, ForceCandidate]
 
 
-@dataclass(frozen=True, slots=True)
-class ForceDiagnosis(ForwardSelection[ForceFit, ForceCandidate]):
+@dataclass(frozen=True, slots=True, repr=False)
+class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
     """What is missing in the balance of forces, and all that led to it; verdicts as those of `verdict`."""
 
     verdict: Verdict
@@ -45,6 +52,42 @@ class ForceDiagnosis(ForwardSelection[ForceFit, ForceCandidate]):
     best: ForceFit
     floor_n: float | None
     rows: Rows
+
+    def blocks(self) -> list[Block]:
+        """Say the verdict, what was tried in each step, and the parameters of the best balance."""
+        said: list[Block] = [f"{self.verdict}: {self.sentence}"]
+        floor = "" if self.floor_n is None else f", floor {self.floor_n:.4g}"
+        for number, step in enumerate(self.steps, start=1):
+            before = step.before
+            title = (
+                f"step {number}: error {before.train_rms_n:.4g} N rms fitted, {before.test_rms_n:.4g} held out{floor}"
+            )
+            said.append(candidate_table([_tried(each) for each in step.candidates], NEWTONS, title))
+        rows = [
+            (name, f"{value:.6g}", "" if std is None else f"{std:.2g}")
+            for name, value in self.best.parameters.items()
+            for std in (self.best.deviations.get(name),)
+        ]
+        said.append(
+            Table(("parameter", "value", "std"), rows, f"with {' and '.join(self.missing) or 'nothing added'}:")
+        )
+        return said + [f"recording: {note}" for note in self.rows.notes]
+
+    def frame_columns(self) -> dict[str, list[object]]:
+        """Return a row a candidate of each step: errors, N, evidence, accepted or why not."""
+        return candidate_columns([_tried(each) for each in self.candidates], NEWTONS)
+
+    def plot(self) -> "Figure":
+        """Draw the held-out error with each effect in the first step; those added and their rivals in colour."""
+        step = self.steps[0]
+        chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
+        tried = [_tried(each) for each in step.candidates]
+        return draw_race(tried, chosen, step.before.test_rms_n, self.floor_n, NEWTONS)
+
+
+def _tried(each: ForceCandidate) -> Tried:
+    errors = (each.fit.train_rms_n, each.fit.test_rms_n, each.fit.typical_n)
+    return Tried(each.step, each.name, *errors, each.gain, each.rejection_reason)
 
 
 def diagnose_forces(

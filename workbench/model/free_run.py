@@ -18,6 +18,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.recording import Column
+from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from sim.karnopp import SLIP, Vector, read, write
@@ -49,8 +50,8 @@ SHORT = 4
 """Samples within which a stem that leaves its place is in motion from the start."""
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+@dataclass(frozen=True, slots=True, repr=False)
+class Run(Brief):
     """The simulation, a row a sample of the record; NaN outside its segments. Stem and indicated position apart."""
 
     indicated_m: Column

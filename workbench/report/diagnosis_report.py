@@ -8,7 +8,7 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
-from workbench.fit.fitting import Fitted
+from workbench.fit.fitted_parameter import Fitted
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.recording import Column
+from config.results.result import Brief
 from workbench.data.held_out import Split, residual_m
 from workbench.fit.fitting import Fit
 from workbench.select.residual_structure import clipped, structure
@@ -34,8 +35,8 @@ SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
 """Within one of these two models are indistinguishable."""
 
 
-@dataclass(frozen=True, slots=True)
-class BlockErrors:
+@dataclass(frozen=True, slots=True, repr=False)
+class BlockErrors(Brief):
     """How far a fit is off, m."""
 
     train_rmse_m: float

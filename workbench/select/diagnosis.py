@@ -7,22 +7,30 @@ accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all ste
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import cpu_count
+from typing import TYPE_CHECKING
 
 from config.recording import Recording
+from config.results.block import Block
+from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import find_effect, shipped_effects
 from workbench.data.held_out import Split, split
+from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
+from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
 from workbench.select.tangent_preview import TangentScore, preview
 from workbench.select.verdict import Verdict, verdict
 from workbench.select.verdict_sentence import verdict_sentence
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis(ForwardSelection[EvaluatedModel, EffectCandidate]):
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """What is missing, and all that led to it."""
 
     verdict: Verdict
@@ -37,6 +45,42 @@ class Diagnosis(ForwardSelection[EvaluatedModel, EffectCandidate]):
     def suspected(self) -> tuple[str, ...]:
         """Effects that may be there, but that nothing proves: the valve without them is at the floor."""
         return tuple(each.name for each in self.steps[-1].suspected)
+
+    def blocks(self) -> list[Block]:
+        """Say the verdict, what was tried in each step, and what the recordings would not show."""
+        said: list[Block] = [f"{self.verdict}: {self.sentence}"]
+        for number, step in enumerate(self.steps, start=1):
+            errors = step.before.errors
+            title = (
+                f"step {number}: error {1e3 * errors.train_rmse_m:.4f} mm rms fitted, {1e3 * errors.test_rmse_m:.4f} "
+                f"held out, floor {1e3 * self.split.floor_m:.4f}"
+            )
+            said.append(candidate_table([_tried(each) for each in step.candidates], MILLIMETRES, title))
+        if self.experiment:
+            said.append(
+                f"experiment: {self.experiment.name}; after a refit the rivals differ by "
+                f"{self.experiment.separation:.3g} times the noise"
+            )
+        return said + [f"not detectable: {each.sentence}" for each in undetectable(self.split, self.best.fit.valve)]
+
+    def frame_columns(self) -> dict[str, list[object]]:
+        """Return a row a candidate of each step: errors, m, evidence, accepted or why not."""
+        return candidate_columns([_tried(each) for each in self.candidates], MILLIMETRES)
+
+    def plot(self) -> "Figure":
+        """Draw the held-out error with each effect in the first step; those added and their rivals in colour."""
+        step = self.steps[0]
+        chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
+        tried = [_tried(each) for each in step.candidates]
+        return draw_race(tried, chosen, step.before.errors.test_rmse_m, self.split.floor_m, MILLIMETRES)
+
+
+def _tried(each: EffectCandidate) -> Tried:
+    if each.model is None:
+        return Tried(each.step, each.name, None, None, None, each.gain, each.rejection_reason)
+    errors = each.model.errors
+    rms_m = (errors.train_rmse_m, errors.test_rmse_m, errors.test_block_m)
+    return Tried(each.step, each.name, *rms_m, each.gain, each.rejection_reason)
 
 
 def diagnose(

@@ -6,6 +6,7 @@ Pure functions of fits and errors: nothing is simulated here.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fitting import Fit
@@ -21,8 +22,8 @@ SAME_COST = 1.01
 """Factor on the cost within which two members of a class came out as the one they are."""
 
 
-@dataclass(frozen=True, slots=True)
-class EvaluatedModel:
+@dataclass(frozen=True, slots=True, repr=False)
+class EvaluatedModel(Brief):
     """A fit and how it does on what was held out."""
 
     fit: Fit
@@ -45,7 +46,7 @@ class EvaluatedModel:
         return tuple(each.name for each in self.fit.valve.effect)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class EffectCandidate(Candidate):
     """An effect refitted beside the model before; without a model it could not be fitted."""
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Recording
+from config.results.result import Brief
 from sim.composition import Composition
 from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
@@ -36,8 +37,8 @@ Command = NDArray[np.float64]
 Shape = Callable[[Command], Command]
 
 
-@dataclass(frozen=True, slots=True)
-class Experiment:
+@dataclass(frozen=True, slots=True, repr=False)
+class Experiment(Brief):
     """An input, and by how many times the noise it separates the least distinct pair."""
 
     name: str

@@ -5,27 +5,34 @@ refitted     its own parameters fitted to the recording, nothing added: what the
 extended     the effects added, everything fitted
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from config.errors import InputError
 from config.recording import Recording
+from config.results.block import Block, Table
+from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.effect import find_effect
 from workbench.data.held_out import Part, Split, residual_m, split
+from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import Fit, fit
 from workbench.model.free_run import FreeRun
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Extension:
+@dataclass(frozen=True, slots=True, repr=False)
+class Extension(Result):
     """A valve with effects added, and the errors on the way."""
 
     effects: tuple[str, ...]
@@ -47,6 +54,59 @@ class Extension:
     def falls(self) -> bool:
         """Whether the effects lower the held-out error below that of the refitted valve without them."""
         return self.gain.held_out > 0.0 and self.extended_errors.test_rmse_m < self.refitted_errors.test_rmse_m
+
+    @property
+    def stages(self) -> Mapping[str, tuple[float, float]]:
+        """The rms error, m, fitted and held out, of each valve on the way."""
+        before, after = self.refitted_errors, self.extended_errors
+        return {
+            "as given": (self.given_train_rmse_m, self.given_test_rmse_m),
+            "refitted, nothing added": (before.train_rmse_m, before.test_rmse_m),
+            f"with {', '.join(self.effects)}": (after.train_rmse_m, after.test_rmse_m),
+        }
+
+    def blocks(self) -> list[Block]:
+        """Say whether the effects help, the errors on the way, and the parameters of the new valve."""
+        before_m, after_m = self.refitted_errors.test_rmse_m, self.extended_errors.test_rmse_m
+        falls = "falls from" if self.falls else "does not fall as it must: from"
+        floor = ("floor: what no model undercuts", (self.split.floor_m, self.split.floor_m))
+        rows = [
+            (what, f"{1e3 * train_m:.4f}", f"{1e3 * test_m:.4f}")
+            for what, (train_m, test_m) in (*self.stages.items(), floor)
+        ]
+        return [
+            f"with {', '.join(self.effects)} the held-out error {falls} {1e3 * before_m:.4g} to {1e3 * after_m:.4g} mm "
+            "rms",
+            Table(("error, mm rms", "fitted", "held out"), rows),
+            parameter_table(self.extended.parameters),
+        ]
+
+    def frame_columns(self) -> dict[str, list[object]]:
+        """Return a row a valve on the way: its rms errors, m."""
+        return {
+            "stage": list(self.stages),
+            "train_rmse_m": [train_m for train_m, _ in self.stages.values()],
+            "test_rmse_m": [test_m for _, test_m in self.stages.values()],
+        }
+
+    def plot(self) -> "Figure":
+        """Draw the error on what was held out, refitted without the effects and with them, over time."""
+        from config.results.drawing import BETTER, MODEL, legend, line, panels
+
+        part = self.split.judged
+        figure, (axes,) = panels((4.0,))
+        for name, found, errors, colour in (
+            ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
+            (f"with {', '.join(self.effects)}", self.extended, self.extended_errors, BETTER),
+        ):
+            composition = Composition.from_file(found.valve)
+            error_m = residual_m(part, FreeRun(composition, part.record).position_m(composition.theta))
+            label = f"{name}: {1e3 * errors.test_rmse_m:.3g} mm rms"
+            line(axes, part.record.time_s - part.record.time_s[0], 1e3 * error_m, colour, label)
+        axes.set_xlabel("time, s")
+        axes.set_ylabel("error on held-out data, mm")
+        legend(axes)
+        return figure
 
 
 def extend(

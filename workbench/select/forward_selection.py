@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from config.results.result import Brief
 from sim.effect import Effect
 from workbench.select.equivalence import algebraic_class
 
@@ -19,8 +20,8 @@ MOST_ADDED = 3
 """Effects added at most."""
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
+@dataclass(frozen=True, slots=True, repr=False)
+class Candidate(Brief):
     """An effect tried in one step, counted from 1, and why it is not accepted; empty if it is."""
 
     step: int
@@ -37,8 +38,8 @@ FittedT = TypeVar("FittedT")
 CandidateT = TypeVar("CandidateT", bound=Candidate)
 
 
-@dataclass(frozen=True, slots=True)
-class ForwardStep(Generic[FittedT, CandidateT]):
+@dataclass(frozen=True, slots=True, repr=False)
+class ForwardStep(Brief, Generic[FittedT, CandidateT]):
     """One forward step: the model before, all candidates by evidence, the one added, and those that do as well."""
 
     before: FittedT
@@ -52,8 +53,8 @@ class ForwardStep(Generic[FittedT, CandidateT]):
     """Where nothing is added: what would be if more were left to explain, and all that is not told from it."""
 
 
-@dataclass(frozen=True, slots=True)
-class ForwardSelection(Generic[FittedT, CandidateT]):
+@dataclass(frozen=True, slots=True, repr=False)
+class ForwardSelection(Brief, Generic[FittedT, CandidateT]):
     """The steps of a search, and what they added."""
 
     steps: tuple[ForwardStep[FittedT, CandidateT], ...]

@@ -1,0 +1,117 @@
+"""What the figures of all results share: colours, axes over time, intervals, and the race of the effects.
+
+Figures come from pyplot and leave its list at once: a notebook shows one that is returned exactly once, and no figure
+is left open. matplotlib is loaded here, at the first figure.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from config.extras import needed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MEASURED, MODEL, BETTER, QUIET, FAINT = "#1f2a37", "#d9622b", "#1b7f79", "#5b6675", "#9aa4b1"
+"""Colours: what was measured, a model, what is valid or chosen, what stands beside it, what was refused."""
+WIDE, ROW = 10.0, 0.26
+TICKS = (1.0, 2.0, 5.0)
+"""Of a decade."""
+
+
+def panels(heights: Sequence[float]) -> "tuple[Figure, Sequence[Axes]]":
+    """Return a figure with panels one below the other, heights in inches, over one horizontal axis."""
+    pyplot = needed("matplotlib.pyplot", "plot")
+    figure, axes = pyplot.subplots(
+        len(heights),
+        sharex=True,
+        squeeze=False,
+        figsize=(WIDE, sum(heights)),
+        height_ratios=heights,
+        layout="constrained",
+    )
+    pyplot.close(figure)
+    for each in axes[:, 0]:
+        each.grid(alpha=0.3)
+    return figure, list(axes[:, 0])
+
+
+def legend(axes: "Axes") -> None:
+    """Name the lines, on one row above the panel."""
+    axes.legend(frameon=False, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A named value with the ends of its interval, as they are drawn."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    colour: str = BETTER
+
+
+def intervals(shown: Sequence[Interval], label: str) -> "tuple[Figure, Axes]":
+    """Draw named values with their intervals, the first on top; what is infinite reaches the edge."""
+    figure, (axes,) = panels([0.9 + ROW * len(shown)])
+    finite = [end for each in shown for end in (each.low, each.high) if np.isfinite(end)]
+    low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
+    margin = 0.1 * (high - low) or 1.0
+    axes.set_xlim(low - margin, high + margin)
+    for row, each in enumerate(reversed(shown)):
+        ends = np.clip([each.low, each.high], low - margin, high + margin)
+        axes.plot(ends, [row, row], color=each.colour, lw=2.0)
+        axes.plot(each.value, row, "o", color=each.colour, ms=6.0)
+    axes.set_yticks(range(len(shown)), [each.name for each in reversed(shown)])
+    axes.set_ylim(-0.7, len(shown) - 0.3)
+    axes.set_xlabel(label)
+    return figure, axes
+
+
+def race(errors: Mapping[str, float], chosen: Collection[str], marks: Mapping[str, float], label: str) -> "Figure":
+    """Draw the errors of what was tried on a logarithmic scale, the least on top, the chosen ones in colour.
+
+    Args:
+        errors: by name; what is not finite and positive is left out.
+        chosen: names drawn in colour.
+        marks: vertical lines, by what they are called.
+        label: of the horizontal axis.
+    """
+    drawn = [(name, error) for name, error in errors.items() if np.isfinite(error) and error > 0.0]
+    ordered = sorted(drawn, key=lambda each: -each[1])
+    names = [name for name, _ in ordered]
+    figure, (axes,) = panels([1.1 + ROW * len(names)])
+    colours = [BETTER if name in chosen else FAINT for name in names]
+    axes.scatter([error for _, error in ordered], names, color=colours, zorder=3)
+    for (name, value), style in zip(marks.items(), (":", "--"), strict=False):
+        axes.axvline(value, color=QUIET, ls=style, label=name)
+    _logarithmic(axes, [*(error for _, error in ordered), *marks.values()])
+    axes.set_xlabel(label)
+    legend(axes)
+    return figure
+
+
+def _logarithmic(axes: "Axes", values: Sequence[float]) -> None:
+    """Scale the horizontal axis to the values, with ticks in plain numbers."""
+    positive = [each for each in values if each > 0.0]
+    if not positive:
+        return
+    low, high = 0.8 * min(positive), 1.25 * max(positive)
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    ticks = [step * 10.0**decade for decade in decades for step in TICKS]
+    shown = [each for each in ticks if low <= each <= high] or [min(positive)]
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    axes.set_xticks(shown, [f"{each:.3g}" for each in shown])
+    axes.minorticks_off()
+
+
+def line(axes: "Axes", x: ArrayLike, y: ArrayLike, colour: str, label: str = "", **style: Any) -> None:
+    """Draw a line."""
+    axes.plot(x, y, color=colour, lw=1.1, label=label or None, **style)
