@@ -19,9 +19,10 @@ EXTRAS = {
 
 def told(who: str, error: ModuleNotFoundError) -> str:
     """Return the line for a module that is missing: who needs it, and what to install; empty if no extra brings it."""
-    if error.name not in EXTRAS:
+    missing = (error.name or "").partition(".")[0]
+    if missing not in EXTRAS:
         return ""
-    return f"{who} needs {error.name}, which is not installed: pip install 'positioner[{EXTRAS[error.name]}]'"
+    return f"{who} needs {missing}, which is not installed: pip install 'positioner[{EXTRAS[missing]}]'"
 
 
 def needed(module: str, who: str) -> Any:

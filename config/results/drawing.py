@@ -92,6 +92,7 @@ def race(errors: Mapping[str, float], chosen: Collection[str], marks: Mapping[st
     for (name, value), style in zip(marks.items(), (":", "--"), strict=False):
         axes.axvline(value, color=QUIET, ls=style, label=name)
     _logarithmic(axes, [*(error for _, error in ordered), *marks.values()])
+    axes.set_ylim(-0.7, len(names) - 0.3)
     axes.set_xlabel(label)
     legend(axes)
     return figure

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import nan
 
 from config.codes import Refusal
+from config.results.result import Brief
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +30,8 @@ NO_BREAKAWAY = no_estimate(Refusal.WAITING_FOR_MOTION)
 """No break-away measured yet."""
 
 
-@dataclass(frozen=True, slots=True)
-class Estimates:
+@dataclass(frozen=True, slots=True, repr=False)
+class Estimates(Brief):
     """All of them.
 
     Attributes:

@@ -86,7 +86,7 @@ class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
 
 
 def _tried(each: ForceCandidate) -> Tried:
-    errors = (each.fit.train_rms_n, each.fit.test_rms_n, each.fit.typical_n)
+    errors = (each.fit.train_rms_n, each.fit.test_rms_n, each.fit.median_error_n)
     return Tried(each.step, each.name, *errors, each.gain, each.rejection_reason)
 
 

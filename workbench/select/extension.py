@@ -93,7 +93,7 @@ class Extension(Result):
         """Draw the error on what was held out, refitted without the effects and with them, over time."""
         from config.results.drawing import BETTER, MODEL, legend, line, panels
 
-        part = self.split.judged
+        part = self.split.test
         figure, (axes,) = panels((4.0,))
         for name, found, errors, colour in (
             ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
