@@ -25,8 +25,8 @@ from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import BASE, STATIC, Composition
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
+from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
-from workbench.compare.sentences import shortened
 from workbench.data.motion import slips
 from workbench.data.record import Record, ready, require_fittable, require_units
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
