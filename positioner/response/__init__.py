@@ -4,6 +4,7 @@
 of each step, dead band and resolution of the recording. A figure that cannot be determined says why. Needs numpy alone.
 
     response_figures                the whole recording
+    response_result                 what it gives, and how that shows itself: sentences, table, figure, data frame
     step_detection, step_figures    its steps, and the figures of one
     rest_level, figure              where the stem rests; a figure with its uncertainty, and when a level is crossed
     dead_band                       dead band and resolution, from series of small steps
