@@ -19,7 +19,8 @@ from unittest import mock
 
 from pymodbus.client import ModbusTcpClient
 
-from config.device import SIMULATED_MAP, ModbusTcpDevice
+from config.device import ModbusTcpDevice
+from config.modbus_map import SIMULATED_MAP
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus.client import ModbusClient
 

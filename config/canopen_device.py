@@ -1,8 +1,9 @@
 """The device on CANopen: where its quantities lie in the object dictionary, and its bus.
 
-`SIMULATED_OBJECTS` follows from `config.device.QUANTITIES`: one object each, from 0x2000 on, in the table's order. The
-electronic data sheet (`fieldbus.canopen.eds`) and the simulated slave come from the same table; the objects of a real
-device are written in the daemon's TOML file, in the same words. `fieldbus.canopen.objects` says what its words mean.
+`SIMULATED_OBJECTS` follows from `config.quantities.QUANTITIES`: one object each, from 0x2000 on, in the table's order.
+The electronic data sheet (`fieldbus.canopen.eds`) and the simulated slave come from the same table; the objects of a
+real device are written in the daemon's TOML file, in the same words. `fieldbus.canopen.objects` says what its words
+mean.
 """
 
 import math
@@ -11,9 +12,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from config.device import QUANTITIES, WRITABLE, ActionName, Device
+from config.device import Device
 from config.errors import InputError
 from config.loading import SHIPPED, NearFile, NonNegative, Schema
+from config.quantities import QUANTITIES, WRITABLE, ActionName
 
 FIRST_OBJECT = 0x2000
 """Manufacturer-specific objects begin here."""
@@ -140,12 +142,12 @@ class CanopenDevice(CanBus, Device):
     """Read by SDO and nothing else: no NMT, no SYNC, nothing set."""
     map: ObjectMap = SIMULATED_OBJECTS
 
-    def untouched(self) -> Self:
+    def read_only(self) -> Self:
         """Return the same device for one who only watches."""
         return self.model_copy(update={"only_watch": True})
 
-    def clash(self, other: Device) -> str | None:
-        """Say so if the other is the same node, or its SYNC would be taken for this one's, or for a frame of it."""
+    def conflict_with(self, other: Device) -> str | None:
+        """Say so if the other is the same node, or its SYNC has the id of this one's, or of a frame of it."""
         if not isinstance(other, CanopenDevice) or self._bus != other._bus:
             return None
         where = f"on {self.interface} {self.channel}"
@@ -153,15 +155,17 @@ class CanopenDevice(CanBus, Device):
             return f"node {self.node} {where}"
         if self.sync_cob_id == other.sync_cob_id:
             return f"sync_cob_id {self.sync_cob_id:#x} {where}"
-        taken = {self.sync_cob_id, other.sync_cob_id} & (self.own_ids | other.own_ids)
-        return f"arbitration id {min(taken):#x} {where}, as sync_cob_id and as one of the node's own" if taken else None
+        shared = {self.sync_cob_id, other.sync_cob_id} & (self.own_ids | other.own_ids)
+        return (
+            f"arbitration id {min(shared):#x} {where}, as sync_cob_id and as one of the node's own" if shared else None
+        )
 
     @property
     def _bus(self) -> tuple[object, ...]:
         return self.interface, self.channel, tuple(sorted(self.options.items()))
 
     @model_validator(mode="after")
-    def _sync_is_none_of_its_own(self) -> Self:
+    def _sync_id_is_free(self) -> Self:
         if self.sync_cob_id in self.own_ids:
             raise ValueError(f"sync_cob_id must be none of node {self.node}'s own ids, it is {self.sync_cob_id:#x}")
         return self

@@ -15,9 +15,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from config.bus_plugins import AnyDevice
-from config.device import ActionName, ModbusTcpDevice
+from config.device import ModbusTcpDevice
 from config.errors import InputError
 from config.loading import Fraction, NonNegative, Positive, Schema, read_toml, validated
+from config.quantities import ActionName
 from config.tls_table import Tls
 
 
@@ -209,14 +210,15 @@ def load_valves(path: Path) -> tuple[DaemonFile, ...]:
     tables, source = read_toml(path), str(path)
     if not tables.get("valve") or not isinstance(tables["valve"], list):
         return (validated(DaemonFile, tables, source, path.parent),)
-    alone = (_alone(tables, entry, f"{source}: valve {number}") for number, entry in enumerate(tables["valve"], 1))
-    files = tuple(validated(DaemonFile, each, where, path.parent) for each, where in alone)
-    if problem := _clash(files) or _crowded_line(files):
+    numbered = enumerate(tables["valve"], 1)
+    each_valve = (_tables_of_one(tables, entry, f"{source}: valve {number}") for number, entry in numbered)
+    files = tuple(validated(DaemonFile, each, where, path.parent) for each, where in each_valve)
+    if problem := _conflict(files) or _crowded_line(files):
         raise InputError(source, problem)
     return files
 
 
-def _alone(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, Any], str]:
+def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, Any], str]:
     """Return the tables that would describe this valve alone, and what to call it in a complaint."""
     if not isinstance(entry, dict):
         raise InputError(where, "is not a table")
@@ -243,7 +245,7 @@ def _merged(common: Any, own: Any) -> Any:
     return own if own.get("bus") not in (None, common.get("bus", "modbus")) else {**common, **own}
 
 
-def _clash(files: Sequence[DaemonFile]) -> str | None:
+def _conflict(files: Sequence[DaemonFile]) -> str | None:
     """Say which two valves cannot be told apart, or are one."""
     for first, second in combinations(files, 2):
         names = f"{first.valve.name} and {second.valve.name}"
@@ -251,27 +253,28 @@ def _clash(files: Sequence[DaemonFile]) -> str | None:
             return f"valve.name: two valves have {first.valve.name!r}, allowed is one each"
         if first.supervisory.unit == second.supervisory.unit:
             return f"valve.unit: {names} have {first.supervisory.unit}, allowed is one each"
-        if problem := first.device.clash(second.device):
+        if problem := first.device.conflict_with(second.device):
             return f"valve.device: {names} have {problem}, allowed is one each"
     return None
 
 
 def _crowded_line(files: Sequence[DaemonFile]) -> str | None:
-    """Say which valve does not get by with its turn on a line that it shares with others.
+    """Say which valve has too short a cycle for the line that it shares with others.
 
     Each gets an equal share of the period, so that one that does not answer takes time from nobody but itself.
     """
     users = Counter(file.device.line for file in files)
     for file in files:
-        line, turn_s = file.device.line, file.device.turn_s
+        line, exchange_s = file.device.line, file.device.longest_exchange_s
         if line is None or users[line] == 1:
             continue
         if file.cycle != (first := next(each for each in files if each.device.line == line)).cycle:
             return f"{file.valve.name}: cycle must be that of {first.valve.name}, which is on the same line {line}"
         share_s = file.cycle.period_s / users[line]
-        if file.cycle.pace == "real_time" and turn_s > share_s:
+        if file.cycle.pace == "real_time" and exchange_s > share_s:
+            least_s = users[line] * exchange_s
             return (
-                f"{file.valve.name}: cycle.period_s must be at least {users[line] * turn_s:.3g} s, for {users[line]} "
-                f"valves on line {line} of which each may take {turn_s:.3g} s, got {file.cycle.period_s:g}"
+                f"{file.valve.name}: cycle.period_s must be at least {least_s:.3g} s, for {users[line]} "
+                f"valves on line {line} of which each may take {exchange_s:.3g} s, got {file.cycle.period_s:g}"
             )
     return None

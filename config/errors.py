@@ -17,5 +17,5 @@ class InputError(Exception):
         return type(self), (self.source, self.problem)
 
 
-class Unfulfilled(Exception):
-    """The thing asked about does not hold, or could not be done. Commands print it and exit with status 1."""
+class CommandFailed(Exception):
+    """What a command was asked does not hold, or could not be done: it prints the one line, exit status 1."""

@@ -7,9 +7,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from config.canopen_device import CanBus
-from config.device import ActionName
 from config.errors import InputError
 from config.loading import NonNegative, Port, Positive, Schema, chosen_by, load
+from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
 from config.tls_table import Tls
 from config.valve_file import shipped_valve

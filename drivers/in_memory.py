@@ -8,7 +8,7 @@ ILLEGAL_VALUE = 3
 
 
 class Plant(Protocol):
-    """What the driver needs of a device; attributes as in `config.device.QUANTITIES`."""
+    """What the driver needs of a device; attributes as in `config.quantities.QUANTITIES`."""
 
     position_m: float
     pressure_pa: float

@@ -16,7 +16,9 @@ from pymodbus.pdu.register_message import (
     WriteMultipleRegistersRequest,
 )
 
-from config.device import CommunicationAction, ModbusDevice, ModbusMap, Place
+from config.device import ModbusDevice
+from config.modbus_map import ModbusMap, Place
+from config.quantities import CommunicationAction
 from drivers.boundary import BadReply, Capabilities, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.layout import layout

@@ -9,8 +9,8 @@ from types import TracebackType
 from typing import Self
 
 from config.codes import Fault, InhibitReason, Refusal, State
-from config.device import MOST_REGISTERS
-from config.errors import InputError, Unfulfilled
+from config.errors import CommandFailed, InputError
+from config.modbus_map import MOST_REGISTERS
 from config.registers import Register, register_named
 from config.tls_table import Tls
 from fieldbus.modbus.client import ClientError, ModbusClient, NobodyThere, NotConnected, Refused
@@ -28,7 +28,7 @@ REFUSALS = (
 """Why an excitation does not begin or has ended; the other reasons concern the law."""
 
 
-class DcsError(Unfulfilled):
+class DcsError(CommandFailed):
     """The daemon did not do what was asked; one line says what and why."""
 
 

@@ -13,7 +13,7 @@ node that is no actuator carry NOT_READY.
 from collections.abc import Mapping
 
 from config.canopen_device import CanopenDevice
-from config.device import CommunicationAction, DeviceStatus
+from config.quantities import CommunicationAction, DeviceStatus
 from drivers.boundary import Capabilities, Driver, Reading, Refused
 from drivers.canopen.activation import Activation
 from drivers.canopen.events import NodeEvent

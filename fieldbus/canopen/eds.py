@@ -3,8 +3,8 @@
     python -m fieldbus.canopen.eds > config/profiles/positioner.eds
 
 A data sheet (CiA 306) lists every object of a device: name, type, access, default, whether a PDO can carry it. Ours has
-the quantities of `config.device` as REAL32 or unsigned objects with units in their names, CiA 408 control and status
-words beside them, and PDOs that carry one sample by default.
+the quantities of `config.quantities` as REAL32 or unsigned objects with units in their names, CiA 408 control and
+status words beside them, and PDOs that carry one sample by default.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.canopen_device import CONTROL_WORD, SIMULATED_OBJECTS, STATUS_WORD
-from config.device import QUANTITIES, WRITABLE
 from config.errors import InputError
+from config.quantities import QUANTITIES, WRITABLE
 from config.register_format import Format, WireType
 from fieldbus.canopen.objects import DEVICE_MODE, MOST_PDOS, DeviceMode, first_fit
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from operator import itemgetter
 from typing import Any
 
-from config.device import Place
+from config.modbus_map import Place
 from config.register_format import LETTER, Format
 
 

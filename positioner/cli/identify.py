@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Identify, print what was found, and whether the law uses it now."""
     from config.codes import Mode
-    from config.errors import Unfulfilled
+    from config.errors import CommandFailed
 
     asked = {
         "alpha": arguments.alpha_pa,
@@ -33,7 +33,9 @@ def run(arguments: argparse.Namespace) -> int:
     }
     with connected(arguments) as dcs:
         if dcs.get("mode") != Mode.AUTOMATIC:
-            raise Unfulfilled("the mode is not automatic, so nothing may move the valve: positioner set mode automatic")
+            raise CommandFailed(
+                "the mode is not automatic, so nothing may move the valve: positioner set mode automatic"
+            )
         excitation = {name: value for name, value in asked.items() if value is not None}
         return _report(dcs, dcs.identify(excitation, arguments.timeout_s))
 

@@ -46,7 +46,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def _done(words: Sequence[str] | None) -> int:
     """Run one command, now that what it imports is known to be ours."""
-    from config.errors import InputError, Unfulfilled
+    from config.errors import CommandFailed, InputError
     from config.extras import told
 
     arguments = command_parser().parse_args(words)
@@ -57,7 +57,7 @@ def _done(words: Sequence[str] | None) -> int:
     except InputError as error:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 2
-    except Unfulfilled as error:
+    except CommandFailed as error:
         print(f"positioner {arguments.command}: {error}", file=sys.stderr)
         return 1
     except ModuleNotFoundError as error:

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Play and write the recording; its time is the reference's, identification lies before it."""
-    from config.errors import Unfulfilled
+    from config.errors import CommandFailed
     from config.recording import write_recording
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     last = snapshots[-1].decision
     ratios = last.applied.ratios
     if ratios is None:
-        raise Unfulfilled(f"{arguments.valve}: not identified, so not controlled: {last.applied.last_refusal.text}")
+        raise CommandFailed(f"{arguments.valve}: not identified, so not controlled: {last.applied.last_refusal.text}")
     print(f"identified b/c = {ratios.b_over_c:.6g} Pa/m, k/c = {ratios.k_over_c:.6g} Pa")
     print(f"{arguments.out}: {len(snapshots)} samples")
     return 0

@@ -57,7 +57,7 @@ def watching_driver(file: "DaemonFile") -> "Driver":
     """Return a driver that leaves the device as it is: a watcher sends no commands."""
     from drivers import driver_for
 
-    return driver_for(file.device.untouched())
+    return driver_for(file.device.read_only())
 
 
 def _burst(driver: "Driver") -> tuple[list["Reading"], float]:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from config.daemon_file import DaemonFile, LawTable
-from config.device import ActionName
+from config.quantities import ActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.supervision import Limits

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from config.codes import Fault, Mode, Quality
-from config.device import ActionName, DeviceStatus
+from config.quantities import ActionName, DeviceStatus
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 

@@ -18,7 +18,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 from canopen.sdo.server import SdoServer
 
 from config.canopen_device import CONTROL_WORD, SIMULATED_OBJECTS, STATUS_WORD
-from config.device import CommunicationAction, DeviceStatus
+from config.quantities import CommunicationAction, DeviceStatus
 from fieldbus.canopen.objects import ACTIVATE, DEVICE_MODE, LOCAL, NO_FAULT, Control, DeviceMode, NodeState
 from sim.slave.canopen_dictionary import (
     COMMUNICATION_END,

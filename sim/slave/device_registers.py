@@ -11,7 +11,8 @@ from operator import attrgetter
 
 from pymodbus.constants import ExcCodes
 
-from config.device import SIMULATED_MAP, WRITABLE, CommunicationAction, ModbusMap
+from config.modbus_map import SIMULATED_MAP, ModbusMap
+from config.quantities import WRITABLE, CommunicationAction
 from fieldbus.modbus.layout import layout
 from fieldbus.modbus.register_answers import RegisterError, Table
 from sim.slave.clocks import Clock

@@ -7,8 +7,8 @@ from one sample to the next. Who lets the time pass is told apart by who calls w
     command, advance the master commands when it likes, the grid runs on: real time. After `communication_timeout_s`
                      without a command the device holds, vents or fills, and says so in its status until the next.
 
-Attributes carry the names of `config.device.QUANTITIES`. What goes wrong with it by its file is judged at each sample
-that it measures (`faults`); `drops` says whether it answers.
+Attributes carry the names of `config.quantities.QUANTITIES`. What goes wrong with it by its file is judged at each
+sample that it measures (`faults`); `drops` says whether it answers.
 """
 
 import math
@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from config.device import CommunicationAction, DeviceStatus
+from config.quantities import CommunicationAction, DeviceStatus
 from config.slave_file import SlaveFile
 from sim.parameter_changes import Changes
 from sim.slave.faults import Faults

@@ -15,7 +15,7 @@ from modbus_tk.modbus_tcp import TcpQuery
 
 from config.codes import Mode
 from config.daemon_file import load_daemon
-from config.errors import Unfulfilled
+from config.errors import CommandFailed
 from config.registers import BY_NAME
 from config.roles import Role
 from config.tls_table import Tls
@@ -90,7 +90,7 @@ def test_each_role_may_write_what_is_its_own_and_a_refusal_is_exception_1_and_on
                 if name in allowed.get(role, values):
                     dcs.set(name, value)
                     continue
-                with pytest.raises(Unfulfilled, match="exception 1, illegal function"):
+                with pytest.raises(CommandFailed, match="exception 1, illegal function"):
                     dcs.set(name, 1)
                 lines += 1
                 until(lambda n=lines: len(site.refusals()) == n, "the line")  # type: ignore[misc]
@@ -106,7 +106,7 @@ def test_a_write_of_several_registers_needs_the_highest_role_and_is_refused_whol
     with Dcs("127.0.0.1", site.port, tls=site.tls("engineer")) as engineer:
         engineer.set_all({"reference": 0.3, "mode": 0})
     with Dcs("127.0.0.1", site.port, tls=site.tls("operator")) as operator:
-        with pytest.raises(Unfulfilled, match="exception 1"):
+        with pytest.raises(CommandFailed, match="exception 1"):
             operator.set_all({"reference": 0.5, "reference_scaled": 5000, "mode": Mode.AUTOMATIC})
         assert operator.get("reference") == pytest.approx(0.3)
         operator.set_all({"reference": 0.35, "reference_scaled": 3500})

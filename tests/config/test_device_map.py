@@ -4,9 +4,11 @@ from typing import Any
 
 import pytest
 
-from config.device import QUANTITIES, SIMULATED_MAP, WRITABLE, ModbusMap, ModbusTcpDevice, Place
+from config.device import ModbusTcpDevice
 from config.errors import InputError
 from config.loading import validated
+from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
+from config.quantities import QUANTITIES, WRITABLE
 
 
 def refusal(tables: dict[str, Any]) -> str:

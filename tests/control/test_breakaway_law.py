@@ -10,7 +10,7 @@ import pytest
 
 from config.codes import Fault, InhibitReason, Mode, State
 from config.daemon_file import DaemonFile
-from config.device import DeviceStatus
+from config.quantities import DeviceStatus
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller import Controller, Decision

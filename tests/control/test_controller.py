@@ -7,7 +7,7 @@ import pytest
 
 from config.codes import Fault, InhibitReason, Mode, Quality, State
 from config.daemon_file import DaemonFile
-from config.device import DeviceStatus
+from config.quantities import DeviceStatus
 from positioner.control.controller import Controller, Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample

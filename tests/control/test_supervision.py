@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from config.codes import Fault, Mode, Quality
-from config.device import DeviceStatus
+from config.quantities import DeviceStatus
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.supervision import Limits, SupervisionMemory, supervise

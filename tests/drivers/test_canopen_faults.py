@@ -13,8 +13,8 @@ import can
 import pytest
 
 from config.canopen_device import SHIPPED_EDS, SIMULATED_OBJECTS, STATUS_WORD, CanBus, CanopenDevice, Entry
-from config.device import DeviceStatus
 from config.errors import InputError
+from config.quantities import DeviceStatus
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused

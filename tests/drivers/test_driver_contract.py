@@ -13,7 +13,9 @@ from typing import Protocol
 import pytest
 from pymodbus.constants import ExcCodes
 
-from config.device import SIMULATED_MAP, CommunicationAction, ModbusMap, ModbusTcpDevice, Place
+from config.device import ModbusTcpDevice
+from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
+from config.quantities import CommunicationAction
 from config.slave_file import SlaveFile
 from config.tls_table import Tls
 from config.valve_file import shipped_valve

@@ -14,7 +14,8 @@ from modbus_tk.modbus import Slave
 from modbus_tk.modbus_rtu import RtuServer
 from modbus_tk.modbus_tcp import TcpServer
 
-from config.device import SIMULATED_MAP, ModbusRtuDevice, ModbusTcpDevice
+from config.device import ModbusRtuDevice, ModbusTcpDevice
+from config.modbus_map import SIMULATED_MAP
 from config.serial_port import SerialPort
 from drivers.boundary import Refused
 from drivers.modbus_device import ModbusDriver

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from config.device import SIMULATED_MAP, ModbusTcpDevice
+from config.device import ModbusTcpDevice
+from config.modbus_map import SIMULATED_MAP
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused

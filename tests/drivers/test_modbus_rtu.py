@@ -16,7 +16,8 @@ import pytest
 from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusIOException
 
-from config.device import SIMULATED_MAP, ModbusRtuDevice
+from config.device import ModbusRtuDevice
+from config.modbus_map import SIMULATED_MAP
 from config.serial_port import Baud, SerialPort
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve

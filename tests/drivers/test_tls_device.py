@@ -197,7 +197,7 @@ def test_a_secured_driver_at_a_plain_device_is_told_so() -> None:
 def test_an_observer_reads_and_moves_nothing(caplog: pytest.LogCaptureFixture) -> None:
     with device_with(guarded()) as (device, server):
         file = ModbusTcpDevice(port=server.port, reply_timeout_s=2.0, tls=tls("observer"))
-        driver = ModbusTcpDriver(file.untouched())
+        driver = ModbusTcpDriver(file.read_only())
         driver.open()
         assert driver.read().sample_counter == 0
         for act in (driver.exchange, driver.write):

@@ -9,9 +9,10 @@ from dcf.lint import lint
 from dcf.parse import parse_file
 
 from config.canopen_device import SHIPPED_EDS, SIMULATED_OBJECTS, CanopenDevice
-from config.device import QUANTITIES, SIMULATED_MAP, WRITABLE
 from config.errors import InputError
 from config.loading import validated
+from config.modbus_map import SIMULATED_MAP
+from config.quantities import QUANTITIES, WRITABLE
 from fieldbus.canopen.eds import DATA_TYPE, eds_text, read_eds
 from fieldbus.canopen.objects import MOST_PDOS, first_fit
 

@@ -7,7 +7,7 @@ import pytest
 from canopen.sdo.exceptions import SdoAbortedError
 
 from config.canopen_device import SHIPPED_EDS
-from config.device import QUANTITIES, CommunicationAction
+from config.quantities import QUANTITIES, CommunicationAction
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from fieldbus.canopen.eds import PRODUCT, VENDOR, read_eds

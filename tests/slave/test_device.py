@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from config.device import CommunicationAction, DeviceStatus
+from config.quantities import CommunicationAction, DeviceStatus
 from config.slave_file import SlaveFile
 from sim.slave.simulated_device import Device
 

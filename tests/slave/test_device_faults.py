@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pymodbus.constants import ExcCodes
 
-from config.device import SIMULATED_MAP
 from config.errors import InputError
+from config.modbus_map import SIMULATED_MAP
 from config.slave_file import load_slave
 from fieldbus.modbus.register_answers import RegisterError
 from sim.slave.clocks import Lockstep

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from config.device import SIMULATED_MAP
+from config.modbus_map import SIMULATED_MAP
 from sim.slave.clocks import MOST_CATCH_UP_S
 from tests.independent import IndependentClient, independent_client
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from config.device import SIMULATED_MAP, ModbusMap, Place
+from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from fieldbus.modbus.client import ModbusClient

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from config.errors import InputError, Unfulfilled
+from config.errors import CommandFailed, InputError
 from config.recording import write_recording
 from config.writing import valve_toml
 from workbench.blind.hiding import Hidden
@@ -50,7 +50,7 @@ def reveal(folder: Path) -> tuple[str, Mapping[str, Any]]:
 
     Raises:
         InputError: there is no sealed answer, or it cannot be read.
-        Unfulfilled: the answer or a file is not the one that was sealed.
+        CommandFailed: the answer or a file is not the one that was sealed.
     """
     path = folder / SEALED
     try:
@@ -62,11 +62,11 @@ def reveal(folder: Path) -> tuple[str, Mapping[str, Any]]:
     except (ValueError, KeyError, TypeError, binascii.Error):
         raise InputError(str(path), "is not a sealed answer: it must hold sha256 and answer_base64") from None
     if _sha256(text) != digest:
-        raise Unfulfilled(f"{path}: the answer is not the one that was sealed: its SHA-256 is another")
+        raise CommandFailed(f"{path}: the answer is not the one that was sealed: its SHA-256 is another")
     answer: dict[str, Any] = json.loads(text)
     for name, expected in answer["files"].items():
         if not (folder / name).is_file() or _sha256((folder / name).read_bytes()) != expected:
-            raise Unfulfilled(f"{folder / name}: is not the file that was sealed")
+            raise CommandFailed(f"{folder / name}: is not the file that was sealed")
     return digest, answer
 
 
