@@ -260,10 +260,10 @@ class LoopbackBus(can.BusABC):
                     self._woken.set()
             elif magic == MAGIC and end < ENDS:
                 port = self._base + end
-                self._heed(self._peers.get(port) or self._newcomer(port), kind, number, taken, datagram)
+                self._handle(self._peers.get(port) or self._newcomer(port), kind, number, taken, datagram)
         return True
 
-    def _heed(self, peer: _Peer, kind: int, number: int, taken: int, datagram: bytes) -> None:
+    def _handle(self, peer: _Peer, kind: int, number: int, taken: int, datagram: bytes) -> None:
         if peer.deaf:
             peer.deaf, peer.acked = False, peer.sent
         elif peer.acked < taken <= peer.sent:

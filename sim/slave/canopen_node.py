@@ -145,7 +145,7 @@ class CanopenNode:
         self._send(0x700 + self.number, b"\0")
 
     def receive(self, identity: int, data: bytes) -> None:
-        """Heed a frame."""
+        """Take in a frame."""
         if identity == self._sync_id:
             if self.state is Nmt.OPERATIONAL:
                 self._sync()
@@ -196,12 +196,12 @@ class CanopenNode:
             self._compose()
 
     def _compose(self) -> None:
-        """Take PDOs, SYNC and heartbeat from the dictionary; `heeds` are the arbitration ids that matter."""
+        """Take PDOs, SYNC and heartbeat from the dictionary; `wanted_ids` are the arbitration ids that matter."""
         self._beat_period_s = 1e-3 * self._dictionary.value(HEARTBEAT_MS)
         self._sync_id = self._dictionary.value(SYNC_ID) & 0x7FF
         self._rpdos = {pdo.cob_id: pdo for pdo in self._dictionary.pdos(RPDO)}
         self._tpdos = self._dictionary.pdos(TPDO)
-        self.heeds = frozenset((0, self._sync_id, 0x600 + self.number, *self._rpdos))
+        self.wanted_ids = frozenset((0, self._sync_id, 0x600 + self.number, *self._rpdos))
 
     def _latch(self, identity: int, data: bytes) -> None:
         if len(data) < self._rpdos[identity].layout.size:

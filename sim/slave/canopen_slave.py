@@ -75,12 +75,12 @@ class NodeServer:
         self._bus.shutdown()
 
     def _work(self) -> None:
-        heeds: frozenset[int] = frozenset()
+        wanted: frozenset[int] = frozenset()
         while not self._stop.is_set():
             try:
-                if self.node.heeds != heeds:  # what is for others need not come
-                    heeds = self.node.heeds
-                    self._bus.set_filters([{"can_id": each, "can_mask": 0x7FF, "extended": False} for each in heeds])
+                if self.node.wanted_ids != wanted:  # what is for others need not come
+                    wanted = self.node.wanted_ids
+                    self._bus.set_filters([{"can_id": each, "can_mask": 0x7FF, "extended": False} for each in wanted])
                 message = self._bus.recv(IDLE_S)
             except (can.CanError, OSError):
                 self._stop.wait(IDLE_S)  # the bus is off; it may come back

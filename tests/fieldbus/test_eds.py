@@ -1,9 +1,12 @@
 """The electronic data sheet: made from the table of quantities, and valid for readers that are not ours."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
+import canopen
 import pytest
+from canopen.objectdictionary import ODVariable
 from dcf.device import Device as DcfDevice
 from dcf.lint import lint
 from dcf.parse import parse_file
@@ -55,6 +58,26 @@ def test_an_independent_checker_finds_no_fault() -> None:
     device = DcfDevice(parsed, {"NODEID": NODE})
     assert device[0x1400][1].parse_value() == 0x200 + NODE
     assert device[SIMULATED_OBJECTS.command_pa.index][0].name == "command_pa"
+
+
+def objects_of(sheet: Any) -> dict[tuple[int, int], tuple[object, ...]]:
+    """Return what a data sheet says of each object and sub-entry."""
+    whole = [sheet[index] for index in sheet]
+    each = [one for found in whole for one in ([found] if isinstance(found, ODVariable) else found.values())]
+    return {
+        (one.index, one.subindex): (one.name, one.data_type, one.access_type, one.default, one.pdo_mappable)
+        for one in each
+    }
+
+
+def test_the_kept_library_would_write_the_same_objects(tmp_path: Path) -> None:
+    sheet, path = read_eds(SHIPPED_EDS, NODE), tmp_path / "exported.eds"
+    with path.open("w") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # it asks datetime.utcnow
+        canopen.export_od(sheet, file, "eds")
+    assert lint(parse_file(str(path)))
+    assert objects_of(read_eds(path, NODE)) == objects_of(sheet)
+    assert len(objects_of(sheet)) > 80
 
 
 def test_the_checker_would_find_one(tmp_path: Path) -> None:
