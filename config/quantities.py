@@ -45,7 +45,8 @@ def _numbers(codes: type[IntEnum]) -> str:
     return ", ".join(f"{int(each)} {_words(each.name)}" for each in codes)
 
 
-def _bits(flags: type[IntFlag]) -> str:
+def listed_bits(flags: type[IntFlag]) -> str:
+    """Return `number name, number name, ...` of all bits."""
     return ", ".join(f"{each.bit_length() - 1} {_words(each.name)}" for each in flags)
 
 
@@ -58,7 +59,7 @@ QUANTITIES = (
     Quantity("pressure_pa", "Pa", "float32", False, "actuator pressure"),
     Quantity("sample_counter", "1", "uint32", False, "samples taken since power-up, wraps"),
     Quantity("device_time_us", "us", "uint64", False, "device's clock at the sample"),
-    Quantity("status", "1", "uint16", False, f"bits: {_bits(DeviceStatus)}"),
+    Quantity("status", "1", "uint16", False, f"bits: {listed_bits(DeviceStatus)}"),
     Quantity("command_pa", "Pa", "float32", True, "pressure command"),
     Quantity("communication_timeout_s", "s", "float32", True, "silence before the action; 0 is never"),
     Quantity("communication_action", "1", "uint16", True, _numbers(CommunicationAction)),

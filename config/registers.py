@@ -11,6 +11,7 @@ from typing import Literal
 
 from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, State, listed
 from config.errors import InputError
+from config.quantities import DeviceStatus, listed_bits
 from config.register_format import Format, WireType
 from config.roles import Role
 
@@ -99,7 +100,7 @@ STATUS = (
     Register("why", 103, "uint16", "1", f"why not as asked: {listed(InhibitReason)}"),
     Register("position", 104, "float32", "p.u.", "stem position"),
     Register("position_scaled", 106, "int16", "1e-4 p.u.", "the same as a whole number"),
-    Register("device_status", 107, "uint16", "1", "the device's own status word"),
+    Register("device_status", 107, "uint16", "1", f"the device's own status word, bits: {listed_bits(DeviceStatus)}"),
     Register("position_m", 108, "float32", "m", "stem position"),
     Register("pressure", 110, "float32", "Pa", "actuator pressure as measured"),
     Register("command", 112, "float32", "Pa", "pressure command"),
