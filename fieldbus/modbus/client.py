@@ -14,12 +14,11 @@ import time
 from collections.abc import Sequence
 
 from pymodbus.framer import FramerSocket
-from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
     ReadHoldingRegistersResponse,
     WriteMultipleRegistersRequest,
-    WriteMultipleRegistersResponse,
 )
 
 from config.tls_table import Tls
@@ -146,7 +145,9 @@ class ModbusClient:
         Raises:
             ClientError: as `transact`; `Refused` where the server does.
         """
-        reply = self._answer(ReadHoldingRegistersRequest(address=address, count=count), 2 + 2 * count)
+        request = encoded(ReadHoldingRegistersRequest(address=address, count=count))
+        size = 2 * count
+        reply = self._ask(request, bytes((request[0], size)), 2 + size)
         answer = ReadHoldingRegistersResponse()
         answer.decode(reply[1:])
         return list(answer.registers)
@@ -157,25 +158,19 @@ class ModbusClient:
         Raises:
             ClientError: as `transact`; `Refused` where the server does.
         """
-        reply = self._answer(WriteMultipleRegistersRequest(address=address, registers=words), 5)
-        echo = WriteMultipleRegistersResponse()
-        echo.decode(reply[1:])
-        if (echo.address, echo.count) != (address, len(words)):
-            raise self._unexpected(reply)
+        request = encoded(WriteMultipleRegistersRequest(address=address, registers=words))
+        echo = request[:5]
+        self._ask(request, echo, len(echo))
 
-    def _answer(self, request: ModbusPDU, size: int) -> bytes:
-        """Return the PDU that answers a request, of its function and a size in bytes."""
-        asked = encoded(request)
-        reply = self.transact(asked)
-        if (code := exception_code(asked, reply)) is not None:
+    def _ask(self, request: bytes, head: bytes, size: int) -> bytes:
+        """Return the reply PDU to a request, which must begin with `head` and have a size in bytes."""
+        reply = self.transact(request)
+        if (code := exception_code(request, reply)) is not None:
             raise Refused(code)
-        if len(reply) != size or reply[0] != request.function_code:
-            raise self._unexpected(reply)
+        if len(reply) != size or not reply.startswith(head):
+            self.close()
+            raise UnexpectedReply(reply)
         return reply
-
-    def _unexpected(self, reply: bytes) -> UnexpectedReply:
-        self.close()
-        return UnexpectedReply(reply)
 
     def _reply(self, line: socket.socket, transaction: int) -> bytes:
         """Return the PDU of the next frame, which must be the reply to a transaction."""

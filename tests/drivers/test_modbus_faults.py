@@ -128,6 +128,7 @@ MISFITS: dict[str, Fault] = {
     "another function": lambda t, _, reply: frame(t, b"\3" + reply[1:]),
     "another function's exception": lambda t, _, __: frame(t, b"\x83\2"),
     "an exception with more behind it": lambda t, _, __: frame(t, b"\x97\2\0"),
+    "an exception longer than its length": lambda t, _, __: frame(t, b"\x97\2", length=2),
     "an exception without code": lambda t, _, __: frame(t, b"\x97"),
     "too few registers": lambda t, _, reply: frame(t, bytes((23, reply[1] - 2)) + reply[2:-2]),
     "too many registers": lambda t, _, reply: frame(t, bytes((23, reply[1] + 2)) + reply[2:] + b"\0\0"),
