@@ -20,6 +20,7 @@ from config.tls_table import Tls
 from config.valve_file import shipped_valve
 from drivers.boundary import NoConnection, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
+from fieldbus.modbus import server as server_module
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard, NotAuthorized, client_context, identity_in
 from sim.slave.clocks import Lockstep
@@ -216,6 +217,24 @@ def test_a_certificate_without_role_may_not_even_read(caplog: pytest.LogCaptureF
     guard = guarded()
     with pytest.raises(NotAuthorized, match="function 3 needs the role observer"):
         guard.authorize(identity_in(without), READ_ONE[7:])
+
+
+def test_a_refused_client_that_sends_on_still_reads_why(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With TLS 1.3 it has sent its first requests before it can know; a reset would cost it the alert."""
+    monkeypatch.setattr(server_module, "LINGER_S", 20.0)
+    context = client_context(tls("outdated"))
+    with (
+        device_with(guarded()) as (_, server),
+        socket.create_connection(("127.0.0.1", server.port), timeout=20) as plain,
+        context.wrap_socket(plain, server_hostname="127.0.0.1") as line,
+    ):
+        assert refusals(caplog)
+        for _ in range(4):
+            line.sendall(READ_ONE)
+        with pytest.raises(ssl.SSLError, match="alert certificate expired"):
+            line.recv(1)
 
 
 @pytest.mark.parametrize("text", [b"Engineer", b"engineer ", b"", b"none", b"engineer\0", b"admin"])

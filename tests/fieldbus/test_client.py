@@ -42,9 +42,11 @@ def answered_with(pdu: bytes, asked: list[bytes] | None = None) -> Iterator[Modb
         thread.start()
         client = ModbusClient("127.0.0.1", listener.getsockname()[1], UNIT, TIMEOUT_S)
         client.open()
-        yield client
-        client.close()
-        thread.join(TIMEOUT_S)
+        try:
+            yield client
+        finally:
+            client.close()
+            thread.join(TIMEOUT_S)
 
 
 def read(client: ModbusClient) -> object:
@@ -120,6 +122,20 @@ def test_nobody_there_and_a_name_nobody_knows_are_told_apart(monkeypatch: pytest
     with pytest.raises(NotConnected, match=r"^Name or service not known$") as caught:
         ModbusClient("valve-7", port, UNIT, TIMEOUT_S).open()
     assert not isinstance(caught.value, NobodyThere)
+
+
+def test_opening_anew_ends_the_connection_before() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        client = ModbusClient("127.0.0.1", listener.getsockname()[1], UNIT, TIMEOUT_S)
+        client.open()
+        first, _ = listener.accept()
+        held = client._socket  # or it would end for want of an owner
+        client.open()
+        first.settimeout(TIMEOUT_S)
+        assert first.recv(1) == b""
+        assert held is not client._socket
+        client.close()
+        first.close()
 
 
 def test_a_late_reply_is_not_read_after_opening_anew() -> None:
