@@ -1,9 +1,15 @@
 """The ground floor: what people write and read, declared once. Imports no other room.
 
-files     valve_file, slave_file, daemon_file; loading reads, writing writes a valve's; shipped: valves, profiles
-[device]  device (Modbus), canopen_device, bus_plugins (buses of other packages); hosts, serial_port, tls_table
-device    quantities (what it measures and obeys), modbus_map (its registers), register_format (values in words)
-DCS       registers (the supervisory table), codes (every code and its text), roles (who may write)
-records   recording, historian_export; noise (of a recorded position)
-errors    InputError (exit status 2), CommandFailed (1), each one line; extras (which package is not installed)
+Its files:
+
+    valve_file, slave_file, daemon_file           what a person writes: the valve, the simulated slave, the daemon
+    loading, writing                              reads such a file; writes a valve's
+    device, canopen_device                        table [device], on Modbus and on CANopen
+    hosts, serial_port, tls_table                 where it is, and how it is secured
+    bus_plugins, extras                           buses of other packages; which package is not installed
+    quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
+    registers, codes, roles                       the supervisory table; every code and its text; who may write
+    recording, historian_export, noise            the recording format; others' exports; the noise of a position
+    results                                       what results have in common in a notebook
+    errors                                        InputError (exit status 2), CommandFailed (1): each one line
 """

@@ -1,8 +1,13 @@
-"""The buses: one narrow boundary to a device, one file a bus.
+"""The buses: one narrow boundary to a device, one file a bus. A driver knows registers and time-outs, and no control.
 
-`boundary` says what every driver does; `modbus_tcp` talks to a device on Modbus TCP, `memory` to a valve in the
-same process and virtual time. A driver knows registers and time-outs, and nothing of control. `driver_for` finds
-drivers by the name of their bus, those of other packages too (`config.bus_plugins`).
+    boundary         what every driver does
+    modbus_device    a device on any Modbus: its quantities in requests and replies
+    modbus_tcp       on TCP, with TLS where that is asked for
+    modbus_rtu       on a serial line
+    canopen          on CANopen
+    in_memory        a valve in the same process and virtual time
+
+`driver_for` finds drivers by the name of their bus, those of other packages too (`config.bus_plugins`).
 """
 
 from config.bus_plugins import DRIVERS, loaded, offered

@@ -1,6 +1,12 @@
 """The model side: the valve's physics, its effects, and the simulated slaves that serve them on a bus.
 
-`sim.valve.Valve` is a valve in virtual time. `sim.open_loop.respond` is the same in one call, for fitting.
-`sim.simulation.simulate` gives a recording of it, with the sensor's noise.
-`sim.karnopp` holds the equations, `sim.effect` says how an effect is written, `sim.effects` has those that come along.
+Its files:
+
+    karnopp, first_order_lag             the equations, and how a step is taken
+    effect, effects                      how an effect is written; those that come along
+    kernel, kernel_source                the equations with effects in their places, compiled; the text of that
+    composition                          a valve file made ready: effects, parameters, kernel
+    valve, open_loop, simulation         in virtual time; in one call, for fitting; as a recording
+    parameter_changes, transmitter       friction that ages meanwhile; the position's noise and rounding
+    slave                                the simulated device on a bus
 """

@@ -7,11 +7,16 @@
     better = fit(recording, load_valve("valve.toml")).valve
     print(diagnose(recording, load_valve("valve.toml")).sentence)
 
-`record` makes a recording ready for simulation and tells what is wrong with it, `free_run` simulates it, `comparison`
-holds the two against each other, `fitting` finds the parameters, `diagnosis` the effects that are missing, `extension`
-adds them, `report` writes it all down for a browser. Where a rig imposes the position there is nothing to simulate:
-`imposed` reads such forces, `force_balance` balances them, `force_diagnosis` says what the balance lacks.
-`hiding` draws recordings with an effect nobody knows.
+Its rooms, each on those before it:
+
+    data       a recording made ready
+    model      the model run through it
+    compare    where it fails
+    fit        the parameters that explain it
+    select     which effect is missing, and how it is added
+    forces     the same where a rig imposes the position, and there is nothing to simulate
+    blind      recordings with an effect that nobody knows
+    report     all of it for a browser
 """
 
 from config.recording import Recording

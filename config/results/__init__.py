@@ -1,4 +1,8 @@
-"""How a result shows itself to a person: `result` in a line, a summary, a data frame, and HTML for a notebook.
+"""How a result shows itself to a person in a notebook or at a prompt.
 
-`block` is what a summary is made of, sentences and tables; `drawing` what figures share.
+Its files:
+
+    result     in a line, a summary, a data frame, and HTML for a notebook
+    block      what a summary is made of: sentences and tables
+    drawing    what figures share
 """

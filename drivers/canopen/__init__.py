@@ -1,6 +1,10 @@
 """The CANopen driver (CiA 301, CiA 408): `canopen_driver` makes what the daemon opens, reads, writes and closes.
 
-`driver` drives a node; `only_watch` reads one that another drives. Both stand on `sdo` (what is asked and set), `pdo`
-(the cycle's frames), `watcher` (heartbeats, boot-up, emergencies), `activation` (the device states of CiA 408),
-`readings` (what the boundary gets of it) and `node_bus` (the node's frames). `events` names what can happen.
+    driver, only_watch    drives a node; reads one that another drives
+    sdo, pdo              what is asked and set; the cycle's frames
+    watcher, events       heartbeats, boot-up, emergencies; what can happen
+    activation            the device states of CiA 408
+    readings, node_bus    what the boundary gets of the node; the node's frames
+
+Both drivers stand on all the others.
 """

@@ -1,1 +1,8 @@
-"""CANopen, both ends: the `objects` of our device, its data sheet `eds`, and `loopback`, a bus for one machine."""
+"""CANopen, both ends.
+
+Its files:
+
+    objects     what our device's words mean, and how one sample is put into PDOs
+    eds         its electronic data sheet, written and read
+    loopback    a CAN bus between processes of one machine
+"""

@@ -1,5 +1,10 @@
-"""Modbus, both ends, on pymodbus: `server`, `connection` and `register_answers` answer, `client` asks.
+"""Modbus, both ends, on pymodbus. What is pymodbus's and what is ours: docs/decisions/0012-pymodbus.md.
 
-`pdu` and `exception_codes` are what frames carry, `rtu` and `serial_line` the serial line, `layout` packs values into
-registers, `tls` is Modbus/TCP Security. What is pymodbus's and what is ours: docs/decisions/0012-pymodbus.md.
+Its files:
+
+    server, connection, register_answers    answers on TCP: the server, one client's frames, what a request gets
+    client                                  asks on TCP
+    serial_line, rtu                        the serial line, and the frames on it
+    pdu, exception_codes, layout            what frames carry; how a refusal is said; values in registers
+    tls                                     Modbus/TCP Security: mutual TLS, roles from certificates
 """

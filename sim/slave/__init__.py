@@ -1,8 +1,12 @@
 """The simulated slave: the valve as a device on a fieldbus, in a process of its own (`positioner sim`).
 
-`device` is the I/P with position transmitter as pure logic, `clocks` says who lets its time pass, `registers` lays
-it out for Modbus, `modbus_rtu` serves it on a serial line, `modbus` puts valve, device, clock and server together from
-a slave file.
-On CANopen `canopen_dictionary` lays it out, `canopen_node` is the node, `canopen` puts it on its bus; `slave` makes
-whichever a file names.
+Its files:
+
+    slave                                     whichever bus a file names
+    simulated_device, clocks                  the I/P with position transmitter as pure logic; who lets its time pass
+    faults                                    it drops, freezes, jumps and restarts, by its file
+    device_registers                          laid out for Modbus
+    modbus_slave, rtu_server                  served on TCP; on a serial line
+    canopen_dictionary, canopen_node          laid out for CANopen; the node as pure logic
+    canopen_slave                             the node on its bus
 """

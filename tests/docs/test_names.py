@@ -146,7 +146,7 @@ CHECKS: dict[str, Callable[..., str | None]] = {
     r"positioner (.+)": wrong_command,
     r"python -m ([\w.]+).*": wrong_module,
     r"make (\w+)": wrong_target,
-    r"\[(\w+)\](?: (\w+))?(?: = .*)?": wrong_table,
+    r"\[([a-z_0-9]+)\](?: (\w+))?(?: = .*)?": wrong_table,
 }
 """What a span may name, and how it is looked for."""
 

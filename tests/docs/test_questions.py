@@ -10,7 +10,7 @@ ROW = re.compile(r"^\| (.+\?) \| `([\w/.]+)` `(\w+)` \|$", re.MULTILINE)
 GUIDE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 QUESTIONS = ROW.findall(GUIDE.partition("\n## Where is it?\n")[2].partition("\n## ")[0])
 ROOMS = (
-    *("config", "drivers", "fieldbus/canopen", "fieldbus/modbus", "sim", "sim/effects", "sim/slave"),
+    *("config", "drivers", "drivers/canopen", "fieldbus/canopen", "fieldbus/modbus", "sim", "sim/effects", "sim/slave"),
     *("positioner/cli", "positioner/control", "positioner/daemon", "positioner/daemon/health", "positioner/estimation"),
     *("positioner/paper", "positioner/response", "positioner/virtual"),
     *("workbench/blind", "workbench/compare", "workbench/data", "workbench/fit", "workbench/forces", "workbench/model"),

@@ -1,5 +1,10 @@
-"""Where the model fails: `comparison` puts it together, `comparison_sentences` say it in words.
+"""Where the model fails.
 
-`phases` are what the stem does, `slip_matching` which of its slips the model makes, `residuals` what the error hangs
-on, `friction_balance` friction from the forces, `measures` figures of an error.
+Its files:
+
+    comparison, comparison_sentences    all of it put together; the same in words
+    phases, slip_matching               what the stem does when; which of its slips the model makes
+    residuals                           what the error hangs together with
+    friction_balance                    friction from the balance of forces
+    measures                            figures of an error
 """

@@ -1,4 +1,10 @@
-"""A recording made ready: `record` says what is wrong with it, `noise` what no model explains, `held_out` what is kept.
+"""A recording made ready.
 
-`motion` finds the slips, `imposed_motion` reads a bench where a rig imposes the position.
+Its files:
+
+    record            cut where it is broken, its bad samples marked, all of it told
+    held_out          what is fitted, and what judges
+    noise             what no model explains: noise, rounding, how well the valve repeats itself
+    motion            velocity, and the slips
+    imposed_motion    a bench where a rig imposes the position, and static curves
 """

@@ -1,5 +1,10 @@
-"""The parameters that explain a record: `fitting` puts it together.
+"""The parameters that explain a record.
 
-`guesses` and `starts` say where searches begin, `objective` what they lower, `uncertainty` what the record determines.
-`fitted_parameter` is a parameter with its interval, and how parameters are shown.
+Its files:
+
+    fitting            puts it together
+    starts, guesses    where searches begin; what the positions suggest
+    objective          what they lower, and how
+    fitted_parameter   a parameter with its interval, and how it is shown
+    uncertainty        what the record determines
 """

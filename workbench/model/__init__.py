@@ -1,1 +1,7 @@
-"""The model held against a record: `free_run` simulates it whole, `parameters` are its coordinates in a fit."""
+"""The model held against a record.
+
+Its files:
+
+    free_run      simulates it whole, on the command alone
+    parameters    the coordinates of a fit
+"""

@@ -5,9 +5,13 @@
     report_forces(diagnose_forces(recordings, valve), path, Subject(valve, ("bench.csv",)))
     report_journal(Journal.beside(Path("better.toml")), path, valve.valve.name)
 
-`comparison`, `diagnosis`, `forces` and `journal` write the sections, `effects` those that two of them share, `overlay`
-and `charts` draw, `series` thins out what is too long to be drawn, `page` sets all of it into `page.html`. The plots
-are plotly.js's. The same input, the same bytes.
+The same input, the same bytes. Its files:
+
+    comparison_report, diagnosis_report    the sections of each report
+    forces_report, journal_report          of the others
+    effects_table, ranking                 sections that two of them share; which effect lowers the error how far
+    overlay, charts, plot_series           measured and simulated; the small plots; what is too long thinned out
+    page, units                            pieces of HTML set into one page; units that people at a plant use
 """
 
 from workbench.report.comparison_report import report_comparison

@@ -1,8 +1,16 @@
-"""Which effect is missing: `diagnosis` puts it together, `extension` adds what it found.
+"""Which effect is missing.
 
-`effect_search` refits the library step by step, `effect_candidates` judges a step, `forward_selection` is what it
-shares with the balance of forces, `candidate_table` how what was tried is shown; `effect_acceptance` is the rule by
-which an effect is accepted, `block_errors` its statistics, `verdict` and `verdict_sentence` what follows. `equivalence`
-is what no recording can tell apart, `tangent_preview` the quick first ranking, `experiment` the input that tells rivals
-apart, `residual_structure` the meter of what is unexplained.
+Its files:
+
+    diagnosis, diagnosis_json                     puts it together; the same as JSON
+    effect_search, effect_candidates              the library refitted step by step; one step
+    forward_selection, candidate_table            shared with the balance of forces; what was tried, shown
+    effect_acceptance, block_errors               the rule by which an effect is accepted; its statistics
+    verdict, verdict_sentence                     what follows, and how it is said
+    equivalence                                   what no recording tells apart
+    tangent_preview                               the quick first ranking
+    experiment                                    the input that tells rivals apart
+    residual_structure                            the meter of what is unexplained
+    extension, extension_json                     adds what was found; the same as JSON
+    extension_journal                             what was added when, and why
 """
