@@ -138,7 +138,7 @@ def test_an_independent_client_gets_in_by_the_same_certificates(site: Site) -> N
     context = ssl.create_default_context(cafile=site.tls("observer").authority)
     context.load_cert_chain(site.tls("observer").certificate, site.tls("observer").key)
     with (
-        socket.create_connection(("127.0.0.1", site.port), timeout=20) as plain,
+        socket.create_connection(("127.0.0.1", site.port), timeout=60) as plain,
         context.wrap_socket(plain, server_hostname="127.0.0.1") as line,
     ):
 

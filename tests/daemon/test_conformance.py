@@ -29,7 +29,7 @@ from sim.slave.modbus_slave import device_of
 pytestmark = pytest.mark.real_time
 
 UNIT = 3
-WITHIN_S = 20.0
+WITHIN_S = 60.0
 WORD_TEST = BY_NAME["word_test"].address
 READ = struct.pack(">BHH", 3, WORD_TEST, 1)
 ANSWER = struct.pack(">BBH", 3, 2, 0xB38C)

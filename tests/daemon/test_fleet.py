@@ -42,7 +42,7 @@ from sim.slave.modbus_slave import device_of
 
 pytestmark = pytest.mark.real_time
 
-WITHIN_S = 30.0
+WITHIN_S = 60.0
 VALVES = 8
 NAMES = [f"FV-{number}" for number in range(1, VALVES + 1)]
 STROKE_M = 0.1016

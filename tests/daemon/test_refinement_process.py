@@ -44,7 +44,7 @@ def test_a_job_is_done_elsewhere_exactly_as_here(process: RefinementProcess) -> 
 
 def test_it_is_started_before_there_is_a_job_and_ends_at_once() -> None:
     made = RefinementProcess()
-    until = time.monotonic() + 20
+    until = time.monotonic() + 60
     while made._process is None and time.monotonic() < until:
         time.sleep(0.005)
     assert made._process is not None
@@ -89,7 +89,7 @@ def test_a_process_that_died_refuses() -> None:
 
 
 def until_collected(refiner: ProcessRefiner) -> bool:
-    until = time.monotonic() + 20
+    until = time.monotonic() + 60
     while time.monotonic() < until:
         if refiner.collect() is not None:
             return True

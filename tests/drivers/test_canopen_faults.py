@@ -129,7 +129,7 @@ def recovers(driver: CanopenDriver, node: Scripted) -> None:
 
 
 def in_time(holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 5
+    end_s = time.monotonic() + 60
     while not holds():
         assert time.monotonic() < end_s
         time.sleep(1e-3)
@@ -180,7 +180,7 @@ def test_a_heartbeat_that_stops_while_samples_come(node: Scripted, channel: str)
     node.fault = without(HEARTBEAT)
 
     def cycle_on() -> None:
-        end_s = time.monotonic() + 5
+        end_s = time.monotonic() + 60
         while time.monotonic() < end_s:
             driver.exchange(PUSH_PA)
 

@@ -73,7 +73,7 @@ def converter() -> Iterator[int]:
 def positioner(site: Path, *words: str) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "PYTHONPATH": str(site)}
     command = [sys.executable, "-m", "positioner.cli", *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=100)
 
 
 def daemon_file(site: Path, *changes: tuple[str, str]) -> str:

@@ -60,7 +60,7 @@ def line(server: RegisterServer) -> Iterator[socket.socket]:
 
 
 def connection(server: RegisterServer) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", server.port), timeout=5)
+    return socket.create_connection(("127.0.0.1", server.port), timeout=60)
 
 
 def frame(pdu: bytes, transaction: int = 1, unit: int = 7) -> bytes:

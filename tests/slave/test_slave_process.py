@@ -43,7 +43,7 @@ def slave(path: Path, text: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
 
 def end(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str, str]:
     process.send_signal(number)
-    out, error = process.communicate(timeout=10)
+    out, error = process.communicate(timeout=60)
     return process.returncode, out, error
 
 
@@ -95,7 +95,7 @@ def test_a_port_in_use_and_bad_files_are_one_line_and_status_2(tmp_path: Path) -
         (tmp_path / "ageing.toml").write_text("[[change]]\nat_s = 5\ncoulomb_n = 1e4\n")
         for (name, *options), line in said.items():
             with start(tmp_path / name, *options) as process:
-                out, error = process.communicate(timeout=20)
+                out, error = process.communicate(timeout=60)
             assert (process.returncode, out, error.count("\n")) == (2, "", 1), error
             assert line in error
 

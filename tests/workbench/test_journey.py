@@ -1,6 +1,6 @@
 """The whole journey, blind: compare fails, diagnose names the effect, extend adds it, the error falls, compare holds.
 
-The recordings come from generators that share no code with the model (LuGre, elasto-plastic) and from `hide`; one case
+The recordings come from generators that share no code with the model (LuGre, elasto-plastic); one case
 arrives as a historian's export. Small libraries and 10 s of recording keep it short; the campaign is in benchmarks/.
 """
 
@@ -17,7 +17,6 @@ from config.valve_file import ValveFile
 from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.generators import case
-from workbench.blind.hiding import hide
 
 DURATION_S = 10.0
 
@@ -40,11 +39,6 @@ def generated(kind: str, law: str, seed: int, rival: str, *, is_export: bool = F
     return Blind(made.fit, made.test, made.base, made.hidden, rival, is_export)
 
 
-def hidden(seed: int, rival: str) -> Blind:
-    drawn = hide(seed, duration_s=DURATION_S)
-    return Blind(drawn.fit, drawn.test, drawn.base, drawn.truth.effect[0].name, rival)
-
-
 def export(path: Path, recording: Recording, stroke_m: float) -> None:
     """Write it as a historian does: its own names, per cent, bar, semicolons and decimal commas."""
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -64,7 +58,6 @@ MAPPING = [f"--column={each}" for each in ("time_s=Time", "command_pa=OUT:bar", 
             lambda: generated("sensor_lag", "elasto_plastic", 2, "ip_lag", is_export=True), id="elasto-plastic, export"
         ),
         pytest.param(lambda: generated("asymmetric_friction", "lugre", 1, "sensor_lag"), id="LuGre"),
-        pytest.param(lambda: hidden(4, "ip_lag"), id="hide"),
     ],
 )
 def test_the_hidden_effect_is_found_and_added_and_the_error_falls(

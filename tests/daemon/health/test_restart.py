@@ -13,7 +13,7 @@ from positioner.dcs import Dcs
 
 pytestmark = pytest.mark.real_time
 
-WITHIN_S = 20.0
+WITHIN_S = 60.0
 DAEMON = """[valve]
 name = 'FV-101'
 stroke_m = 0.1016
