@@ -14,7 +14,7 @@ from tests.workbench.generators import CASES, CLEAN, DIRTY, KINDS, LAWS, SMOOTH,
 from tests.workbench.generators import follow as followed
 from workbench.blind.input_signal import excitation
 from workbench.data.motion import slips
-from workbench.data.noise import repeatability_m
+from workbench.data.noise_floor import repeatability_m
 
 PERIOD_S = 0.01
 SAME = Plant(law=SMOOTH, v_s=1e-2)

@@ -21,7 +21,7 @@ from workbench.blind.input_signal import FIRST, excitation
 from workbench.blind.sealing import FILES, SEALED, seal
 from workbench.blind.trial import NOISE_M
 from workbench.data.motion import slips
-from workbench.data.noise import repeat_lag, repeatability_m
+from workbench.data.noise_floor import repeat_lag, repeatability_m
 
 Capture = pytest.CaptureFixture[str]
 SEED = load_valve(find_valve("seed")).valve

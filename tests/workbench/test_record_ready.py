@@ -7,7 +7,7 @@ from config.errors import InputError
 from config.noise import quantum_m
 from config.recording import Column, Recording
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
-from workbench.data.noise import noise_std_m, repeatability_m
+from workbench.data.noise_floor import noise_std_m, repeatability_m
 from workbench.data.record import ready, require_units
 
 

@@ -27,7 +27,7 @@ from config.recording import Column, Recording, read_table
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.motion import PARABOLA
-from workbench.data.noise import noise_std_m
+from workbench.data.noise_floor import noise_std_m
 from workbench.data.record import UNITS_PA
 
 FORCES = ("time_s", "pressure_pa", "position_m", "load_n")

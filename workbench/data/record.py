@@ -18,7 +18,7 @@ from config.noise import quantum_m
 from config.recording import CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
-from workbench.data.noise import noise_std_m, repeatability_m
+from workbench.data.noise_floor import noise_std_m, repeatability_m
 
 GAP = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
