@@ -1,6 +1,6 @@
 """`python -m benchmarks`: every benchmark that takes seconds; `benchmarks.memory` takes minutes and runs alone."""
 
-from benchmarks import bus, can, cycle_time, estimation, modbus_pieces, physics, rtu, startup, tls
+from benchmarks import bus, can, cycle_time, estimation, modbus_pieces, physics, rtu_cycle, startup, tls_cycle
 
 for name, benchmark in {
     "physics": physics.report,
@@ -9,8 +9,8 @@ for name, benchmark in {
     "Modbus, piece by piece": modbus_pieces.report,
     "cycle": cycle_time.report,
     "can": can.report,
-    "rtu": rtu.report,
-    "tls": tls.report,
+    "rtu": rtu_cycle.report,
+    "tls": tls_cycle.report,
     "start-up": startup.report,
 }.items():
     print(f"== {name}", *benchmark(), "", sep="\n", flush=True)
