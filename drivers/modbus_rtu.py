@@ -1,7 +1,7 @@
 """A device on a serial line, on Modbus RTU.
 
 A reply on a serial line does not say whose it is: one that comes after its time-out would be taken for the answer to
-the next request, and every later one be shifted by one. So the line is let go after whatever is not one whole fitting
+the next request, and every later one be shifted by one. So the line is closed after whatever is not one whole fitting
 reply, and `open` first asks for an echo (function 8) of a number that changes each time. A device answers in order:
 once that echo is back, or is refused as an unknown function, everything asked before has been answered or never will
 be, however late it is. What comes before it is thrown away.
@@ -36,7 +36,7 @@ class ModbusRtuDriver(ModbusDriver):
         self._echoes = 0
 
     def close(self) -> None:
-        """Let go of the line; the device keeps its last command until its own time-out."""
+        """Close the line; the device keeps its last command until its own time-out."""
         self._line.close()
 
     def _connect(self) -> None:
@@ -87,19 +87,19 @@ class ModbusRtuDriver(ModbusDriver):
         return reply
 
     def _fault(self, request: bytes, frame: bytes) -> DriverError:
-        """Return what a transaction that did not succeed means; let go of the line unless it can be trusted."""
+        """Return what a transaction that did not succeed means; close the line unless it can be trusted."""
         if len(frame) == EXCEPTION_FRAME and frame[1] == request[0] | EXCEPTION and self._is_ours(frame):
             return self._refused(request, frame[2])
         self.close()
         about = self._about(request)
         if not frame:
             return NoReply(f"{about}: no reply within {1e3 * self._reply_timeout_s:g} ms")
-        return BadReply(f"{about}: {self._misfit(frame)}: {frame.hex(' ')}")
+        return BadReply(f"{about}: {self._mismatch(frame)}: {frame.hex(' ')}")
 
     def _is_ours(self, frame: bytes) -> bool:
         return frame[0] == self._unit and is_whole(frame)
 
-    def _misfit(self, frame: bytes) -> str:
+    def _mismatch(self, frame: bytes) -> str:
         if not is_whole(frame):
             return "noise, or a broken reply"
         return "the reply does not fit" if frame[0] == self._unit else f"a reply of unit {frame[0]}"

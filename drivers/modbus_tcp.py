@@ -25,7 +25,7 @@ class ModbusTcpDriver(ModbusDriver):
         self._client = ModbusClient(config.host, config.port, config.unit, config.reply_timeout_s, config.tls)
 
     def close(self) -> None:
-        """Let go of the device; it keeps its last command until its own time-out."""
+        """Close the connection; the device keeps its last command until its own time-out."""
         self._client.close()
 
     def _connect(self) -> None:

@@ -31,8 +31,8 @@ class NeverSilent(OSError):
 
 
 @dataclass(slots=True)
-class _Taken:
-    """A line that this process has, once for all who use it."""
+class _OpenLine:
+    """A line that this process has open, once for all who use it."""
 
     fd: int
     users: int
@@ -40,7 +40,7 @@ class _Taken:
     """When the last character was on it, as far as known."""
 
 
-_TAKEN: dict[str, _Taken] = {}
+_OPEN_LINES: dict[str, _OpenLine] = {}
 """By the real path of the line."""
 
 
@@ -54,7 +54,7 @@ class SerialLine:
     def __init__(self, port: SerialPort) -> None:
         self._port = port
         self._real = ""
-        self._taken: _Taken | None = None
+        self._taken: _OpenLine | None = None
 
     @property
     def is_open(self) -> bool:
@@ -69,9 +69,9 @@ class SerialLine:
         """
         self.close()
         self._real = os.path.realpath(self._port.path)
-        taken = _TAKEN.get(self._real)
+        taken = _OPEN_LINES.get(self._real)
         if taken is None:
-            taken = _TAKEN[self._real] = _Taken(_opened(self._port), 0, time.monotonic())
+            taken = _OPEN_LINES[self._real] = _OpenLine(_opened(self._port), 0, time.monotonic())
         taken.users += 1
         self._taken = taken
 
@@ -82,7 +82,7 @@ class SerialLine:
             return
         taken.users -= 1
         if taken.users == 0:
-            del _TAKEN[self._real]
+            del _OPEN_LINES[self._real]
             os.close(taken.fd)
 
     def send(self, frame: bytes, within_s: float) -> float:
@@ -126,7 +126,7 @@ class SerialLine:
         taken.active_s = time.monotonic()
         return data
 
-    def _open_line(self) -> _Taken:
+    def _open_line(self) -> _OpenLine:
         if self._taken is None:
             raise OSError(errno.EBADF, "the line is closed")
         return self._taken

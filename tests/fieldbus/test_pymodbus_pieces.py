@@ -4,6 +4,7 @@ A test that turns red here is good news: the piece can be looked at again.
 """
 
 import ast
+import asyncio
 import gc
 import socket
 import struct
@@ -11,12 +12,15 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pymodbus.client import ModbusTcpClient, ModbusTlsClient
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, ReadWriteMultipleRegistersRequest
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
 
 ROOT = Path(__file__).parents[2]
 OURS = ("config", "fieldbus", "drivers", "positioner", "sim")
@@ -81,6 +85,40 @@ def test_function_23_may_write_more_than_121_registers() -> None:
     request = ReadWriteMultipleRegistersRequest()
     request.decode(struct.pack(">HHHHB", 0, 1, 0, 122, 244) + bytes(244))
     assert request.write_count == 122
+
+
+# ---- the server
+
+
+async def served(*bursts: bytes) -> list[bytes]:
+    """Return the first reply of pymodbus's server, ten registers of 0 behind it, to each of some bursts of frames."""
+    zeros = SimData(0, values=[0] * 10, datatype=DataType.REGISTERS)
+    server: Any = ModbusTcpServer(SimDevice(1, simdata=[zeros]), address=("127.0.0.1", 0))
+    await server.serve_forever(background=True)
+    reader, writer = await asyncio.open_connection(*server.transport.sockets[0].getsockname())
+    replies = []
+    for burst in bursts:
+        writer.write(burst)
+        header = await reader.readexactly(7)
+        replies.append(header[:2] + await reader.readexactly(header[5] - 1))
+    writer.close()
+    await writer.wait_closed()
+    await server.shutdown()
+    return replies
+
+
+def test_its_server_answers_the_first_of_pipelined_requests_only() -> None:
+    """Ours answers all: `test_pipelined_requests_are_each_answered_in_order_with_their_own_transaction`."""
+    numbered = [struct.pack(">H", number) + framed(READ)[2:] for number in range(1, 5)]
+    assert asyncio.run(served(b"".join(numbered[:3]), numbered[3])) == [b"\0\1\3\2\0\0", b"\0\4\3\2\0\0"]
+
+
+def test_its_server_writes_before_it_finds_that_it_cannot_read() -> None:
+    """Ours changes nothing: `test_a_write_that_is_not_right_is_refused_and_changes_nothing`."""
+    beyond = framed(struct.pack(">BHHHHBH", 23, 500, 1, 0, 1, 2, 999))
+    refused, read = asyncio.run(served(beyond, framed(READ)))
+    assert refused[2:] == b"\x97\2"
+    assert read[2:] == b"\3\2" + struct.pack(">H", 999)
 
 
 # ---- the client
