@@ -20,7 +20,7 @@ test: $(READY)          ## lint, types, import contracts and the whole test suit
 	$(MAKE) --no-print-directory --jobs=2 suite lint
 
 suite: $(READY)
-	$(BIN)/pytest --numprocesses=auto --dist=loadgroup --no-loadscope-reorder
+	$(BIN)/pytest --numprocesses=auto
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -5,12 +5,37 @@ for a clock, a process or a wire ever wait for each other. See tests/README.md.
 """
 
 import os
+from functools import cache
+from pathlib import Path
 
 import pytest
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
-REAL_TIME = "real_time"
+ROOT = Path(__file__).parents[1]
+REAL_TIME = "pytest.mark.real_time"
+"""In a file: it waits for a clock, a process or a wire."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
+
+
+class Groups(LoadScopeScheduling):  # type: ignore[misc]
+    """Gives each worker a whole group at a time; xdist knows a test by its id alone, hence by its file."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return REAL_TIME if _is_real_time(ROOT / file) else file
+
+
+@cache
+def _is_real_time(path: Path) -> bool:
+    return REAL_TIME in path.read_text(encoding="utf-8")
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Groups:
+    """Share out by groups, in the order of `pytest_collection_modifyitems`."""
+    config.option.loadscopereorder = False
+    return Groups(config, log)
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -19,8 +44,5 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests; put those in real time first, which take the longest however many the processors."""
-    items.sort(key=lambda item: item.get_closest_marker(REAL_TIME) is None)
-    for item in items:
-        is_real_time = item.get_closest_marker(REAL_TIME) is not None
-        item.add_marker(pytest.mark.xdist_group(REAL_TIME if is_real_time else item.nodeid.partition("::")[0]))
+    """Put what happens in real time first: it takes the longest however many the processors."""
+    items.sort(key=lambda item: not _is_real_time(item.path))
