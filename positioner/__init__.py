@@ -17,7 +17,7 @@ docs/library.md has an example of each. The rooms:
     cli          the roof: one file a command
 """
 
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # which type checkers take for true: `typing` itself takes longer to load than all this
 
 if TYPE_CHECKING:
     from config.device import Device
@@ -122,7 +122,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def _loaded(name: str) -> object:
     """Load one of the library's names at its first use (PEP 562).
 
     Raises:
@@ -147,6 +147,10 @@ def __getattr__(name: str) -> Any:
         raise
     globals()[name] = found
     return found
+
+
+if not TYPE_CHECKING:  # or a type checker would take any name for one of the library's
+    __getattr__ = _loaded
 
 
 def __dir__() -> list[str]:

@@ -72,7 +72,7 @@ def test_what_needs_an_extra_names_it_in_one_line(name: str, missing: str) -> No
 
 def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
     with pytest.raises(AttributeError, match=r"no attribute 'comparison'; it has: .*compare, diagnose"):
-        _ = pos.comparison
+        getattr(pos, "comparison")  # noqa: B009
 
 
 def test_version_is_the_distributions() -> None:
