@@ -53,7 +53,7 @@ def search_of(library: Mapping[str, Effect], workers: int = 2) -> EffectSearch:
     time_s: Column = np.asarray(0.01 * np.arange(1200), np.float64)
     position_m = 0.05 + 0.03 * np.sin(1.3 * time_s) + FLOOR_M * np.random.default_rng(1).standard_normal(1200)
     parts = split([Recording({"time_s": time_s, "command_pa": 8e5 * position_m, "position_m": position_m})])
-    return EffectSearch(parts, library, seed=0, workers=workers, progress=lambda _what, _done: None)
+    return EffectSearch(parts, library, valve_with().valve, seed=0, workers=workers, progress=lambda _what, _done: None)
 
 
 def test_it_ends_with_the_effect_that_explains_all(searched: Callable[..., tuple[EffectStep, ...]]) -> None:

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from sim.composition import COULOMB, STATIC, Composition
-from tests.workbench.valves import NOISE_M, drawn_valve, with_effect
-from workbench.blind.hiding import hide
-from workbench.fit.fitting import fit
+from tests.workbench.valves import drawn_valve, with_effect
 from workbench.fit.starts import with_plays
 from workbench.model.parameters import free_parameters
 
@@ -24,12 +22,3 @@ def test_a_play_takes_from_friction_what_friction_stood_in_for() -> None:
         assert abs(theta[STATIC] - VALVE.valve.static_n) <= 1.0001 * shift_n
         assert theta[COULOMB] > 0.0
     assert not with_plays(composition.theta, free_parameters(composition, ["spring_n_per_m"]))
-
-
-def test_an_area_that_varies_is_found_though_spring_and_friction_must_move_far_with_it() -> None:
-    hidden = hide(31013)
-    assert [each.name for each in hidden.truth.effect] == ["area_variation"]
-    found = fit(hidden.fit, hidden.base, effects=("area_variation",), profile=False)
-    assert found.rms_m < 1.1 * NOISE_M
-    truth = hidden.truth.effect[0].parameters["change_m2"]
-    assert found.parameters["area_variation.change_m2"].value == pytest.approx(truth, rel=0.02)

@@ -51,10 +51,13 @@ def pressures(generator: np.random.Generator, count: int) -> Column:
     return command
 
 
-def record_of(file: ValveFile, seed: int, count: int = 3000, *, dirty: bool = False) -> Recording:
+def record_of(
+    file: ValveFile, seed: int, count: int = 3000, *, dirty: bool = False, command_pa: Column | None = None
+) -> Recording:
     """Record a valve; dirty: 300 Pa of correlated pressure noise, and 12 bits of position."""
     generator = np.random.default_rng(seed)
-    command = pressures(generator, count)
+    command = pressures(generator, count) if command_pa is None else command_pa
+    count = command.size
     drive = command + _correlated(generator, count, 300.0) if dirty else command
     valve = file.valve
     begin_m = float(command[0]) * valve.diaphragm_area_m2 / valve.spring_n_per_m

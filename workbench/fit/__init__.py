@@ -4,7 +4,10 @@ Its files:
 
     fitting            puts it together
     starts, guesses    where searches begin; what the positions suggest
-    objective          what they lower, and how
+    landings           the balance of forces where slides end in rest, from which searches begin too
+    objective          what they lower
+    descent            how: trust region, and a scan of the stairs
+    agreement          which of them came to the same
     fitted_parameter   a parameter with its interval, and how it is shown
     uncertainty        what the record determines
 """

@@ -1,16 +1,16 @@
 """Fit: the parameters with which one free run through the whole recording comes closest.
 
-`simulation_error` has the cost and its search, `starts` where searches begin, `parameters` the coordinates,
-`uncertainty` what the recording says about the result.
+`objective` has the cost, `starts` where searches begin, `descent` how they go on, `agreement` which came to the same,
+`uncertainty` what the recording says about the result, `parameters` the coordinates.
 
-Several searches are made, and how far their results agree is told. The result does not depend on the number of
-workers, which are threads: the simulation holds no interpreter lock.
+Searches from all starts go down at the wide scale, the best of these at the middling one, and of those, the best
+first, each to where it stays, until searches from independent starts have come to the same. The result does not depend
+on the number of workers, which are threads: the simulation holds no interpreter lock.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 from os import cpu_count
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -29,10 +29,12 @@ from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
 from workbench.data.motion import slips
 from workbench.data.record import Record, ready, require_fittable, require_units
+from workbench.fit.agreement import Place, agreeing
+from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.objective import FINAL, LAST, MIDDLE, NARROW, POLLS, STRIDES, WIDE, SimulationError
+from workbench.fit.objective import MIDDLE, SimulationError
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed
-from workbench.fit.uncertainty import Uncertainty, uncertainty
+from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import DEFAULT, free_parameters
 
@@ -44,21 +46,18 @@ if TYPE_CHECKING:
 class Effort:
     """How much a search takes upon itself."""
 
-    starts: int
-    """Searches begun, at the wide level."""
     carried: int
-    """The best of these are carried on through the other levels,"""
-    polled: int
-    """and of those at most so many, two at a time, are polled,"""
+    """Of the searches begun at the wide scale the best are carried on,"""
+    settled: int
+    """of those at most so many, two at a time, are brought to where they stay,"""
     agreeing: int
-    """until so many have come to the same."""
+    """until searches from so many origins have come to the same."""
 
 
-OF_BASE, OF_EFFECT = Effort(16, 8, 6, 3), Effort(18, 4, 3, 2)
+OF_BASE, OF_EFFECT = Effort(8, 6, 3), Effort(5, 4, 2)
+DRAWS = 8
 ELSEWHERE = 0.01
 """Of a log-parameter: searches that end nearer to each other have found the same place."""
-AGREE = 1.01
-"""Searches agree if their costs are within this factor of the best."""
 FLAT = 0.5
 """Rise of the cost that is nothing: within it static friction is put in the middle."""
 AT_BOUND = 1e-3
@@ -96,9 +95,9 @@ class Fit(Result):
     starts: tuple[Search, ...]
     """The searches, best first."""
     agreement: int
-    """How many of the searches that were carried to the end came within 1 % of the best cost."""
+    """From how many independent starts searches came to the best, in cost and in parameters (`agreement`)."""
     condition: float
-    undetermined: tuple[str, ...]
+    undetermined: tuple[Combination, ...]
     notes: tuple[str, ...]
     from_pressure: bool
     seeds: tuple[Vector, ...] = field(repr=False)
@@ -106,7 +105,7 @@ class Fit(Result):
 
     @property
     def trusted(self) -> bool:
-        """Whether more than one search came to the same error."""
+        """Whether searches from more than one independent start came to the same cost and parameters."""
         return self.agreement > 1
 
     def predict(self, recording: Recording) -> Column:
@@ -157,7 +156,8 @@ def fit(
 
     Args:
         recording: what was measured.
-        valve: where to begin; its area, mass, Stribeck velocity and stroke are kept unless named in `free`.
+        valve: where to begin, and what an effect's given parameters are scaled by; its area, mass, Stribeck velocity
+            and stroke are kept unless named in `free`.
         effects: names of effects to be added to those of the valve file.
         free: parameters to be fitted, an effect's as `effect.parameter`; by default spring, viscous, Coulomb and static
             friction and all that the effects have.
@@ -179,16 +179,16 @@ def fit(
         composition = Composition.from_file(valve)
         error = _error(composition, record, free, from_pressure)
         origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
-        begins = base_starts(error, origins, seed, OF_BASE.starts)
+        begins = base_starts(error, origins, seed, DRAWS)
         found = _searched(composition, error, begins, OF_BASE, profile, workers, progress)
         return replace(found, seeds=(*found.seeds, *origins))
     ground = base or fit(recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free))
-    composition = _extended(ground.valve, effects)
+    composition = _extended(ground.valve, effects, valve.valve)
     error = _error(composition, record, free, from_pressure)
     names = {find_effect(name, "effects").name for name in effects}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in ground.seeds]
-    begins = effect_starts(error, added, seeds, OF_EFFECT.starts)
+    begins = effect_starts(error, added, seeds)
     return _searched(composition, error, begins, OF_EFFECT, profile, workers, progress)
 
 
@@ -238,13 +238,13 @@ def _require_motion(record: Record) -> None:
         )
 
 
-def _extended(valve: ValveFile, effects: Sequence[str]) -> Composition:
-    """Compose the valve with effects added, each somewhere in its range."""
+def _extended(valve: ValveFile, effects: Sequence[str], known: ValveParameters) -> Composition:
+    """Compose a fitted valve with effects added, each switched off; what is given on a drawing is as known before."""
     there = [each.name for each in valve.effect]
     for name in effects:
         if name in there:
             raise InputError("valve file", f"effect {name} is there already")
-    tables = [_switched_off(find_effect(name, "effects"), name, valve.valve) for name in effects]
+    tables = [_switched_off(find_effect(name, "effects"), name, known) for name in effects]
     return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
 
 
@@ -256,34 +256,39 @@ def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTa
 def _searched(
     composition: Composition,
     error: SimulationError,
-    begins: list[Vector],
+    begins: Sequence[Place],
     effort: Effort,
     profile: bool,
     workers: int | None,
     progress: Progress | None,
 ) -> Fit:
-    """Search from every start, poll the best, and judge what was found."""
+    """Search from every start, and judge what was found."""
     tell = progress or (lambda _: None)
-    wide = partial(error.rough.descended_at, WIDE)
+    rough = error.rough
 
-    middle = partial(error.rough.descended_at, MIDDLE)
-    narrow = partial(error.descended_at, NARROW)
+    def begun(start: Place) -> Place:
+        return replace(start, z=descended(rough, start.z, WIDE))
 
-    begun = _each(wide, begins, workers, lambda done: tell(0.3 * done))
-    carried = _each(middle, error.screened(begun, effort.carried), workers, lambda done: tell(0.3 + 0.1 * done))
-    carried = _polled(error.rough, carried, STRIDES, MIDDLE.scale, workers, lambda done: tell(0.4 + 0.1 * done))
-    # The first start as it is stays in the race: descent at a wide scale may lose it.
-    down = _each(narrow, [*carried, begins[0]], workers, lambda done: tell(0.5 + 0.2 * done))
-    down.sort(key=error.cost)
-    ends: list[Vector] = []
-    while len(ends) < effort.polled and _agreeing(error, ends) < effort.agreeing:
-        pair = down[len(ends) : min(len(ends) + 2, effort.polled)]
-        ends += _polled(error, pair, POLLS, FINAL, workers, lambda done: tell(0.7 + 0.2 * done))
-        ends.sort(key=error.cost)
-    if _agreeing(error, ends) < effort.agreeing:
-        ends = sorted([*ends, error.polled(narrow(ends[0]))], key=error.cost)
-    best = _centred(error, error.descended_at(LAST, ends[0]))
-    judged = uncertainty(error, best, ends, profile=profile)
+    def carried(start: Place) -> Place:
+        return replace(start, z=descended(rough, start.z, MIDDLING))
+
+    def ended(start: Place) -> Place:
+        return replace(start, z=settled(error, start.z))
+
+    def screening(start: Place) -> float:
+        return rough.cost(start.z, MIDDLE)
+
+    first = sorted(_each(begun, begins, workers, lambda done: tell(0.3 * done)), key=screening)[: effort.carried]
+    second = _by_origins(sorted(_each(carried, first, workers, lambda done: tell(0.3 + 0.2 * done)), key=screening))
+    ends: list[Place] = []
+    while len(ends) < min(effort.settled, len(second)) and (not ends or agreeing(error, ends) < effort.agreeing):
+        pair = second[len(ends) : min(len(ends) + 2, effort.settled)]
+        ends += _each(ended, pair, workers, lambda done: tell(0.5 + 0.4 * done))
+        ends.sort(key=lambda end: error.cost(end.z))
+    agreement = agreeing(error, ends)
+    found = [end.z for end in ends]
+    best = _centred(error, found[0])
+    judged = uncertainty(error, best, found, profile=profile)
     tell(1.0)
     valve = _fitted_file(composition, error.theta(best))
     return Fit(
@@ -293,41 +298,26 @@ def _searched(
         error.run.record.floor_m,
         error.cost(best),
         error.count,
-        tuple(_search(error, z) for z in ends),
-        _agreeing(error, ends),
+        tuple(_search(error, z) for z in found),
+        agreement,
         judged.condition,
         judged.undetermined,
         error.run.record.notes,
         error.run.from_pressure,
-        tuple(error.theta(z) for z in (best, *_elsewhere(ends))),
+        tuple(error.theta(z) for z in (best, *_elsewhere(found))),
     )
 
 
-def _polled(
-    error: SimulationError,
-    searches: Sequence[Vector],
-    steps: Sequence[float],
-    scale: float,
-    workers: int | None,
-    tell: Progress,
-) -> list[Vector]:
-    """Poll the searches; of those that fit equally well the first for all."""
-    fresh = [i for i, z in enumerate(searches) if not any(error.alike(z, other, scale) for other in searches[:i])]
-    polled = _each(lambda i: error.polled(searches[i], steps, scale), fresh, workers, tell)
-    at = dict(zip(fresh, polled, strict=True))
-    return [at.get(i, z) for i, z in enumerate(searches)]
+def _by_origins(places: Sequence[Place]) -> list[Place]:
+    """Return the first of each origin, then the second of each, and so on: those that can agree come first."""
+    turns = [sum(other.origin == each.origin for other in places[:i]) for i, each in enumerate(places)]
+    return [places[i] for i in sorted(range(len(places)), key=turns.__getitem__)]
 
 
 def _elsewhere(ends: Sequence[Vector]) -> list[Vector]:
     """Return the best search that came to another place than the best of all, if there is one."""
     away = [z for z in ends if np.max(np.abs(z - ends[0])) > ELSEWHERE]
     return away[:1]
-
-
-def _agreeing(error: SimulationError, ends: Sequence[Vector]) -> int:
-    """Count the searches that came as low as the best."""
-    costs = [error.cost(z) for z in ends]
-    return sum(cost <= AGREE * min(costs) for cost in costs)
 
 
 def _centred(error: SimulationError, z: Vector) -> Vector:

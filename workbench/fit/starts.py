@@ -13,111 +13,153 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from sim.composition import AREA, BASE, COULOMB, SPRING, STATIC, VISCOUS
+from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.data.motion import directions, velocity_m_per_s
 from workbench.data.record import Record
+from workbench.fit.agreement import Place
+from workbench.fit.descent import scanned
 from workbench.fit.guesses import values_seen
-from workbench.fit.objective import LONGEST_MOVE, WIDE, SimulationError, root_weights
+from workbench.fit.landings import Landings, Rest, rests
+from workbench.fit.objective import MIDDLE, SimulationError
 from workbench.model.parameters import Parameter, strengths
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
 STATIC_RATIO = (0.0, 0.4)
 """Range of the draws of log(F_s / F_c)."""
-DRAWS_REGRESSED, DRAWS_FILE, DRAWS_EFFECT = 40, 12, 150
+DRAWS_REGRESSED, DRAWS_FILE = 40, 12
 ENOUGH_MOVING = 20
 EXCESSES = (1.0, 0.5, 0.1)
 """Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
-EACH_SEEDS, COMPENSATED = 2, 5
-"""Strengths begun at each base fit, and with base parameters that make up for them; other searches begin at draws."""
+AT_BEST, EACH_SEED = 2, 1
+"""Strengths begun at the best base fit, and at each other."""
+LANDED_BASE, LANDED_EFFECT = 1, 2
+"""Searches begun at each half of the landings."""
+ENOUGH_RESTS = 6
+VISCOUS_FACTORS = (0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0)
+ABOUT = np.geomspace(4e-3, 0.4, 7)
+"""Distances, of a log-parameter, in which what the landings do not hold is scanned about the grid,"""
+ALTERNATIONS = 2
+"""so many times in turn."""
 PLAY = "backlash.width_m"
 NARROWEST, WIDEST, PLAYS = 6e-3, 0.9, 5
 """Of the dead band 2 F_c / k_s, beyond which a play leaves no friction; widths in each of three bands."""
 STATIC_SHIFTS = (1.0, 0.0, -1.0)
 
 
-def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, count: int) -> list[Vector]:
-    """Return coordinates: of the origins and draws round both the best by the screening cost.
+def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, count: int) -> list[Place]:
+    """Return where the bare valve's searches begin: landings, origins and draws, the best by the screening cost.
 
     Args:
         error: by whose screening cost they are compared.
         origins: theta of the valve file, and that of the regression.
         seed: of the draws.
-        count: how many.
+        count: how many draws.
     """
     generator = np.random.default_rng(seed)
     theta, regressed = origins
-    pool = [theta, regressed, *_drawn(regressed, DRAWS_REGRESSED, generator), *_drawn(theta, DRAWS_FILE, generator)]
-    return error.screened(map(error.coordinates, pool), count)
+    drawn = [*_drawn(regressed, DRAWS_REGRESSED, generator), *_drawn(theta, DRAWS_FILE, generator)]
+    return [
+        *landed_starts(error, (theta,), [()], (), LANDED_BASE),
+        Place(error.coordinates(theta), "valve file"),
+        Place(error.coordinates(regressed), "regression"),
+        *(Place(z, f"draw {i}") for i, z in enumerate(error.screened(map(error.coordinates, drawn), count))),
+    ]
 
 
-def effect_starts(
-    error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector], count: int
-) -> list[Vector]:
-    """Return coordinates: the base as it is, and at each of its seeds the best strengths by the screening cost.
+def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector]) -> list[Place]:
+    """Return where searches with effects begin: landings, and at each base fit the best strengths by screening.
 
     Args:
         error: by whose screening cost they are compared.
         added: the parameters of the effects to be added.
-        seeds: theta of base fits, the best first, with the effects switched off.
-        count: how many but for the base as it is.
+        seeds: theta of base fits, the best first, with the effects switched off; the last two are the valve file's and
+            the regression's.
     """
     ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
-    switched_off = error.coordinates(seeds[0])
-    weakest = min((switched_off, *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost)
+    weakest = min(
+        (error.coordinates(seeds[0]), *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost
+    )
     points = [*strengths(added), *values_seen(added, error.run.record)]
-    grids = [
-        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
-        for theta in seeds
+    starts = [
+        *landed_starts(error, (seeds[-2],), points, added, LANDED_EFFECT),
+        Place(weakest, "base fit 1"),
     ]
-    chosen = [z for grid in grids for z in error.screened(grid, EACH_SEEDS)]
-    strong = [_with(error, seeds[0], added, values) for values in points]
-    chosen += error.screened(_compensated(error, switched_off, strong), COMPENSATED)
+    for number, theta in enumerate(seeds, 1):
+        grid = [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
+        starts += [Place(z, f"base fit {number}") for z in error.screened(grid, EACH_SEED if number > 1 else AT_BEST)]
     for band in with_plays(seeds[0], added):
-        chosen += error.screened(map(error.coordinates, band), 1)
-    between = _between(error, seeds[0], added)
-    return [weakest, *chosen, *error.screened(between, count - len(chosen))]
+        starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
+    return starts
 
 
-def _compensated(error: SimulationError, base: Vector, grid: Sequence[Vector]) -> list[Vector]:
-    """Return the strengths with the base's parameters moved by one Gauss-Newton step to make up for each.
+def landed_starts(
+    error: SimulationError,
+    seeds: Sequence[Vector],
+    points: Sequence[tuple[float, ...]],
+    added: Sequence[Parameter],
+    count: int,
+) -> list[Place]:
+    """Return the best starts from landings: at each strength the landings' solution, viscous friction from a grid.
 
-    Static friction stays: its derivatives are a staircase's, a slip more or less.
+    Args:
+        error: by whose screening cost they are compared.
+        seeds: theta from which the landings are solved.
+        points: values of the added parameters to begin with.
+        added: the parameters of the effects to be added.
+        count: how many at most.
     """
-    rough = error.rough
-    own = [i for i, each in enumerate(error.parameters) if each.index < len(BASE) and each.index != STATIC]
-    J = rough.jacobian(base, rough.residuals(base), WIDE.difference)[:, own]
-    compensated = []
-    for z in grid:
-        residuals = rough.residuals(z)
-        weights = root_weights(residuals, WIDE.scale)
-        move = np.linalg.lstsq(weights[:, None] * J, -weights * residuals)[0]
-        there = z.copy()
-        there[own] += np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
-        compensated.append(np.clip(there, error.lower, error.upper))
-    return compensated
+    moving = [i for i, each in enumerate(error.parameters) if each.index in (VISCOUS, STATIC) or each in added]
+    return [
+        Place(_in_motion(error.rough, z, moving), origin)
+        for origin, chosen in _halves(rests(error.run.record)).items()
+        for z in error.screened(_landed(error, Landings(error, chosen), seeds, points, added), count)
+    ]
 
 
-def _between(error: SimulationError, theta: Vector, added: Sequence[Parameter]) -> list[Vector]:
-    """Return draws between an effect's outermost strengths, with any part of the static friction."""
-    generator = np.random.default_rng(0)
-    corners = [error.coordinates(each) for each in (_sticking(theta, 0.0), theta)]
-    pool = []
-    for _ in range(DRAWS_EFFECT):
-        z = corners[0] + generator.uniform() * (corners[1] - corners[0])
-        for i, parameter in enumerate(error.parameters):
-            if parameter in added:
-                low, high = (_coordinate(parameter, theta, end(parameter.starts)) for end in (min, max))
-                z[i] = generator.uniform(low, high)
-        pool.append(z)
-    return pool
+def _halves(found: Sequence[Rest]) -> dict[str, Sequence[Rest]]:
+    """Return every other rest, and those between, where there are enough for both: they share no measurement."""
+    if len(found) < 2 * ENOUGH_RESTS:
+        return {"landings": found}
+    return {"even landings": found[::2], "odd landings": found[1::2]}
 
 
-def _coordinate(parameter: Parameter, theta: Vector, value: float) -> float:
+def _landed(
+    error: SimulationError,
+    landings: Landings,
+    seeds: Sequence[Vector],
+    points: Sequence[tuple[float, ...]],
+    added: Sequence[Parameter],
+) -> list[Vector]:
+    kept = [each.index for each in added] if landings.behind_path else []
+    found = []
+    for theta in seeds:
+        for values in points:
+            begin = theta.copy()
+            begin[[each.index for each in added]] = values
+            solved = landings.solved(begin, kept)
+            if solved:
+                viscous = [_scaled(solved.theta, VISCOUS, factor) for factor in VISCOUS_FACTORS]
+                found += error.screened(map(error.coordinates, viscous), 1)
+    return found
+
+
+def _in_motion(rough: SimulationError, z: Vector, moving: Sequence[int]) -> Vector:
+    """Return z with what the landings do not hold moved to where the simulation comes closest, all else kept."""
+    for _ in range(ALTERNATIONS):
+        before = z
+        for i in moving:
+            z = scanned(rough, z, i, ABOUT, MIDDLE)
+        if np.array_equal(z, before):
+            break
+    return z
+
+
+def _scaled(theta: Vector, index: int, factor: float) -> Vector:
     changed = theta.copy()
-    changed[parameter.index] = value
-    return parameter.coordinate(changed)
+    changed[index] *= factor
+    return changed
 
 
 def _sticking(theta: Vector, part: float) -> Vector:

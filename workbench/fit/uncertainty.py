@@ -11,7 +11,7 @@ slope. The condition number is that of J scaled to unit columns; a combination i
 deviation exceeds 1, a factor of e.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import exp
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.karnopp import Vector
-from workbench.fit.objective import FINAL, SimulationError
+from workbench.fit.objective import FINAL, SimulationError, root_weights
 
 DIFFERENCE = 1e-3
 RISE_95 = 1.92
@@ -31,8 +31,31 @@ INVOLVED = 0.3
 """Component of a unit vector from which a parameter is named as part of a combination."""
 NOTHING = 1e-30
 """Of the largest eigenvalue: an information that is none."""
+TOLD = 0.1
+"""Change of a log-parameter by which a combination is told."""
 ILL = 1e4
 """Condition number from which the worst combination is told even if its deviation is below 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Combination:
+    """What may change unseen: parameters, and the power with which each goes, 1 for the one that goes farthest.
+
+    Where the first is multiplied by f the others are by f^power, an effect's parameter that may be zero only in
+    proportion to its scale.
+    """
+
+    names: tuple[str, ...]
+    powers: tuple[float, ...]
+
+    def sentence(self, words: Callable[[str], str] = str) -> str:
+        """Say so, a parameter's name in these words."""
+        if len(self.names) == 1:
+            return f"{words(self.names[0])} is not determined by this recording"
+        together = ", ".join(
+            f"{words(name)} by {exp(TOLD * power):.3f}" for name, power in zip(self.names, self.powers, strict=True)
+        )
+        return f"only a combination is determined: these may change together unseen: {together}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +66,7 @@ class Uncertainty:
     lower: Vector
     upper: Vector
     condition: float
-    undetermined: tuple[str, ...]
+    undetermined: tuple[Combination, ...]
     rise: float
     """Rise of the cost that counts as significant, 1.92 kappa."""
 
@@ -53,22 +76,22 @@ def uncertainty(
 ) -> Uncertainty:
     """Judge a minimum, `others` being where other searches ended; without `profile` by the derivatives alone."""
     residuals = error.residuals(z)
-    weights = 1.0 / np.sqrt(1.0 + (residuals / FINAL) ** 2)
-    J = _central(error, z) * np.sqrt(weights)[:, None]
-    kappa = max(1.0, float(np.mean(weights * residuals**2))) * _correlation(residuals)
-    information = J.T @ J
-    covariance = np.asarray(kappa * np.linalg.pinv(information, rcond=1e-14, hermitian=True), np.float64)
+    weights = root_weights(residuals, FINAL)
+    J = _central(error, z) * weights[:, None]
+    kappa = _kappa(residuals)
+    gram = J.T @ J
+    covariance = np.asarray(kappa * np.linalg.pinv(gram, rcond=1e-14, hermitian=True), np.float64)
     lengths = np.linalg.norm(J, axis=0)
     seen = lengths > 0.0
     scaled = J / np.where(seen, lengths, 1.0)
-    values, vectors = np.linalg.eigh(information)
+    values, vectors = np.linalg.eigh(gram)
     std = np.sqrt(np.diag(covariance))
     std[~seen] = np.inf
     rise = RISE_95 * kappa
     limit = error.cost(z) + rise
     lower, upper = z - 1.96 * std, z + 1.96 * std
     if profile:
-        curve = _Curve(error, z, J, np.sqrt(weights), covariance, limit)
+        curve = _Curve(error, z, J, weights, covariance, limit)
         lower, upper = np.array([curve.interval(i, float(std[i])) for i in range(z.size)]).T
     as_good = np.array([z, *(each for each in others if error.cost(each) < limit)])
     lower, upper = np.minimum(lower, as_good.min(axis=0)), np.maximum(upper, as_good.max(axis=0))
@@ -78,6 +101,19 @@ def uncertainty(
         _combination(error, vectors[:, i]) for i in range(z.size) if deviations[i] > 1.0 or (condition > ILL and i == 0)
     )
     return Uncertainty(np.maximum(std, 0.5 * (upper - lower) / 1.96), lower, upper, condition, undetermined, rise)
+
+
+def information(error: SimulationError, z: Vector) -> tuple[Vector, NDArray[np.float64], float]:
+    """Return the eigenvalues, (n,), and eigenvectors, (n, n) by columns, of J' W J at z, and kappa."""
+    residuals = error.residuals(z)
+    J = _central(error, z) * root_weights(residuals, FINAL)[:, None]
+    values, vectors = np.linalg.eigh(J.T @ J)
+    return values, vectors, _kappa(residuals)
+
+
+def _kappa(residuals: Vector) -> float:
+    squares = (root_weights(residuals, FINAL) * residuals) ** 2
+    return max(1.0, float(np.mean(squares))) * _correlation(residuals)
 
 
 def _central(error: SimulationError, z: Vector) -> NDArray[np.float64]:
@@ -161,15 +197,12 @@ class _Curve:
         return np.clip(z, self.error.lower, self.error.upper)
 
 
-def _combination(error: SimulationError, vector: Vector) -> str:
-    """Say which parameters may change together unseen, each to the power with which it goes."""
+def _combination(error: SimulationError, vector: Vector) -> Combination:
+    """Return the parameters that lead in a direction of the coordinates, (parameters,)."""
     leading = vector / vector[np.argmax(np.abs(vector))]
     parts = [
-        (each.name, power)
+        (each.name, float(power))
         for each, power in zip(error.parameters, leading.tolist(), strict=True)
         if abs(power) > INVOLVED
     ]
-    if len(parts) == 1:
-        return f"{parts[0][0]} is not determined by this recording"
-    together = ", ".join(f"{name} by {exp(0.1 * power):.3f}" for name, power in parts)
-    return f"only a combination is determined: these may change together unseen: {together}"
+    return Combination(tuple(name for name, _ in parts), tuple(power for _, power in parts))

@@ -322,16 +322,13 @@ def _command(chosen: Experiment) -> dict[str, object]:
 
 def _undetectable(diagnosis: Diagnosis) -> Html:
     best = diagnosis.best.fit
-    said = [
-        f"not determined by this recording: {', '.join(parameter(name)[0] for name in each.split(', '))}"
-        for each in best.undetermined
-    ]
+    said = [each.sentence(lambda name: parameter(name)[0]) for each in best.undetermined]
     said += [
         f"at the end of its physical range: {parameter(key)[0]}" for key, f in best.parameters.items() if f.at_bound
     ]
     said += [each.sentence for each in undetectable(diagnosis.split, best.valve)]
     if not best.trusted:
-        said.append("searches from different starts end at different errors: a better fit may exist")
+        said.append("searches from independent starts do not come to the same parameters: a better fit may exist")
     said.append(
         "only ratios of forces can be read from pressure and position: the diaphragm area is taken from the valve file"
     )

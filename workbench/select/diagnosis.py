@@ -114,7 +114,8 @@ def diagnose(
     named = [find_effect(name, "effects") for name in (shipped_effects() if effects is None else effects)]
     library = {each.written: each for each in named if each.written not in there}
     threads = workers or cpu_count() or 1
-    search = EffectSearch(parts, library, seed=seed, workers=threads, progress=progress or (lambda _what, _done: None))
+    tell = progress or (lambda _what, _done: None)
+    search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell)
 
     base = search.base(valve)
     scores = preview(base.fit, parts, library)

@@ -11,12 +11,13 @@ from dataclasses import replace
 from functools import partial
 
 from config.errors import InputError
-from config.valve_file import ValveFile
+from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import Split
+from workbench.fit.descent import NARROW, descended
 from workbench.fit.fitting import Fit, fit, profiled
-from workbench.fit.objective import NARROW, SimulationError
+from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 from workbench.select.block_errors import block_errors
@@ -37,12 +38,16 @@ Progress = Callable[[str, float], None]
 
 
 class EffectSearch:
-    """The forward search over one split recording, and what it holds on to."""
+    """The forward search over one split recording, and what it holds on to.
+
+    `known` is the valve before any fit: what an effect's drawing gives is scaled by it.
+    """
 
     def __init__(
         self,
         split: Split,
         library: Mapping[str, Effect],
+        known: ValveParameters,
         *,
         seed: int,
         workers: int,
@@ -50,6 +55,7 @@ class EffectSearch:
     ) -> None:
         self._split = split
         self._library = library
+        self._known = known
         self._seed = seed
         self._workers = workers
         self._progress = progress
@@ -147,15 +153,16 @@ class EffectSearch:
         run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure)
         parameters = free_parameters(composition, tuple(base.parameters))
         error = SimulationError(run, composition, parameters, composition.theta)
-        return error.cost(error.descended_at(NARROW, error.coordinates(composition.theta)))
+        return error.cost(descended(error, error.coordinates(composition.theta), NARROW))
 
     def _refitted(self, number: int, before: EvaluatedModel, names: Sequence[str]) -> dict[str, EvaluatedModel | str]:
         """Refit the named effects, each on one thread; where that is not possible, say why."""
         train, here = self._split.train.recording, before.fit
+        known = ValveFile(valve=self._known, effect=here.valve.effect)
 
         def refitted(name: str) -> EvaluatedModel | str:
             try:
-                found = fit(train, here.valve, effects=(name,), base=here, seed=self._seed, workers=1, profile=False)
+                found = fit(train, known, effects=(name,), base=here, seed=self._seed, workers=1, profile=False)
             except InputError as error:
                 return error.problem
             return self._evaluated(found)

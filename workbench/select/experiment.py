@@ -23,6 +23,7 @@ from sim.composition import Composition
 from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from workbench.data.record import Record, ready
+from workbench.fit.descent import descended_through
 from workbench.fit.fitting import Fit
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
@@ -161,4 +162,4 @@ def _left(answer: Record, rival: Fit) -> float:
     composition = Composition.from_file(rival.valve)
     parameters = free_parameters(composition, tuple(rival.parameters))
     error = SimulationError(FreeRun(composition, answer), composition, parameters, composition.theta)
-    return error.rms_m(error.descended(error.coordinates(composition.theta))) / error.sigma_m
+    return error.rms_m(descended_through(error, error.coordinates(composition.theta))) / error.sigma_m

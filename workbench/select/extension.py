@@ -143,7 +143,7 @@ def extend(
     before = fit(train, valve, seed=seed, workers=workers, progress=lambda done: tell("fitting without", done))
     after = fit(
         train,
-        before.valve,
+        valve,
         effects=tuple(effects),
         base=before,
         seed=seed,

@@ -17,8 +17,9 @@ from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.record import Record
+from workbench.fit.descent import NARROW
 from workbench.fit.fitting import Fit
-from workbench.fit.objective import FINAL, NARROW, SimulationError, root_weights
+from workbench.fit.objective import FINAL, SimulationError, root_weights
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 

@@ -42,7 +42,7 @@ def verdict_sentence(
     begun = f" {names} explains a part: {fell}." if names else f" The held-out error is {after:.3g} mm."
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
-    return f"Not to be trusted: the searches end at different errors.{begun}"
+    return f"Not to be trusted: searches from independent starts do not come to the same.{begun}"
 
 
 def reduction_sentence(before: BlockErrors, after: BlockErrors) -> str:

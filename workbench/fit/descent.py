@@ -1,0 +1,104 @@
+"""The descent from one start to the least error in reach: a trust region at falling scales, then a scan of the stairs.
+
+The cost is a staircase: a slip happens or does not. So the scale of the soft-L1 loss falls, 100, 30, 5 sigma, and with
+it the step of the forward differences, 1e-3, 3e-4, 1e-4 of a log-parameter: large errors are first bounded, then
+resolved. The minimiser is scipy's trust region reflective, in a box round its start.
+
+What is left are stairs that no derivative sees: a break-away one sample early or late. Each coordinate is scanned to
+either side over five hundredths, the lowest step taken and the descent begun again there, until the parameters stay.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from sim.karnopp import Vector
+from workbench.fit.objective import FINAL, MIDDLE, SimulationError
+
+
+class Stage(NamedTuple):
+    """A stage of the descent."""
+
+    scale: float
+    """Of the soft-L1 loss, in sigma."""
+    difference: float
+    """Step of the forward differences."""
+    tolerance: float
+    """Relative fall of the cost, and of a move, at which it ends."""
+    evaluations: int
+    """Most, derivatives not counted."""
+
+
+WIDE, MIDDLING = Stage(100.0, 1e-3, 1e-2, 12), Stage(MIDDLE, 3e-4, 1e-3, 12)
+COARSE, NARROW = Stage(FINAL, 1e-3, 1e-6, 20), Stage(FINAL, 1e-4, 1e-7, 20)
+"""The last stages: the valleys are bent at the bottom, and too wide for the narrow differences alone."""
+REACH = 1.0
+"""Half-width of the box round a stage's start, of a log-parameter."""
+GRADIENT = 1e-9
+"""Of the cost by a log-parameter: less is none, and no direction to go."""
+STAIRS = np.geomspace(2e-4, 5e-2, 10)
+ROUNDS = 6
+SETTLED = 1e-3
+"""Relative fall of the cost by a scan below which the search has ended."""
+
+
+def descended_through(error: SimulationError, z: Vector) -> Vector:
+    """Return the coordinates of the least that the stages from wide to narrow reach from z, without a scan."""
+    for stage in (WIDE, MIDDLING, NARROW):
+        z = descended(error, z, stage)
+    return z
+
+
+def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
+    """Return the coordinates, (parameters,), of the least that a stage reaches from z."""
+    lower, upper = np.maximum(error.lower, z - REACH), np.minimum(error.upper, z + REACH)
+    latest: tuple[bytes, Vector] = b"", z
+
+    def residuals(there: Vector) -> Vector:
+        nonlocal latest
+        if latest[0] != there.tobytes():
+            latest = there.tobytes(), error.residuals(there)
+        return latest[1]
+
+    def jacobian(there: Vector) -> NDArray[np.float64]:
+        return error.jacobian(there, residuals(there), stage.difference)
+
+    found = least_squares(
+        residuals,
+        z,
+        jac=jacobian,
+        bounds=(lower, upper),
+        loss="soft_l1",
+        f_scale=stage.scale,
+        x_scale="jac",
+        ftol=stage.tolerance,
+        xtol=1e-2 * stage.tolerance,
+        gtol=GRADIENT,
+        max_nfev=stage.evaluations,
+    )
+    there = np.clip(np.asarray(found.x, np.float64), error.lower, error.upper)
+    return there if error.cost(there, stage.scale) < error.cost(z, stage.scale) else z
+
+
+def settled(error: SimulationError, z: Vector) -> Vector:
+    """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower."""
+    for _ in range(ROUNDS):
+        z = descended(error, descended(error, z, COARSE), NARROW)
+        at_rest = error.cost(z)
+        for i in range(z.size):
+            z = scanned(error, z, i)
+        if error.cost(z) > at_rest * (1.0 - SETTLED):
+            break
+    return z
+
+
+def scanned(error: SimulationError, z: Vector, i: int, distances: Vector = STAIRS, scale: float = FINAL) -> Vector:
+    """Return z with the i-th coordinate moved to the lowest of the stairs about it, at these distances either way."""
+    places = [z]
+    for way in (*distances, *-distances):
+        there = z.copy()
+        there[i] = np.clip(z[i] + way, error.lower[i], error.upper[i])
+        places.append(there)
+    return min(places, key=lambda there: error.cost(there, scale))
