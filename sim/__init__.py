@@ -5,6 +5,7 @@ Its files:
     karnopp, first_order_lag             the equations, and how a step is taken
     effect, effects                      how an effect is written; those that come along
     kernel, kernel_source                the equations with effects in their places, compiled; the text of that
+    interpreted                          the same uncompiled, for what asks a single place
     composition                          a valve file made ready: effects, parameters, kernel
     valve, open_loop, simulation         in virtual time; in one call, for fitting; as a recording
     parameter_changes, transmitter       friction that ages meanwhile; the position's noise and rounding
