@@ -1,6 +1,7 @@
 """Daemon and slave as processes on a CAN bus: the node killed and back, a second node on the bus, probe and doctor."""
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -111,17 +112,21 @@ def test_a_node_killed_while_the_stem_moves_is_detected_in_time(tmp_path: Path) 
     with ExitStack() as slaves:
         process = slaves.enter_context(slave(node))
         with running("run", config) as daemon, Dcs("127.0.0.1", port_in(daemon)) as dcs:
-            while not took_s or (took_s[-1] >= DETECTED_WITHIN_S and len(took_s) < MOST_KILLS):
+            for _ in range(MOST_KILLS):
+                begun_s = time.time()
                 in_s1(dcs, 0.6)
                 killed_s = time.time()
                 os.kill(process.pid, signal.SIGKILL)
-                until(lambda k=killed_s: max(faulted_s(log, "NO_REPLY"), default=0.0) >= k, "the fault")  # type: ignore[misc]
-                took_s.append(min(each for each in faulted_s(log, "NO_REPLY") if each >= killed_s) - killed_s)
-                assert dcs.get("mode") == Mode.HOLD
+                # One that a busy machine made the controller let go of just before the kill tells no delay.
+                until(lambda b=begun_s: max(faulted_s(log, "NO_REPLY"), default=0.0) >= b, "the fault")  # type: ignore[misc]
+                until(lambda: dcs.get("mode") == Mode.HOLD, "hold")
+                took_s += [each - killed_s for each in faulted_s(log, "NO_REPLY") if each >= killed_s]
+                if took_s and took_s[-1] < DETECTED_WITHIN_S:
+                    break
                 process.wait()
                 process = slaves.enter_context(slave(node))
     print("detected after, s:", took_s)
-    assert min(took_s) < DETECTED_WITHIN_S, took_s
+    assert min(took_s, default=math.inf) < DETECTED_WITHIN_S, took_s
     reasons = {str(event["reason"]) for event in events(log) if event["event"] == "no good reply"}
     assert all("SYNC not answered" in reason or "heartbeat lost" in reason for reason in reasons), reasons
 
