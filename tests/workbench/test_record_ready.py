@@ -25,7 +25,7 @@ def test_a_sound_recording_has_nothing_to_tell() -> None:
     record = ready(Recording(plain()))
     assert record.notes == ()
     assert record.segments == ((0, 1000),)
-    assert record.judged.all()
+    assert record.valid.all()
 
 
 def test_a_gap_a_clock_set_back_and_unrecorded_rows_begin_new_segments() -> None:
@@ -62,7 +62,7 @@ def test_a_missing_command_is_held_and_missing_positions_and_spikes_are_not_judg
     position[500] = 0.9
     record = ready(Recording(columns | {"command_pa": command, "position_m": position}))
     assert (record.command_pa[99:103] == command[99]).all()
-    assert np.flatnonzero(~record.judged).tolist() == [200, 500]
+    assert np.flatnonzero(~record.valid).tolist() == [200, 500]
     assert record.notes == (
         "command_pa is not a number in 3 samples, the first 101: the command before is held",
         "position_m is not a number in sample 201: left out of the error",

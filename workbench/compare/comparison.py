@@ -66,7 +66,7 @@ class PressureSide:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Comparison(Result):
-    """Everything a report draws; arrays of n rows as the recording, NaN where it is not judged."""
+    """Everything a report draws; arrays of n rows as the recording, NaN where it is not valid."""
 
     adequate: bool
     sentences: tuple[str, ...]
@@ -186,7 +186,7 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         close=error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
     )
     simulated_rows = np.concatenate([np.arange(first, end) for first, end in record.segments])
-    judged = rows[simulated_rows]
+    valid = rows[simulated_rows]
     return Comparison(
         adequate=found.adequate,
         sentences=sentences(found),
@@ -208,7 +208,7 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         phase=phase,
         over_time=profile(record.time_s[rows], residual_m[rows]),
         over_position=profile(record.position_m[rows], residual_m[rows]),
-        over_velocity=profile(velocity[judged], residual_m[simulated_rows][judged]),
+        over_velocity=profile(velocity[valid], residual_m[simulated_rows][valid]),
         over_direction=profile(direction[rows][direction[rows] != 0], residual_m[rows][direction[rows] != 0], 2),
         over_pressure=profile(_pressure(record, run)[rows], residual_m[rows]),
         autocorrelation=autocorrelated,
@@ -267,9 +267,9 @@ class _SegmentFindings:
 def _segment_findings(valve: ValveFile, record: Record, run: Run, first: int, end: int) -> _SegmentFindings:
     time_s = record.time_s[first:end]
     rows = np.arange(end - first)
-    seen = record.judged[first:end]
+    valid = record.valid[first:end]
     # Only for finding motion: across a bad sample the stem is taken to go straight.
-    measured_m = np.interp(rows, rows[seen], record.position_m[first:end][seen])
+    measured_m = np.interp(rows, rows[valid], record.position_m[first:end][valid])
     simulated_m = run.indicated_m[first:end]
     measured, simulated = slips(measured_m, record.noise_m), slips(simulated_m, record.noise_m)
     pressure_pa = _pressure(record, run)[first:end]

@@ -27,7 +27,7 @@ SHARE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What the sentences are made from; arrays over the judged samples."""
+    """What the sentences are made from; arrays over the valid samples."""
 
     time_s: Column
     residual_m: Column

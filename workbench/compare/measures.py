@@ -14,7 +14,7 @@ BLOCK_S = 1.0
 
 def valid_rows(record: Record, simulated_m: Column) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
     """Return which rows count, (n,): valid in the record, and simulated, m, (n,) with NaN where not."""
-    return record.judged & np.isfinite(simulated_m)
+    return record.valid & np.isfinite(simulated_m)
 
 
 def fit_percent(record: Record, simulated_m: Column) -> float:

@@ -68,7 +68,7 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
 
 def _part(recording: Recording, first: int) -> Part:
     record = ready(recording)
-    return Part(recording, record, record.judged & (np.arange(len(recording)) >= first))
+    return Part(recording, record, record.valid & (np.arange(len(recording)) >= first))
 
 
 def residual_m(part: Part, simulated_m: Column) -> Column:

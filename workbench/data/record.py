@@ -46,7 +46,7 @@ class Record(Brief):
     position_m: Column
     pressure_pa: Column | None
     load_n: Column | None
-    judged: Mask
+    valid: Mask
     """Whether a sample's position counts in the error."""
     segments: tuple[tuple[int, int], ...]
     notes: tuple[str, ...]
@@ -81,12 +81,12 @@ def ready(recording: Recording) -> Record:
     notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key == "torn" or key.startswith("not ")]
     command_pa = _held(recording.command_pa, notes)
     position_m = recording.position_m
-    judged = _judged(position_m, notes)
+    valid = _valid(position_m, notes)
     segments = tuple(_segments(columns, notes))
     if not segments:
         raise InputError("recording", f"no stretch of at least {SHORTEST} samples without a gap or a step of the clock")
-    noise_m = noise_std_m(position_m[judged])
-    quantum = quantum_m(position_m[judged])
+    noise_m = noise_std_m(position_m[valid])
+    quantum = quantum_m(position_m[valid])
     if quantum:
         notes.append(f"position_m is rounded to {quantum:.3g} m")
     _tell_sampling(columns["time_s"], segments, notes)
@@ -96,11 +96,11 @@ def ready(recording: Recording) -> Record:
         position_m,
         _whole(columns.get("pressure_pa"), "pressure_pa", notes),
         _whole(columns.get("load_n"), "load_n", notes),
-        judged,
+        valid,
         segments,
         tuple(notes),
         noise_m,
-        _repeatability(columns["time_s"], command_pa, np.where(judged, position_m, np.nan), segments),
+        _repeatability(columns["time_s"], command_pa, np.where(valid, position_m, np.nan), segments),
     )
 
 
@@ -126,7 +126,7 @@ def require_units(record: Record, valve: ValveParameters) -> None:
     Raises:
         InputError: the numbers are those of another unit; says which and how to import it.
     """
-    position_m = record.position_m[record.judged]
+    position_m = record.position_m[record.valid]
     reached = float(np.max(np.abs(position_m)))
     if reached > 20.0 * valve.stroke_m:
         unit = "mm" if valve.stroke_m < 0.06 < reached < 1.5e3 * valve.stroke_m < 90 else "per cent (%) or mm"
@@ -205,7 +205,7 @@ def _held(command_pa: Column, notes: list[str]) -> Column:
     return command_pa[last]
 
 
-def _judged(position_m: Column, notes: list[str]) -> Mask:
+def _valid(position_m: Column, notes: list[str]) -> Mask:
     finite = np.isfinite(position_m)
     if not finite.any():
         raise InputError("recording", "position_m: no sample is a number")

@@ -91,7 +91,7 @@ class Fit(Result):
     cost: float
     """Soft-L1 cost of scale 5, in units of the noise; half the number of samples for white residuals."""
     count: int
-    """Judged samples."""
+    """Valid samples."""
     starts: tuple[Search, ...]
     """The searches, best first."""
     agreement: int
@@ -197,9 +197,9 @@ def profiled(found: Fit, recording: Recording) -> Fit:
     composition = Composition.from_file(found.valve)
     error = _error(composition, ready(recording), tuple(found.parameters), found.from_pressure)
     z = error.coordinates(composition.theta)
-    judged = uncertainty(error, z)
-    parameters = {each.name: _fitted(error, z, judged, i) for i, each in enumerate(error.parameters)}
-    return replace(found, parameters=parameters, condition=judged.condition, undetermined=judged.undetermined)
+    determined = uncertainty(error, z)
+    parameters = {each.name: _fitted(error, z, determined, i) for i, each in enumerate(error.parameters)}
+    return replace(found, parameters=parameters, condition=determined.condition, undetermined=determined.undetermined)
 
 
 def _error(
@@ -225,7 +225,7 @@ def _require_motion(record: Record) -> None:
     found = [
         each
         for first, end in record.segments
-        for each in slips(np.where(record.judged, record.position_m, np.nan)[first:end], record.noise_m)
+        for each in slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.noise_m)
     ]
     if len(found) < LEAST_SLIPS:
         raise InputError(
@@ -288,20 +288,20 @@ def _searched(
     agreement = agreeing(error, ends)
     found = [end.z for end in ends]
     best = _centred(error, found[0])
-    judged = uncertainty(error, best, found, profile=profile)
+    determined = uncertainty(error, best, found, profile=profile)
     tell(1.0)
     valve = _fitted_file(composition, error.theta(best))
     return Fit(
         valve,
-        {each.name: _fitted(error, best, judged, i) for i, each in enumerate(error.parameters)},
+        {each.name: _fitted(error, best, determined, i) for i, each in enumerate(error.parameters)},
         error.rms_m(best),
         error.run.record.floor_m,
         error.cost(best),
         error.count,
         tuple(_search(error, z) for z in found),
         agreement,
-        judged.condition,
-        judged.undetermined,
+        determined.condition,
+        determined.undetermined,
         error.run.record.notes,
         error.run.from_pressure,
         tuple(error.theta(z) for z in (best, *_elsewhere(found))),
@@ -342,7 +342,7 @@ def _moved(error: SimulationError, z: Vector, i: int, way: float) -> Vector:
     return there
 
 
-def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> Fitted:
+def _fitted(error: SimulationError, z: Vector, determined: Uncertainty, i: int) -> Fitted:
     parameter = error.parameters[i]
 
     def value(coordinate: float) -> float:
@@ -354,22 +354,22 @@ def _fitted(error: SimulationError, z: Vector, judged: Uncertainty, i: int) -> F
     near = AT_BOUND * (high - low)
     at_bound = bool(z[i] < low + near or z[i] > high - near)
     inward = 10.0 * near if z[i] < low + near else -10.0 * near
-    wants_out = at_bound and _wants_out(error, z, judged, i, inward)
+    wants_out = at_bound and _wants_out(error, z, determined, i, inward)
     slope = (value(z[i] + 1e-6) - value(z[i] - 1e-6)) / 2e-6
     return Fitted(
         value(z[i]),
-        abs(slope) * float(judged.std[i]),
-        value(max(low, float(judged.lower[i]))),
-        value(min(high, float(judged.upper[i]))),
+        abs(slope) * float(determined.std[i]),
+        value(max(low, float(determined.lower[i]))),
+        value(min(high, float(determined.upper[i]))),
         at_bound,
         not wants_out,
     )
 
 
-def _wants_out(error: SimulationError, z: Vector, judged: Uncertainty, i: int, inward: float) -> bool:
+def _wants_out(error: SimulationError, z: Vector, determined: Uncertainty, i: int, inward: float) -> bool:
     """Whether the cost rises so steeply into the range that its least must lie beyond the end."""
     steepness = (error.cost(_moved(error, z, i, inward)) - error.cost(z)) / abs(inward)
-    return steepness > 0.0 and steepness * float(judged.std[i]) > WANTS_OUT * judged.rise
+    return steepness > 0.0 and steepness * float(determined.std[i]) > WANTS_OUT * determined.rise
 
 
 def _search(error: SimulationError, z: Vector) -> Search:

@@ -30,7 +30,7 @@ def values_seen(added: Sequence[Parameter], record: Record) -> list[tuple[float,
     kinds = {each.seen for each in added}
     suggested: list[dict[str, float]] = []
     if kinds & {"lowest", "swept"}:
-        suggested += _ends_seen(record.position_m[record.judged], record.noise_m)
+        suggested += _ends_seen(record.position_m[record.valid], record.noise_m)
     if "quantum" in kinds:
         suggested += [{"quantum": each} for each in quanta_seen_m(record)]
     return [
@@ -66,7 +66,7 @@ def _rests_m(record: Record) -> Column:
     """Return the mean position of each rest long enough."""
     means = []
     for first, end in record.segments:
-        position_m = np.where(record.judged, record.position_m, np.nan)[first:end]
+        position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
         way = directions(position_m, record.noise_m)
         edges = [0, *(1 + np.flatnonzero(np.diff(way != 0))).tolist(), way.size]
         for begin, over in pairwise(edges):

@@ -35,7 +35,7 @@ class SimulationError:
         simulated = np.zeros(len(record), dtype=np.bool_)
         for first, end in record.segments:
             simulated[first:end] = True
-        self._rows = np.flatnonzero(simulated & record.judged)
+        self._rows = np.flatnonzero(simulated & record.valid)
         self._measured_m = record.position_m[self._rows]
         self.sigma_m = record.noise_m or 1e-6 * composition.valve.stroke_m
         self._theta = np.array(theta)
@@ -51,7 +51,7 @@ class SimulationError:
 
     @property
     def count(self) -> int:
-        """Number of judged samples."""
+        """Number of valid samples."""
         return len(self._rows)
 
     def theta(self, z: Vector) -> Vector:
@@ -67,7 +67,7 @@ class SimulationError:
         return np.asarray(np.clip(z, self.lower, self.upper))
 
     def residuals(self, z: Vector) -> Vector:
-        """Return r, one a judged sample."""
+        """Return r, one a valid sample."""
         error = (self.run.position_m(self.theta(z))[self._rows] - self._measured_m) / self.sigma_m
         return np.clip(np.nan_to_num(error, nan=HOPELESS, posinf=HOPELESS, neginf=-HOPELESS), -HOPELESS, HOPELESS)
 
@@ -87,7 +87,7 @@ class SimulationError:
         return self.sigma_m * float(np.sqrt(np.mean(self.residuals(z) ** 2)))
 
     def jacobian(self, z: Vector, here: Vector, step: float) -> NDArray[np.float64]:
-        """Return dr/dz at z, where r is `here`: (judged samples, parameters).
+        """Return dr/dz at z, where r is `here`: (valid samples, parameters).
 
         By differences of that step, forward but for the upper bound.
         """

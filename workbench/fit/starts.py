@@ -194,7 +194,7 @@ def _moving(area_m2: float, record: Record, from_pressure: bool) -> tuple[Vector
     drive = record.pressure_pa if from_pressure and record.pressure_pa is not None else record.command_pa
     rows, forces = [], []
     for first, end in record.segments:
-        x = np.where(record.judged, record.position_m, np.nan)[first:end]
+        x = np.where(record.valid, record.position_m, np.nan)[first:end]
         v = velocity_m_per_s(record.time_s[first:end], x)
         way = directions(x, record.noise_m)
         force_n = area_m2 * drive[first:end]

@@ -189,7 +189,7 @@ class Balance:
         residual_n, predicted_n = y - X @ theta, np.full(y.size, np.nan)
         for k, other in others.items():
             predicted_n[self.fold == k] = (y - X @ other)[self.fold == k]
-        judged = np.isfinite(predicted_n)
+        predicted = np.isfinite(predicted_n)
         train_n = _rms(residual_n[np.isin(self.fold, trained)])
         values = dict(zip([each.name for each in columns], theta.tolist(), strict=True))
         whole = values | self._shapes(model, values)
@@ -206,9 +206,9 @@ class Balance:
             whole,
             {} if deviations is None else dict(zip(values, deviations.tolist(), strict=True)),
             train_n,
-            _rms(predicted_n[judged]),
-            _stroke_logs(self.rows.stroke[judged], predicted_n[judged]),
-            np.where(judged, predicted_n, residual_n),
+            _rms(predicted_n[predicted]),
+            _stroke_logs(self.rows.stroke[predicted], predicted_n[predicted]),
+            np.where(predicted, predicted_n, residual_n),
             n * 2.0 * float(np.log(max(train_n, 1e-12))) + free * float(np.log(n)),
             next(filter(None, violations), "") if bounded else "",
         )

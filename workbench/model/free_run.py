@@ -131,8 +131,8 @@ def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, co
 
 
 def initial_state(record: Record, first: int, end: int) -> InitialState:
-    """Return where a segment begins, from its first judged samples."""
-    rows = first + np.flatnonzero(record.judged[first:end])
+    """Return where a segment begins, from its first valid samples."""
+    rows = first + np.flatnonzero(record.valid[first:end])
     if not rows.size:
         raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
     position_m = record.position_m[rows[:LONGEST_START]]

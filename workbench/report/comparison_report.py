@@ -119,13 +119,13 @@ def _is_noise(each: Comparison) -> bool:
 
 
 def _overlay(each: Comparison) -> Html:
-    judged = np.isfinite(each.residual_m)
+    valid = np.isfinite(each.residual_m)
     figure = overlay(
         each.time_s,
         each.command_pa,
         each.measured_m,
         [Simulated("model", MODEL, each.simulated_m)],
-        phase_shades(each.phase, judged),
+        phase_shades(each.phase, valid),
         each.slips,
     )
     return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)

@@ -109,12 +109,12 @@ def _axes(has_ground: bool) -> Figure:
     }
 
 
-def phase_shades(phase: NDArray[np.int64], judged: Mask) -> list[Shade]:
+def phase_shades(phase: NDArray[np.int64], valid: Mask) -> list[Shade]:
     """Return a ground for each phase but rest; indices into PHASES and mask, (n,) each."""
     return [
-        Shade(name, SHADES[name], judged & (phase == i))
+        Shade(name, SHADES[name], valid & (phase == i))
         for i, name in enumerate(PHASES)
-        if i != STUCK and bool(np.any(judged & (phase == i)))
+        if i != STUCK and bool(np.any(valid & (phase == i)))
     ]
 
 

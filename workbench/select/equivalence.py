@@ -101,7 +101,7 @@ def _apart_m(part: Part, one: ValveFile, other: ValveFile) -> float:
     record = part.record
     begun = np.zeros(len(record), np.bool_)
     for first, end in record.segments:
-        found = slips(np.where(record.judged, record.position_m, np.nan)[first:end], record.noise_m)
+        found = slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.noise_m)
         if len(found) > TAKEN_UP:
             begun[first + found[TAKEN_UP].first : end] = True
     rows = part.counted & begun

@@ -63,7 +63,7 @@ def _regressors(record: Record) -> Matrix:
     state = np.zeros((len(record), 6))
     for first, end in record.segments:
         rows = slice(first, end)
-        position_m = np.where(record.judged, record.position_m, np.nan)[rows]
+        position_m = np.where(record.valid, record.position_m, np.nan)[rows]
         time_s = record.time_s[rows]
         way = directions(position_m, record.noise_m)
         last = np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))

@@ -49,7 +49,7 @@ def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Tan
     weights = root_weights(residual, FINAL)
     basis, _ = np.linalg.qr(weights[:, None] * error.jacobian(z, residual, NARROW.difference))
     bare = run.position_m(composition.theta)
-    rows = record.judged & np.isfinite(bare)
+    rows = record.valid & np.isfinite(bare)
 
     def score(tangent_m: Series) -> float:
         r, t = (_without(basis, weights * each) for each in (residual, tangent_m[rows]))
