@@ -52,7 +52,7 @@ from config.errors import InputError
 from config.valve_file import ValveParameters
 
 Memory = npt.NDArray[np.float64]
-Seen = Literal["", "lowest", "swept", "quantum"]
+Guess = Literal["", "lowest", "swept", "quantum"]
 
 EVERYWHERE = ("t", "x", "v", "p", "q", "z")
 PLACES: Mapping[str, tuple[str, ...]] = {
@@ -89,7 +89,7 @@ class Parameter:
     """Parameters of the bare valve, multiplied and divided, such as "spring_n_per_m * stroke_m"; empty: 1."""
     given: bool = False
     """Read from a drawing or a data sheet: a fit leaves it at its start."""
-    seen: Seen = ""
+    guess: Guess = ""
     """What a record's positions suggest for it, "lowest", "swept" or "quantum": a fit begins there too. Searches that
     begin elsewhere would not find it."""
 
@@ -299,9 +299,9 @@ def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:
         parameter = get_args(hint)[-1] if get_origin(hint) is Annotated else None
         if not isinstance(parameter, Parameter):
             raise InputError(str(path), f"Parameters.{name}: must be Annotated[float, Parameter(...)]")
-        if parameter.seen not in get_args(Seen):
-            allowed = ", ".join(each for each in get_args(Seen) if each)
-            raise InputError(str(path), f"Parameters.{name}: seen must be one of {allowed}, got {parameter.seen!r}")
+        if parameter.guess not in get_args(Guess):
+            allowed = ", ".join(each for each in get_args(Guess) if each)
+            raise InputError(str(path), f"Parameters.{name}: guess must be one of {allowed}, got {parameter.guess!r}")
         declared[name] = parameter
     return declared
 

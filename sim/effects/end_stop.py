@@ -22,7 +22,7 @@ class Parameters(NamedTuple):
     lower_m: Annotated[
         float,
         Parameter(
-            "position of the lower stop", -100.0, 100.0, off=-100.0, starts=(0.0, 0.1), scale="stroke_m", seen="lowest"
+            "position of the lower stop", -100.0, 100.0, off=-100.0, starts=(0.0, 0.1), scale="stroke_m", guess="lowest"
         ),
     ]
     travel_m: Annotated[
@@ -34,7 +34,7 @@ class Parameters(NamedTuple):
             off=200.0,
             starts=(1.0, 0.9, 0.75, 0.5),
             scale="stroke_m",
-            seen="swept",
+            guess="swept",
         ),
     ]
     stiffness_n_per_m: Annotated[

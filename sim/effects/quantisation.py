@@ -24,7 +24,7 @@ class Parameters(NamedTuple):
 
     quantum_m: Annotated[
         float,
-        Parameter("quantum", 0.0, 1.0, off=0.0, starts=(2.5e-4, 1e-3, 4e-3, 0.016), scale="stroke_m", seen="quantum"),
+        Parameter("quantum", 0.0, 1.0, off=0.0, starts=(2.5e-4, 1e-3, 4e-3, 0.016), scale="stroke_m", guess="quantum"),
     ]
 
 

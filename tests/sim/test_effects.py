@@ -197,9 +197,9 @@ HEAD = "from typing import Annotated, NamedTuple\nfrom sim.effect import Paramet
             "Parameters.k: must be Annotated",
         ),
         (
-            HEAD + "class Parameters(NamedTuple):\n    k: Annotated[float, Parameter('k', 0.0, 1.0, seen='swpt')]\n"
+            HEAD + "class Parameters(NamedTuple):\n    k: Annotated[float, Parameter('k', 0.0, 1.0, guess='swpt')]\n"
             "def force(x): return x",
-            "Parameters.k: seen must be one of lowest, swept, quantum, got 'swpt'",
+            "Parameters.k: guess must be one of lowest, swept, quantum, got 'swpt'",
         ),
     ],
 )

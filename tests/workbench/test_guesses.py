@@ -7,7 +7,7 @@ from config.recording import Recording
 from sim.composition import Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
-from workbench.fit.guesses import quanta_seen_m, values_seen
+from workbench.fit.guesses import guessed_values, likely_quanta_m
 from workbench.model.parameters import free_parameters
 
 VALVE = drawn_valve(np.random.default_rng(0))
@@ -21,15 +21,15 @@ def recorded(**effect: float | str) -> Recording:
 
 @pytest.mark.parametrize("quantum_m", [1.4e-4, 2e-4, 5e-4])
 def test_a_quantum_of_a_few_noises_is_among_the_likely_ones(quantum_m: float) -> None:
-    likely_m = quanta_seen_m(ready(recorded(name="quantisation", quantum_m=quantum_m)))
+    likely_m = likely_quanta_m(ready(recorded(name="quantisation", quantum_m=quantum_m)))
     assert min(abs(each / quantum_m - 1.0) for each in likely_m) < 2e-3
 
 
 def test_stops_are_sought_where_the_positions_end() -> None:
     composition = Composition.from_file(with_effect(VALVE, "end_stop", **STOPS))
     added = free_parameters(composition, ["end_stop.lower_m", "end_stop.travel_m"])
-    seen = values_seen(added, ready(recorded(name="end_stop", **STOPS)))
-    lowest, swept = np.array(seen).T
+    guessed = guessed_values(added, ready(recorded(name="end_stop", **STOPS)))
+    lowest, swept = np.array(guessed).T
     upper = lowest + swept
     assert np.min(np.abs(upper - 0.072)) < 4.0 * NOISE_M
     assert np.any(upper > 0.075), "the upper stop alone out of reach"

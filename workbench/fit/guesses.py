@@ -22,24 +22,24 @@ FINEST, COARSEST = 2.0, 8.0
 PER_LOBE = 8.0
 
 
-def values_seen(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
+def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
     """Return values of the parameters that the positions suggest, for an effect that declares what of them it may be.
 
     Just inside their lowest or highest, or both; and the quanta to which they look rounded. Empty if none is declared.
     """
-    kinds = {each.seen for each in added}
+    kinds = {each.guess for each in added}
     suggested: list[dict[str, float]] = []
     if kinds & {"lowest", "swept"}:
-        suggested += _ends_seen(record.position_m[record.valid], record.noise_m)
+        suggested += _ends(record.position_m[record.valid], record.noise_m)
     if "quantum" in kinds:
-        suggested += [{"quantum": each} for each in quanta_seen_m(record)]
+        suggested += [{"quantum": each} for each in likely_quanta_m(record)]
     return [
-        tuple(seen.get(each.seen, each.starts[0] if each.starts else each.least) for each in added)
-        for seen in suggested
+        tuple(guess.get(each.guess, each.starts[0] if each.starts else each.least) for each in added)
+        for guess in suggested
     ]
 
 
-def _ends_seen(position_m: Column, noise_m: float) -> list[dict[str, float]]:
+def _ends(position_m: Column, noise_m: float) -> list[dict[str, float]]:
     lowest, highest = np.quantile(position_m, ENDS).tolist()
     aside = ASIDE * (highest - lowest)
     return [
@@ -49,7 +49,7 @@ def _ends_seen(position_m: Column, noise_m: float) -> list[dict[str, float]]:
     ]
 
 
-def quanta_seen_m(record: Record) -> list[float]:
+def likely_quanta_m(record: Record) -> list[float]:
     """Return the steps, m, of which the places of rest look most to be multiples, of the highest S(q) first."""
     places_m = _rests_m(record)
     if places_m.size < FEWEST_RESTS:

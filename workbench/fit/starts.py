@@ -1,12 +1,15 @@
 """Where searches begin: for the bare valve, and with an effect added.
 
-The bare valve begins at the valve file's values, at a regression of forces over the moving samples, and at draws round
-both. An effect begins at no strength, so that the extended valve is never worse than the base it extends, and on a grid
-of strengths at the best base fits; what the record's positions suggest is in `seen`.
+The bare valve begins at landings, at the valve file's values, at a regression of forces over the moving samples, and at
+draws round both. An effect begins at landings with each of its strengths, and on a grid of strengths at base fits, at
+none of them too, so that the extended valve is never worse than the base it extends. What the record's positions
+suggest is in `guesses`.
 
     A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected
-    z_b(q) = z_b - J^+ r(q)                       base parameters for a strength q of the effect, which must make up for
-                                                  it: J = dr/dz_b without the effect, r with it
+
+Landings say nothing of motion: what they do not hold, F_v, F_s inside its interval and the effect's own dynamics, is
+scanned with the rest kept. Every other rest and those between solve for themselves: two starts without a common
+measurement.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,7 +22,7 @@ from workbench.data.motion import directions, velocity_m_per_s
 from workbench.data.record import Record
 from workbench.fit.agreement import Place
 from workbench.fit.descent import scanned
-from workbench.fit.guesses import values_seen
+from workbench.fit.guesses import guessed_values
 from workbench.fit.landings import Landings, Rest, rests
 from workbench.fit.objective import MIDDLE, SimulationError
 from workbench.model.parameters import Parameter, strengths
@@ -81,7 +84,7 @@ def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Seq
     weakest = min(
         (error.coordinates(seeds[0]), *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost
     )
-    points = [*strengths(added), *values_seen(added, error.run.record)]
+    points = [*strengths(added), *guessed_values(added, error.run.record)]
     starts = [
         *landed_starts(error, (seeds[-2],), points, added, LANDED_EFFECT),
         Place(weakest, "base fit 1"),

@@ -82,11 +82,11 @@ def uncertainty(
     gram = J.T @ J
     covariance = np.asarray(kappa * np.linalg.pinv(gram, rcond=1e-14, hermitian=True), np.float64)
     lengths = np.linalg.norm(J, axis=0)
-    seen = lengths > 0.0
-    scaled = J / np.where(seen, lengths, 1.0)
+    sensitive = lengths > 0.0
+    scaled = J / np.where(sensitive, lengths, 1.0)
     values, vectors = np.linalg.eigh(gram)
     std = np.sqrt(np.diag(covariance))
-    std[~seen] = np.inf
+    std[~sensitive] = np.inf
     rise = RISE_95 * kappa
     limit = error.cost(z) + rise
     lower, upper = z - 1.96 * std, z + 1.96 * std
@@ -95,7 +95,7 @@ def uncertainty(
         lower, upper = np.array([curve.interval(i, float(std[i])) for i in range(z.size)]).T
     as_good = np.array([z, *(each for each in others if error.cost(each) < limit)])
     lower, upper = np.minimum(lower, as_good.min(axis=0)), np.maximum(upper, as_good.max(axis=0))
-    condition = float(np.linalg.cond(scaled)) if seen.all() else np.inf
+    condition = float(np.linalg.cond(scaled)) if sensitive.all() else np.inf
     deviations = np.sqrt(kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))
     undetermined = tuple(
         _combination(error, vectors[:, i]) for i in range(z.size) if deviations[i] > 1.0 or (condition > ILL and i == 0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from config.errors import InputError
 from sim.composition import BASE, COULOMB, STATIC, Composition
-from sim.effect import Seen
+from sim.effect import Guess
 from sim.karnopp import Vector
 
 DEFAULT = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
@@ -36,7 +36,7 @@ class Parameter:
     most: float
     starts: tuple[float, ...] = ()
     """Where a fit may begin, as an effect declares it."""
-    seen: Seen = ""
+    guess: Guess = ""
     """What the record's positions suggest for it, as an effect declares it."""
 
     def coordinate(self, theta: Vector) -> float:
@@ -100,7 +100,7 @@ def _parameter(composition: Composition, index: int) -> Parameter:
     effect, _, key = name.partition(".")
     declared = next(each for each in composition.effects if each.name == effect).parameters[key]
     starts = declared.starts_for(composition.valve)
-    return Parameter(name, index, declared.least, declared.most, starts, declared.seen)
+    return Parameter(name, index, declared.least, declared.most, starts, declared.guess)
 
 
 def _smallest(composition: Composition, name: str) -> float:
