@@ -105,6 +105,8 @@ def test_what_explains_more_than_the_bare_valve_by_another_name_is_added() -> No
     step = judged(POOR, sensor_gain=gain, ip_lag=model_of("ip_lag"))
     assert step.added
     assert (step.added.name, names(step)) == ("ip_lag", ("ip_lag",))
+    as_good = judged(POOR, sensor_gain=model_of("sensor_gain", cost=2.0 * AT_FLOOR), ip_lag=model_of("ip_lag"))
+    assert names(as_good) == ("ip_lag",), "the bare valve by another name is nobody's rival"
 
 
 def off_by(standard_errors: float, before: EvaluatedModel, effect: str, cost: float) -> EvaluatedModel:
