@@ -3,7 +3,7 @@
 `Device` is what a bus of another package builds on; `CanopenDevice` is in `config.canopen_device`.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -21,10 +21,25 @@ def _host(host: str) -> str:
     return host
 
 
+RENAMED = {"untouched": "read_only", "clash": "conflict_with", "turn_s": "longest_exchange_s"}
+"""Members of `Device` by the names they had in 0.1: a bus that still overrides one would be passed over in silence."""
+
+
 class Device(Schema):
     """What table `[device]` says of a device on any bus: a bus's own schema adds how to reach it."""
 
     bus: str
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_kwargs: Any) -> None:
+        """Refuse a bus's own schema that overrides a member by its old name.
+
+        Raises:
+            TypeError: says what it is called now.
+        """
+        for old, new in RENAMED.items():
+            if old in vars(cls):
+                raise TypeError(f"{cls.__name__}.{old} is called {new} now")
 
     @property
     def line(self) -> str | None:

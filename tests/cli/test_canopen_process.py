@@ -1,12 +1,10 @@
 """Daemon and slave as processes on a CAN bus: the node killed and back, a second node on the bus, probe and doctor."""
 
 import json
-import math
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from datetime import datetime
@@ -24,8 +22,6 @@ from tests.cli.test_daemon_process import LAW, until
 pytestmark = pytest.mark.real_time
 
 NODE = 5
-MOST_KILLS = 5
-DETECTED_WITHIN_S = 0.15
 PATIENT = "reply_timeout_s = 2.0\nheartbeat_s = 1.0\n"
 """Where time is no matter, so that a busy machine is none."""
 
@@ -101,33 +97,17 @@ def in_s1(dcs: Dcs, reference: float) -> None:
     until(is_there, "S1")
 
 
-def test_a_node_killed_while_the_stem_moves_is_detected_in_time(tmp_path: Path) -> None:
-    """With the time-outs that a file has by default. A busy machine may need some kills for a prompt one.
-
-    What becomes of the valve then, and how it comes back: tests/daemon/test_slave_killed.py, in cycles counted.
-    """
+def test_a_node_killed_while_the_stem_moves_is_a_fault_with_its_reason(tmp_path: Path) -> None:
+    """How soon, what becomes of the valve, and how it comes back: tests/daemon/test_slave_killed.py, in cycles."""
     channel = free_channel()
     node, config, log = slave_file(tmp_path, channel), daemon_file(tmp_path, channel), tmp_path / f"daemon{NODE}.log"
-    took_s: list[float] = []
-    with ExitStack() as slaves:
-        process = slaves.enter_context(slave(node))
-        with running("run", config) as daemon, Dcs("127.0.0.1", port_in(daemon)) as dcs:
-            for _ in range(MOST_KILLS):
-                begun_s = time.time()
-                in_s1(dcs, 0.6)
-                killed_s = time.time()
-                os.kill(process.pid, signal.SIGKILL)
-                # One that a busy machine made the controller let go of just before the kill tells no delay.
-                until(lambda b=begun_s: max(faulted_s(log, "NO_REPLY"), default=0.0) >= b, "the fault")  # type: ignore[misc]
-                until(lambda: dcs.get("mode") == Mode.HOLD, "hold")
-                took_s += [each - killed_s for each in faulted_s(log, "NO_REPLY") if each >= killed_s]
-                if took_s and took_s[-1] < DETECTED_WITHIN_S:
-                    break
-                process.wait()
-                process = slaves.enter_context(slave(node))
-    print("detected after, s:", took_s)
-    assert min(took_s, default=math.inf) < DETECTED_WITHIN_S, took_s
+    with slave(node) as process, running("run", config) as daemon, Dcs("127.0.0.1", port_in(daemon)) as dcs:
+        in_s1(dcs, 0.6)
+        os.kill(process.pid, signal.SIGKILL)
+        until(lambda: bool(faulted_s(log, "NO_REPLY")), "the fault")
+        until(lambda: dcs.get("mode") == Mode.HOLD, "hold")
     reasons = {str(event["reason"]) for event in events(log) if event["event"] == "no good reply"}
+    assert reasons
     assert all("SYNC not answered" in reason or "heartbeat lost" in reason for reason in reasons), reasons
 
 

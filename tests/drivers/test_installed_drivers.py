@@ -110,6 +110,10 @@ def test_a_bus_that_nobody_offers_is_named_with_those_there_are(site: Path) -> N
     [
         ("raise OSError('no licence')\n", "positioner.devices: acme_device:AcmeDevice cannot be loaded: no licence"),
         ("import not_there\n", "bus 'acme' needs not_there, which is not installed"),
+        (
+            "from config.device import Device\nclass AcmeDevice(Device):\n    def untouched(self): return self\n",
+            "positioner.devices: acme_device:AcmeDevice cannot be loaded: AcmeDevice.untouched is called read_only now",
+        ),
     ],
 )
 def test_a_broken_package_fails_where_it_is_used_and_nowhere_else(site: Path, broken: str, said: str) -> None:
