@@ -126,7 +126,7 @@ def test_searches_that_disagree_and_explain_nothing_are_not_trusted(parts: Split
     assert not lone.fit.trusted
     found = diagnosed(parts, step(lone, ip_lag=lone))
     assert found.verdict == "untrusted"
-    assert found.sentence.startswith("Not to be trusted: the searches end at different errors.")
+    assert found.sentence.startswith("Not to be trusted: searches from independent starts do not come to the same.")
     explained = replace(lone, errors=EXPLAINED.errors, at_floor=True)
     assert diagnosed(parts, step(explained, ip_lag=explained)).verdict == "adequate", "it explains all"
 
