@@ -17,6 +17,7 @@ class MadeUp:
     """500 residuals linear in the first two coordinates, blind to the third, on stairs in the second."""
 
     lower, upper = np.full(3, -2.0), np.full(3, 2.0)
+    parameters = ()
 
     def __init__(self, stairs: float = 0.0, second: float = np.inf) -> None:
         generator = np.random.default_rng(0)
@@ -25,6 +26,9 @@ class MadeUp:
         self._stairs = stairs
         self._second = second
         """First coordinate about which there is another valley, a hair worse in cost."""
+
+    def theta(self, z: Vector) -> Vector:
+        return z
 
     def residuals(self, z: Vector) -> Vector:
         apart = z - BEST

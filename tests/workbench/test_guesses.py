@@ -8,6 +8,8 @@ from sim.composition import Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
 from workbench.fit.guesses import guessed_values, likely_quanta_m
+from workbench.fit.objective import SimulationError, smoothed
+from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 
 VALVE = drawn_valve(np.random.default_rng(0))
@@ -34,3 +36,19 @@ def test_stops_are_sought_where_the_positions_end() -> None:
     assert np.min(np.abs(upper - 0.072)) < 4.0 * NOISE_M
     assert np.any(upper > 0.075), "the upper stop alone out of reach"
     assert np.any(lowest < lowest.max() - 2e-3), "the lower stop alone out of reach"
+
+
+def test_before_rounding_the_truth_lies_inside_its_quanta_and_a_wrong_spring_outside() -> None:
+    quantum_m = 5e-4
+    composition = Composition.from_file(with_effect(VALVE, "quantisation", quantum_m=quantum_m))
+    record = ready(recorded(name="quantisation", quantum_m=quantum_m))
+    parameters = free_parameters(composition, ["spring_n_per_m", "quantisation.quantum_m"])
+    error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+    truth = error.coordinates(composition.theta)
+    smooth = smoothed(error, truth)
+    assert float(np.mean(np.abs(smooth.residuals(truth)) > 1.0)) < 0.05, "but where it slides"
+    for way in (-1.0, 1.0):
+        costs = [smooth.cost(truth + way * each * np.array([1.0, 0.0])) for each in (1e-3, 2e-3, 4e-3, 8e-3)]
+        assert costs == sorted(costs), "downhill to the truth"
+    off = truth * np.array([1.0, 0.0])
+    assert smoothed(error, off) is error, "nothing is rounded there"

@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.karnopp import Vector
 from workbench.fit.objective import SimulationError
-from workbench.fit.uncertainty import information
+from workbench.fit.uncertainty import NOTHING, information
 
 WITHIN = 1.01
 DEVIATIONS, NEAR = 2.0, 0.01
@@ -57,4 +57,4 @@ def agreeing(error: SimulationError, ends: Sequence[Place]) -> int:
 def _deviations(error: SimulationError, z: Vector) -> Vector:
     """Return s, (parameters,)."""
     values, vectors, kappa = information(error, z)
-    return np.asarray(np.sqrt(vectors**2 @ (kappa / np.maximum(values, np.finfo(float).tiny))))
+    return np.asarray(np.sqrt(vectors**2 @ (kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))))

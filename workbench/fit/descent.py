@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from sim.karnopp import Vector
-from workbench.fit.objective import FINAL, MIDDLE, SimulationError
+from workbench.fit.objective import FINAL, MIDDLE, SimulationError, smoothed
 
 
 class Stage(NamedTuple):
@@ -84,6 +84,9 @@ def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
 
 def settled(error: SimulationError, z: Vector) -> Vector:
     """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower."""
+    smooth = smoothed(error, z)
+    if smooth is not error:
+        z = min(z, descended(smooth, z, COARSE), key=error.cost)
     for _ in range(ROUNDS):
         z = descended(error, descended(error, z, COARSE), NARROW)
         at_rest = error.cost(z)

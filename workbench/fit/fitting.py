@@ -32,7 +32,7 @@ from workbench.data.record import Record, ready, require_fittable, require_units
 from workbench.fit.agreement import Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
-from workbench.fit.objective import MIDDLE, SimulationError
+from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
@@ -267,10 +267,10 @@ def _searched(
     rough = error.rough
 
     def begun(start: Place) -> Place:
-        return replace(start, z=descended(rough, start.z, WIDE))
+        return replace(start, z=descended(smoothed(rough, start.z), start.z, WIDE))
 
     def carried(start: Place) -> Place:
-        return replace(start, z=descended(rough, start.z, MIDDLING))
+        return replace(start, z=descended(smoothed(rough, start.z), start.z, MIDDLING))
 
     def ended(start: Place) -> Place:
         return replace(start, z=settled(error, start.z))

@@ -1,12 +1,13 @@
 """What the positions of a record suggest for a parameter of an effect: stops at their ends, quanta of their rests.
 
-S(q) = |sum exp(2 pi i x_j / q)|      x_j mean position of the j-th rest, where the noise is averaged away; q quantum, m
+S(q) = |sum exp(2 pi i x_j / q)|      x_j median position of the j-th rest, where the noise is small; q quantum, m
 """
 
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from config.recording import Column
 from workbench.data.motion import directions
@@ -59,17 +60,27 @@ def likely_quanta_m(record: Record) -> list[float]:
     height = np.abs(np.exp(2j * np.pi * np.outer(frequency, places_m)).sum(axis=1))
     peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]))
     likeliest = peaks[np.argsort(-height[peaks])[:LIKELY_QUANTA]]
-    return [float(each) for each in 1.0 / frequency[likeliest]]
+    half = frequency[1] - frequency[0]
+    return [1.0 / _summit(float(each), half, places_m) for each in frequency[likeliest]]
+
+
+def _summit(frequency: float, half: float, places_m: Column) -> float:
+    """Return where S is highest within half a width of a frequency, 1/m."""
+
+    def depth(there: float) -> float:
+        return -float(np.abs(np.exp(2j * np.pi * there * places_m).sum()))
+
+    return float(minimize_scalar(depth, bounds=(frequency - half, frequency + half), method="bounded").x)
 
 
 def _rests_m(record: Record) -> Column:
-    """Return the mean position of each rest long enough."""
-    means = []
+    """Return the median position of each rest long enough: a sample of the next quantum does not move it."""
+    places = []
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
         way = directions(position_m, record.noise_m)
         edges = [0, *(1 + np.flatnonzero(np.diff(way != 0))).tolist(), way.size]
         for begin, over in pairwise(edges):
             if way[begin] == 0 and over - begin >= LEAST_REST:
-                means.append(float(np.nanmean(position_m[begin:over])))
-    return np.array(means)
+                places.append(float(np.nanmedian(position_m[begin:over])))
+    return np.array(places)

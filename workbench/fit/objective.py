@@ -22,6 +22,10 @@ HOPELESS = 1e6
 """What a residual that is not finite counts, in sigma."""
 
 
+INSIDE, SHARPER = 0.49, 0.1
+"""Of a quantum: what is well inside its half; of the noise: how far outside counts, where a sensor rounds."""
+
+
 class SimulationError:
     """A free run held against its record, over the coordinates of some parameters."""
 
@@ -68,8 +72,10 @@ class SimulationError:
 
     def residuals(self, z: Vector) -> Vector:
         """Return r, one a valid sample."""
-        error = (self.run.position_m(self.theta(z))[self._rows] - self._measured_m) / self.sigma_m
-        return np.clip(np.nan_to_num(error, nan=HOPELESS, posinf=HOPELESS, neginf=-HOPELESS), -HOPELESS, HOPELESS)
+        return _bounded(self._apart_m(self.theta(z)) / self.sigma_m)
+
+    def _apart_m(self, theta: Vector) -> Vector:
+        return np.asarray(self.run.position_m(theta)[self._rows] - self._measured_m)
 
     def cost(self, z: Vector, scale: float = FINAL) -> float:
         """Return the soft-L1 cost, half a sum of squares for small residuals; once worked out it is kept."""
@@ -97,6 +103,47 @@ class SimulationError:
             there[i] += step if z[i] + step <= self.upper[i] else -step
             columns.append((self.residuals(there) - here) / (there[i] - z[i]))
         return np.array(columns).T
+
+
+class Unrounded(SimulationError):
+    """The error of a sensor that rounds, by how far the position lies outside the quantum that was indicated.
+
+    r_i = max(0, |x_i - q n_i| - 0.49 q) sign(x_i - q n_i) / (sigma / 10)     x_i simulated before rounding, n_i the
+                                                                              measured in quanta, rounded
+
+    Rounded positions are right or wrong by a whole quantum, and nothing says which way to go; this does. The quantum
+    itself stays as it is at z: a wider one is never wrong. What lies just outside is as wrong as what lies far, hence
+    the sharper sigma and the margin.
+    """
+
+    def __init__(self, error: SimulationError, quantum: Parameter, z: Vector) -> None:
+        theta = error.theta(z)
+        super().__init__(error.run, error.composition, error.parameters, theta)
+        self._index = quantum.index
+        quantum_m = float(theta[quantum.index])
+        self._measured_m = quantum_m * np.round(self._measured_m / quantum_m)
+        self._inside_m = INSIDE * quantum_m
+
+    def residuals(self, z: Vector) -> Vector:
+        """Return r, one a valid sample."""
+        theta = self.theta(z)
+        theta[self._index] = 0.0
+        off_m = self._apart_m(theta)
+        return _bounded(np.sign(off_m) * np.maximum(np.abs(off_m) - self._inside_m, 0.0) / (SHARPER * self.sigma_m))
+
+
+def smoothed(error: SimulationError, z: Vector) -> SimulationError:
+    """Return the error itself, or where a sensor rounds at z, that of the position before it is rounded."""
+    theta = error.theta(z)
+    for each in error.parameters:
+        if each.guess == "quantum" and theta[each.index] > 0.0:
+            return Unrounded(error, each, z)
+    return error
+
+
+def _bounded(residuals: Vector) -> Vector:
+    finite = np.nan_to_num(residuals, nan=HOPELESS, posinf=HOPELESS, neginf=-HOPELESS)
+    return np.asarray(np.clip(finite, -HOPELESS, HOPELESS))
 
 
 def root_weights(residuals: Vector, scale: float) -> Vector:

@@ -21,10 +21,10 @@ from sim.karnopp import Vector
 from workbench.data.motion import directions, velocity_m_per_s
 from workbench.data.record import Record
 from workbench.fit.agreement import Place
-from workbench.fit.descent import scanned
+from workbench.fit.descent import MIDDLING, descended, scanned
 from workbench.fit.guesses import guessed_values
 from workbench.fit.landings import Landings, Rest, rests
-from workbench.fit.objective import MIDDLE, SimulationError
+from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.model.parameters import Parameter, strengths
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
@@ -91,6 +91,7 @@ def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Seq
     ]
     for number, theta in enumerate(seeds, 1):
         grid = [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
+        grid = [_smoothed(error, z) for z in grid] if number == 1 else grid
         starts += [Place(z, f"base fit {number}") for z in error.screened(grid, EACH_SEED if number > 1 else AT_BEST)]
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
@@ -144,8 +145,14 @@ def _landed(
             solved = landings.solved(begin, kept)
             if solved:
                 viscous = [_scaled(solved.theta, VISCOUS, factor) for factor in VISCOUS_FACTORS]
-                found += error.screened(map(error.coordinates, viscous), 1)
+                found += [_smoothed(error, z) for z in error.screened(map(error.coordinates, viscous), 1)]
     return found
+
+
+def _smoothed(error: SimulationError, z: Vector) -> Vector:
+    """Return z, or where a sensor rounds, all but the quantum moved to where the positions before lie inside it."""
+    smooth = smoothed(error.rough, z)
+    return z if smooth is error.rough else descended(smooth, z, MIDDLING)
 
 
 def _in_motion(rough: SimulationError, z: Vector, moving: Sequence[int]) -> Vector:
