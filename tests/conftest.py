@@ -1,9 +1,10 @@
 """How `make test` shares the suite out over workers: a file is one group, all that happens in real time is another.
 
 A group runs on one worker, in order. So a file's valves, fits and processes are made once, and no two tests that wait
-for a clock, a process or a wire ever wait for each other. See tests/README.md.
+for a clock, a process or a wire ever wait for each other. The others give way to these. See tests/README.md.
 """
 
+import gc
 import os
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,8 @@ REAL_TIME = "pytest.mark.real_time"
 """In a file: it waits for a clock, a process or a wire."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
+GIVES_WAY = 10
+"""Niceness of a test that waits for nothing outside."""
 
 
 class Groups(LoadScopeScheduling):  # type: ignore[misc]
@@ -46,3 +49,17 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put what happens in real time first: it takes the longest however many the processors."""
     items.sort(key=lambda item: not _is_real_time(item.path))
+
+
+def pytest_collection_finish() -> None:
+    """Leave all that is imported by now out of garbage collection.
+
+    To go through it takes half a second on a busy machine, in which no thread of the process answers anybody.
+    """
+    gc.freeze()
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Give way to what happens in real time on another worker; that group goes first, so a worker never turns back."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not _is_real_time(item.path):
+        os.setpriority(os.PRIO_PROCESS, 0, GIVES_WAY)

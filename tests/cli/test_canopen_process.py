@@ -145,7 +145,9 @@ def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(tmp_path: Path, caps
         assert dcs.get("lost_replies") == 0, "the watcher did not touch the daemon's bus"
 
 
-def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(tmp_path: Path) -> None:
+def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     channel = free_channel()
     first = slave_file(tmp_path, channel)
     (tmp_path / "sheet.eds").write_text("not a data sheet")
@@ -153,7 +155,7 @@ def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(tmp_path: Path)
     (tmp_path / "none.toml").write_text('[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\neds = "none.eds"\n')
     (tmp_path / "gone.toml").write_text(f'[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\nchannel = "{channel}"\n')
     (tmp_path / "face.toml").write_text('[valve]\nstroke_m = 0.1\n[device]\nbus = "canopen"\ninterface = "nosuch"\n')
-    said = {
+    lines = {
         ("sim", first): "bus.node: 5 is taken",
         ("run", tmp_path / "bad.toml"): "is not an electronic data sheet",
         ("run", tmp_path / "none.toml"): "none.eds: cannot be read: No such file",
@@ -161,11 +163,11 @@ def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(tmp_path: Path)
         ("run", tmp_path / "face.toml"): "nosuch",
     }
     with slave(first):
-        for (command, config), line in said.items():
-            words = [sys.executable, "-m", "positioner.cli", command, str(config)]
-            ended = subprocess.run(words, capture_output=True, text=True, timeout=100, check=False)
-            assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1), ended.stderr
-            assert line in ended.stderr
+        for (command, config), line in lines.items():
+            assert main([command, str(config)]) == 2
+            said = capsys.readouterr()
+            assert (said.out, said.err.count("\n")) == ("", 1), said.err
+            assert line in said.err
 
 
 def test_without_the_packages_a_gateway_runs_and_says_in_one_line_what_is_missing(tmp_path: Path) -> None:

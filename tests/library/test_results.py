@@ -48,13 +48,13 @@ def bench() -> pos.Recording:
 @pytest.fixture(scope="module")
 def results(hidden: pos.Hidden, stepped: pos.Recording, bench: pos.Recording) -> dict[str, Result]:
     """One result of each kind."""
-    effects = ["asymmetric_friction", "backlash"]
+    effects = ["asymmetric_friction"]
     return {
         "Recording": hidden.fit,
         "Comparison": pos.compare(hidden.fit, hidden.base),
         "Fit": pos.fit(hidden.fit, hidden.base, profile=False),
         "Diagnosis": pos.diagnose(hidden.fit, hidden.base, test=hidden.test, effects=effects),
-        "Extension": pos.extend(hidden.fit, hidden.base, effects[:1], test=hidden.test),
+        "Extension": pos.extend(hidden.fit, hidden.base, effects, test=hidden.test),
         "ForceDiagnosis": pos.diagnose_forces(bench, hidden.base),
         "ResponseFigures": pos.respond(stepped),
         "RecordingEstimates": pos.estimate(stepped),

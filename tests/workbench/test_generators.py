@@ -177,8 +177,9 @@ def test_what_is_hidden_shows(kind: str, law: str) -> None:
 
 
 def test_a_case_is_the_same_again() -> None:
+    cases = [case("cavitation", seed=seed, duration_s=10.0).fit for seed in (1, 1, 2)]
     for column in ("time_s", "command_pa", "position_m"):
-        one, again, other = (case("cavitation", seed=seed, duration_s=10.0).fit.columns[column] for seed in (1, 1, 2))
+        one, again, other = (each.columns[column] for each in cases)
         np.testing.assert_array_equal(one, again)
         assert column == "time_s" or not np.array_equal(one, other)
 
