@@ -1,7 +1,7 @@
 """The whole journey, blind: compare fails, diagnose names the effect, extend adds it, the error falls, compare holds.
 
 The recordings come from generators that share no code with the model (LuGre, elasto-plastic); one case
-arrives as a historian's export. Small libraries and 8 s of recording keep it short; the campaign is in benchmarks/.
+arrives as a historian's export. Small libraries and 10 s of recording keep it short; the campaign is in benchmarks/.
 """
 
 import csv
@@ -18,7 +18,7 @@ from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.generators import case
 
-DURATION_S = 8.0
+DURATION_S = 10.0
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import json
 from workbench.blind.hiding import hide
 from workbench.fit.fitting import fit
 
-hidden = hide(31013, duration_s=8.0)
+hidden = hide(31013, duration_s=10.0)
 found = fit(hidden.fit, hidden.base, effects=("area_variation",), workers=1, profile=False)
 parameters = {name: (each.value, each.std) for name, each in found.parameters.items()}
 print(json.dumps([found.cost, found.trusted, parameters]))

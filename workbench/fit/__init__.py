@@ -8,6 +8,7 @@ Its files:
     objective          what they lower
     descent            how: trust region, and a scan of the stairs
     agreement          which of them came to the same
+    threads            searches side by side
     fitted_parameter   a parameter with its interval, and how it is shown
     uncertainty        what the record determines
 """

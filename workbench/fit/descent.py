@@ -8,6 +8,7 @@ What is left are stairs that no derivative sees: a break-away one sample early o
 either side over five hundredths, the lowest step taken and the descent begun again there, until the parameters stay.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,15 +32,15 @@ class Stage(NamedTuple):
     """Most, derivatives not counted."""
 
 
-WIDE, MIDDLING = Stage(100.0, 1e-3, 1e-2, 12), Stage(MIDDLE, 3e-4, 1e-3, 12)
-COARSE, NARROW = Stage(FINAL, 1e-3, 1e-6, 20), Stage(FINAL, 1e-4, 1e-7, 20)
+WIDE, MIDDLING = Stage(100.0, 1e-3, 1e-2, 8), Stage(MIDDLE, 3e-4, 1e-3, 12)
+COARSE, NARROW = Stage(FINAL, 1e-3, 1e-5, 20), Stage(FINAL, 1e-4, 1e-6, 20)
 """The last stages: the valleys are bent at the bottom, and too wide for the narrow differences alone."""
 REACH = 1.0
 """Half-width of the box round a stage's start, of a log-parameter."""
 GRADIENT = 1e-9
 """Of the cost by a log-parameter: less is none, and no direction to go."""
 STAIRS = np.geomspace(2e-4, 5e-2, 10)
-ROUNDS = 6
+ROUNDS = 4
 SETTLED = 1e-3
 """Relative fall of the cost by a scan below which the search has ended."""
 
@@ -82,14 +83,23 @@ def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
     return there if error.cost(there, stage.scale) < error.cost(z, stage.scale) else z
 
 
-def settled(error: SimulationError, z: Vector) -> Vector:
-    """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower."""
+def settled(error: SimulationError, z: Vector, scanned_below: float = math.inf) -> Vector:
+    """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower.
+
+    Args:
+        error: what is lowered.
+        z: where it begins, (parameters,).
+        scanned_below: the cost from which on the stairs are let be: what is no better than a search that is there
+            already need not be the best of its kind.
+    """
     smooth = smoothed(error, z)
     if smooth is not error:
         z = min(z, descended(smooth, z, COARSE), key=error.cost)
     for _ in range(ROUNDS):
         z = descended(error, descended(error, z, COARSE), NARROW)
         at_rest = error.cost(z)
+        if at_rest > scanned_below:
+            break
         for i in range(z.size):
             z = scanned(error, z, i)
         if error.cost(z) > at_rest * (1.0 - SETTLED):

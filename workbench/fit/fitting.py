@@ -5,13 +5,12 @@
 
 Searches from all starts go down at the wide scale, the best of these at the middling one, and of those, the best
 first, each to where it stays, until searches from independent starts have come to the same. The result does not depend
-on the number of workers, which are threads: the simulation holds no interpreter lock.
+on the number of workers, which are threads.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from os import cpu_count
+from math import inf
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -29,11 +28,12 @@ from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
 from workbench.data.motion import slips
 from workbench.data.record import Record, ready, require_fittable, require_units
-from workbench.fit.agreement import Place, agreeing
+from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed
+from workbench.fit.threads import on_threads
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import DEFAULT, free_parameters
@@ -51,7 +51,9 @@ class Effort:
     settled: int
     """of those at most so many, two at a time, are brought to where they stay,"""
     agreeing: int
-    """until searches from so many origins have come to the same."""
+    """until searches from so many origins have come to the same;"""
+    scanned_below: float = inf
+    """those of a higher cost are not scanned for stairs: an effect that makes nothing better than the base."""
 
 
 OF_BASE, OF_EFFECT = Effort(8, 6, 3), Effort(5, 4, 2)
@@ -189,7 +191,8 @@ def fit(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in ground.seeds]
     begins = effect_starts(error, added, seeds)
-    return _searched(composition, error, begins, OF_EFFECT, profile, workers, progress)
+    effort = replace(OF_EFFECT, scanned_below=ground.cost / WITHIN)
+    return _searched(composition, error, begins, effort, profile, workers, progress)
 
 
 def profiled(found: Fit, recording: Recording) -> Fit:
@@ -273,7 +276,7 @@ def _searched(
         return replace(start, z=descended(smoothed(rough, start.z), start.z, MIDDLING))
 
     def ended(start: Place) -> Place:
-        return replace(start, z=settled(error, start.z))
+        return replace(start, z=settled(error, start.z, effort.scanned_below))
 
     def screening(start: Place) -> float:
         return rough.cost(start.z, MIDDLE)
@@ -390,8 +393,7 @@ def _fitted_file(composition: Composition, theta: Vector) -> ValveFile:
 def _each(function: Callable[[T], S], arguments: Sequence[T], workers: int | None, tell: Progress) -> list[S]:
     """Apply a function to each argument on the workers; results in the order of the arguments."""
     results = []
-    with ThreadPoolExecutor(workers or cpu_count()) as pool:
-        for result in pool.map(function, arguments):
-            results.append(result)
-            tell(len(results) / len(arguments))
+    for result in on_threads(function, arguments, workers):
+        results.append(result)
+        tell(len(results) / len(arguments))
     return results

@@ -142,8 +142,8 @@ def smoothed(error: SimulationError, z: Vector) -> SimulationError:
 
 
 def _bounded(residuals: Vector) -> Vector:
-    finite = np.nan_to_num(residuals, nan=HOPELESS, posinf=HOPELESS, neginf=-HOPELESS)
-    return np.asarray(np.clip(finite, -HOPELESS, HOPELESS))
+    clipped = np.clip(residuals, -HOPELESS, HOPELESS)
+    return np.where(np.isnan(clipped), HOPELESS, clipped)
 
 
 def root_weights(residuals: Vector, scale: float) -> Vector:

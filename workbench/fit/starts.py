@@ -40,7 +40,7 @@ AT_BEST, EACH_SEED = 2, 1
 LANDED_BASE, LANDED_EFFECT = 1, 2
 """Searches begun at each half of the landings."""
 ENOUGH_RESTS = 6
-VISCOUS_FACTORS = (0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0)
+VISCOUS_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 ABOUT = np.geomspace(4e-3, 0.4, 7)
 """Distances, of a log-parameter, in which what the landings do not hold is scanned about the grid,"""
 ALTERNATIONS = 2

@@ -80,7 +80,7 @@ class FreeRun:
         self, composition: Composition, record: Record, *, from_pressure: bool = False, accuracy: Accuracy = FINE
     ) -> None:
         self.record = record
-        self._accuracy = accuracy
+        self._tolerance = accuracy.tolerance
         self.from_pressure = from_pressure
         everything = (composition, list(range(len(composition.names))))
         self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
@@ -88,6 +88,9 @@ class FreeRun:
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
         self._starts = [initial_state(record, first, end) for first, end in record.segments]
+        self._periods_s = [np.diff(record.time_s[first:end]) for first, end in record.segments]
+        longest_s = accuracy.steps * self._composition.step_s
+        self._steps_s = [min(float(each.max()), longest_s) for each in self._periods_s]
 
     def run(self, theta: Vector) -> Run:
         """Simulate; theta, (parameters,), as `composition.names`."""
@@ -95,13 +98,11 @@ class FreeRun:
         load_n = self.record.load_n
         drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
         rows = np.full((4, len(self.record)), np.nan)
-        accuracy = self._accuracy
-        for (first, end), begin in zip(self.record.segments, self._starts, strict=True):
+        segments = zip(self.record.segments, self._starts, self._periods_s, self._steps_s, strict=True)
+        for (first, end), begin, periods_s, step_s in segments:
             state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
-            periods = np.diff(self.record.time_s[first:end])
             held_pa = drive_pa[first : end - 1]
-            step_s = min(float(periods.max()), accuracy.steps * self._composition.step_s)
-            path = follow(self._composition, vector, state, held_pa, periods, step_s, accuracy.tolerance)
+            path = follow(self._composition, vector, state, held_pa, periods_s, step_s, self._tolerance)
             rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
         return Run(*rows)
 

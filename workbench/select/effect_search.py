@@ -6,7 +6,6 @@ Steps go on until the added model explains all, nothing more is accepted, or thr
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -18,6 +17,7 @@ from workbench.data.held_out import Split
 from workbench.fit.descent import NARROW, descended
 from workbench.fit.fitting import Fit, fit, profiled
 from workbench.fit.objective import SimulationError
+from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 from workbench.select.block_errors import block_errors
@@ -141,8 +141,7 @@ class EffectSearch:
         imitations = [each for each in map(bare_imitation, better) if each]
         valves = [*(each.valve for each in better), *imitations]
         bare = [ValveFile(valve=valve, effect=before.fit.valve.effect) for valve in valves]
-        with ThreadPoolExecutor(self._workers) as pool:
-            costs = list(pool.map(partial(self._local_minimum, before.fit), bare))
+        costs = list(on_threads(partial(self._local_minimum, before.fit), bare, self._workers))
         if not costs or min(costs) > BETTER * before.fit.cost:
             return before
         return self.base(bare[costs.index(min(costs))])
@@ -170,10 +169,9 @@ class EffectSearch:
         # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
         dearest_first = sorted(names, key=lambda name: -len(self._library[name].parameters))
         models: dict[str, EvaluatedModel | str] = {}
-        with ThreadPoolExecutor(self._workers) as pool:
-            for name, model in zip(dearest_first, pool.map(refitted, dearest_first), strict=True):
-                models[name] = model
-                self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
+        for name, model in zip(dearest_first, on_threads(refitted, dearest_first, self._workers), strict=True):
+            models[name] = model
+            self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
         return {name: models[name] for name in names}
 
     def _evaluated(self, found: Fit) -> EvaluatedModel:

@@ -9,9 +9,7 @@ it can be played to a valve at rest, or by `positioner simulate VALVE.toml --inp
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from os import cpu_count
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +24,7 @@ from workbench.data.record import Record, ready
 from workbench.fit.descent import descended_through
 from workbench.fit.fitting import Fit
 from workbench.fit.objective import SimulationError
+from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 
@@ -121,8 +120,7 @@ def experiment(fits: Sequence[Fit], record: Record, *, seed: int = 0, workers: i
         time_s, command_pa = _input(MENU[name], record)
         return Experiment(name, _separation(fits, time_s, command_pa, record, seed), time_s, command_pa)
 
-    with ThreadPoolExecutor(workers or cpu_count()) as pool:
-        return max(pool.map(rated, MENU), key=lambda each: each.separation)
+    return max(on_threads(rated, list(MENU), workers), key=lambda each: each.separation)
 
 
 def _input(shape: Shape, record: Record) -> tuple[Command, Command]:

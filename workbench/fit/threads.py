@@ -1,0 +1,27 @@
+"""Searches on threads: the simulation holds no interpreter lock.
+
+Each search is on one thread. The linear algebra of a descent is of few columns: given threads of its own, these would
+mostly wait for each other and take the processors from the searches.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from os import cpu_count
+from typing import TypeVar
+
+from threadpoolctl import ThreadpoolController
+
+T = TypeVar("T")
+S = TypeVar("S")
+
+
+def on_threads(function: Callable[[T], S], arguments: Sequence[T], workers: int | None) -> Iterator[S]:
+    """Apply a function to each argument on so many threads, by default one a core; results in their order."""
+    with _linear_algebra().limit(limits=1, user_api="blas"), ThreadPoolExecutor(workers or cpu_count()) as pool:
+        yield from pool.map(function, arguments)
+
+
+@cache
+def _linear_algebra() -> ThreadpoolController:
+    return ThreadpoolController()
