@@ -20,8 +20,8 @@ REAL_TIME = "pytest.mark.real_time"
 """In a file: it waits for a clock, a process or a wire."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
-GIVES_WAY = 10
-"""Niceness of a test that waits for nothing outside."""
+GIVES_WAY = 3
+"""Niceness of a test that waits for nothing outside: half the weight. More, and beside busy processes it would starve."""
 
 
 class Groups(LoadScopeScheduling):  # type: ignore[misc]
