@@ -21,7 +21,7 @@ REAL_TIME = "pytest.mark.real_time"
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
 GIVES_WAY = 3
-"""Niceness of a test that waits for nothing outside: half the weight. More, and beside busy processes it would starve."""
+"""Niceness of a test that waits for nothing outside, half the weight: more would starve it beside busy processes."""
 
 
 class Groups(LoadScopeScheduling):  # type: ignore[misc]
