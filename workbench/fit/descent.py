@@ -32,7 +32,7 @@ class Stage(NamedTuple):
     """Most, derivatives not counted."""
 
 
-WIDE, MIDDLING = Stage(100.0, 1e-3, 1e-2, 8), Stage(MIDDLE, 3e-4, 1e-3, 12)
+WIDE, MIDDLING = Stage(100.0, 1e-3, 1e-2, 12), Stage(MIDDLE, 3e-4, 1e-3, 12)
 COARSE, NARROW = Stage(FINAL, 1e-3, 1e-5, 20), Stage(FINAL, 1e-4, 1e-6, 20)
 """The last stages: the valleys are bent at the bottom, and too wide for the narrow differences alone."""
 REACH = 1.0

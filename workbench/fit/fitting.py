@@ -51,9 +51,10 @@ class Effort:
     settled: int
     """of those at most so many, two at a time, are brought to where they stay,"""
     agreeing: int
-    """until searches from so many origins have come to the same;"""
-    scanned_below: float = inf
-    """those of a higher cost are not scanned for stairs: an effect that makes nothing better than the base."""
+    """until searches from so many origins have come to the same."""
+    improves_below: float = inf
+    """Cost above which an effect makes nothing better than the base: such ends are not scanned for stairs, and do not
+    agree, as the place where the effect is off can be reached from everywhere."""
 
 
 OF_BASE, OF_EFFECT = Effort(8, 6, 3), Effort(5, 4, 2)
@@ -97,7 +98,8 @@ class Fit(Result):
     starts: tuple[Search, ...]
     """The searches, best first."""
     agreement: int
-    """From how many independent starts searches came to the best, in cost and in parameters (`agreement`)."""
+    """From how many independent starts searches came to the best, in cost and in parameters (`agreement`); 1 where an
+    added effect makes nothing better."""
     condition: float
     undetermined: tuple[Combination, ...]
     notes: tuple[str, ...]
@@ -121,7 +123,7 @@ class Fit(Result):
 
     def blocks(self) -> list[Block]:
         """Say the error, whether the searches agree, and each parameter with its interval."""
-        agreement = "searches agree" if self.trusted else "search alone came so low: not to be trusted"
+        agreement = "searches agree" if self.trusted else "search came to this alone, or to nothing better: not trusted"
         return [
             f"error {1e3 * self.rms_m:.4g} mm rms, floor {1e3 * self.floor_m:.4g} mm; {self.agreement} {agreement}",
             parameter_table(self.parameters),
@@ -191,7 +193,7 @@ def fit(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in ground.seeds]
     begins = effect_starts(error, added, seeds)
-    effort = replace(OF_EFFECT, scanned_below=ground.cost / WITHIN)
+    effort = replace(OF_EFFECT, improves_below=ground.cost / WITHIN)
     return _searched(composition, error, begins, effort, profile, workers, progress)
 
 
@@ -276,7 +278,7 @@ def _searched(
         return replace(start, z=descended(smoothed(rough, start.z), start.z, MIDDLING))
 
     def ended(start: Place) -> Place:
-        return replace(start, z=settled(error, start.z, effort.scanned_below))
+        return replace(start, z=settled(error, start.z, effort.improves_below))
 
     def screening(start: Place) -> float:
         return rough.cost(start.z, MIDDLE)
@@ -288,7 +290,7 @@ def _searched(
         pair = second[len(ends) : min(len(ends) + 2, effort.settled)]
         ends += _each(ended, pair, workers, lambda done: tell(0.5 + 0.4 * done))
         ends.sort(key=lambda end: error.cost(end.z))
-    agreement = agreeing(error, ends)
+    agreement = agreeing(error, ends) if error.cost(ends[0].z) < effort.improves_below else 1
     found = [end.z for end in ends]
     best = _centred(error, found[0])
     determined = uncertainty(error, best, found, profile=profile)
