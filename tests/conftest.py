@@ -14,14 +14,15 @@ from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
 ROOT = Path(__file__).parents[1]
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-"""Of every process: threads for small matrices would only take the processors from the other workers."""
 REAL_TIME = "pytest.mark.real_time"
 """In a file: it waits for a clock, a process or a wire."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
 GIVES_WAY = 3
 """Niceness of a test that waits for nothing outside, half the weight: more would starve it beside busy processes."""
+
+# Of every process: threads for small matrices would only take the processors from the other workers.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 class Groups(LoadScopeScheduling):  # type: ignore[misc]

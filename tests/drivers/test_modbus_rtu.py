@@ -132,6 +132,16 @@ def driver(scripted: ScriptedDevice) -> Iterator[ModbusRtuDriver]:
     driver.close()
 
 
+@pytest.fixture
+def slow_driver(scripted: ScriptedDevice) -> Iterator[ModbusRtuDriver]:
+    """Where silence is so long that a busy machine leaves none in a babble."""
+    end = scripted.driver_end  # type: ignore[attr-defined]
+    driver = ModbusRtuDriver(ModbusRtuDevice(serial=SerialPort(path=end, baud=SLOW_BAUD), reply_timeout_s=2.0))
+    driver.open()
+    yield driver
+    driver.close()
+
+
 def refused_as(kind: type[DriverError], act: Callable[[], object]) -> str:
     """Return what the error says: one line that names the device."""
     start_s = time.perf_counter()
@@ -237,11 +247,7 @@ def test_noise_on_the_idle_line_is_thrown_away(driver: ModbusRtuDriver, scripted
     os.close(fd)
 
 
-def test_a_line_that_is_never_silent_is_no_connection(scripted: ScriptedDevice) -> None:
-    """At a slow rate, where silence is so long that a busy machine leaves none in the babble."""
-    end = scripted.driver_end  # type: ignore[attr-defined]
-    slow = ModbusRtuDriver(ModbusRtuDevice(serial=SerialPort(path=end, baud=SLOW_BAUD), reply_timeout_s=2.0))
-    slow.open()
+def test_a_line_that_is_never_silent_is_no_connection(slow_driver: ModbusRtuDriver, scripted: ScriptedDevice) -> None:
     stop = threading.Event()
 
     def babble() -> None:
@@ -258,15 +264,14 @@ def test_a_line_that_is_never_silent_is_no_connection(scripted: ScriptedDevice) 
         while not any("the line is never silent" in each for each in heard):
             assert time.monotonic() < end_s, heard
             try:  # its gaps may let a request through; then the babble is noise
-                slow.open()
-                slow.exchange(PUSH_PA)
+                slow_driver.open()
+                slow_driver.exchange(PUSH_PA)
             except DriverError as error:
                 heard.append(str(error))
     finally:
         stop.set()
         thread.join()
-    recovers(slow, scripted)
-    slow.close()
+    recovers(slow_driver, scripted)
 
 
 # A reply on a serial line carries nothing that says which request it answers.

@@ -8,7 +8,7 @@ What is left are stairs that no derivative sees: a break-away one sample early o
 either side over five hundredths, the lowest step taken and the descent begun again there, until the parameters stay.
 """
 
-import math
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +83,7 @@ def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
     return there if error.cost(there, stage.scale) < error.cost(z, stage.scale) else z
 
 
-def settled(error: SimulationError, z: Vector, scanned_below: float = math.inf) -> Vector:
+def settled(error: SimulationError, z: Vector, scanned_below: float = inf) -> Vector:
     """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower.
 
     Args:

@@ -20,8 +20,6 @@ FINAL, MIDDLE = 5.0, 30.0
 """Scales, in sigma: of the cost by which fits are compared, and of that by which starts are chosen."""
 HOPELESS = 1e6
 """What a residual that is not finite counts, in sigma."""
-
-
 INSIDE, SHARPER = 0.49, 0.1
 """Of a quantum: what is well inside its half; of the noise: how far outside counts, where a sensor rounds."""
 

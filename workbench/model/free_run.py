@@ -13,6 +13,7 @@ of the measurements at its ends. A measured load acts as the pressure load / A b
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,6 +69,18 @@ class InitialState:
     velocity_m_per_s: float
 
 
+class Segment(NamedTuple):
+    """A stretch of a record without a gap, rows first to end (half open), as it is simulated."""
+
+    first: int
+    end: int
+    begin: InitialState
+    periods_s: Column
+    """Between its samples, s."""
+    step_s: float
+    """Longest of the integration, s."""
+
+
 class FreeRun:
     """A composition made ready to run through a record, for one parameter vector after another.
 
@@ -87,10 +100,8 @@ class FreeRun:
         self._drive_pa = _measured(record) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
-        self._starts = [initial_state(record, first, end) for first, end in record.segments]
-        self._periods_s = [np.diff(record.time_s[first:end]) for first, end in record.segments]
         longest_s = accuracy.steps * self._composition.step_s
-        self._steps_s = [min(float(each.max()), longest_s) for each in self._periods_s]
+        self._segments = [_segment(record, first, end, longest_s) for first, end in record.segments]
 
     def run(self, theta: Vector) -> Run:
         """Simulate; theta, (parameters,), as `composition.names`."""
@@ -98,8 +109,7 @@ class FreeRun:
         load_n = self.record.load_n
         drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
         rows = np.full((4, len(self.record)), np.nan)
-        segments = zip(self.record.segments, self._starts, self._periods_s, self._steps_s, strict=True)
-        for (first, end), begin, periods_s, step_s in segments:
+        for first, end, begin, periods_s, step_s in self._segments:
             state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
             held_pa = drive_pa[first : end - 1]
             path = follow(self._composition, vector, state, held_pa, periods_s, step_s, self._tolerance)
@@ -120,6 +130,11 @@ class FreeRun:
             direction = float(np.sign(begin.velocity_m_per_s))
             write(state, read(state)._replace(v=begin.velocity_m_per_s, mode=SLIP, sigma=direction))
         return state
+
+
+def _segment(record: Record, first: int, end: int, longest_s: float) -> Segment:
+    periods_s = np.diff(record.time_s[first:end])
+    return Segment(first, end, initial_state(record, first, end), periods_s, min(float(periods_s.max()), longest_s))
 
 
 def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
