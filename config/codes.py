@@ -77,6 +77,9 @@ class InhibitReason(Code):
     LAW_BEYOND_LIMITS = 8, "the law asks for a pressure beyond the limits"
     STUCK = 9, "stuck: the strongest pulse allowed does not move the stem"
     TRIM_ENDED = 10, "the trim ended outside its dead band"
+    EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond the limit set"
+    EXCURSION_WAITS = 12, "a small move waits, for the last excursion was too recent"
+    STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"
 
 
 class Refusal(Code):
@@ -110,6 +113,12 @@ class Refusal(Code):
         "only b/c and k/c can be known",
     )
     MODEL_DOES_NOT_FIT = 20, "the motion is not that of the model: the residuals outweigh the sensor's noise"
+    LANDINGS_TOO_FEW = 21, "too few slides have ended in rest, or all in one direction"
+    LANDINGS_NOT_STRAIGHT = 22, "the landings lie on no straight line: spring or friction change over the travel"
+    CONTRADICTED_BY_LANDINGS = (
+        23,
+        "slides land elsewhere than this says: a preload, or unlike friction up and down",
+    )
 
 
 class Ne107Status(Code):

@@ -85,6 +85,10 @@ class IdentificationTable(Schema):
         return self
 
 
+NARROWEST_WINDOW = 0.2
+"""Of the stroke, for a staircase."""
+
+
 class ExcitationTable(Schema):
     """Table `[excitation]`: what S3 applies until the DCS writes otherwise, and how long at the most."""
 
@@ -92,6 +96,19 @@ class ExcitationTable(Schema):
     beta_pa: NonNegative = 13238.0
     omega_rad_per_s: Positive = 1.0
     limit_s: Positive = 10.0
+    kind: Literal["sine", "staircase"] | None = None
+    """A sine for a fast loop, a staircase of slides for any; where nobody says, the law of slides has the staircase."""
+    travel_window: tuple[Fraction, Fraction] = (0.1, 0.9)
+    """Where the staircase may take the stem, as shares of the stroke."""
+    staircase_limit_s: Positive = 600.0
+    """The staircase ends by itself after this."""
+
+    @model_validator(mode="after")
+    def _window_is_open(self) -> Self:
+        low, high = self.travel_window
+        if high - low < NARROWEST_WINDOW:
+            raise ValueError(f"travel_window must be at least {NARROWEST_WINDOW:g} wide, it is {low:g} to {high:g}")
+        return self
 
 
 class LawTable(Schema):
@@ -104,11 +121,15 @@ class LawTable(Schema):
 class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what the law for small moves may do."""
 
-    law: Literal["seed", "breakaway"] = "seed"
+    law: Literal["seed", "breakaway", "slides"] = "seed"
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
     push_limit_pa: Positive | None = None
     """The most a pulse may push beyond the balance of the moving stem; F_c / A as identified where nobody says."""
+    excursion_limit: Fraction = 0.2
+    """How far the law of slides may take the stem beyond a small move, as a share of the stroke."""
+    excursion_interval_s: NonNegative = 0.0
+    """Least time between two such excursions."""
 
 
 class SupervisoryTable(Schema):

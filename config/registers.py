@@ -149,6 +149,12 @@ ESTIMATES = (
     Register("refusals", 249, "uint16", "1", "how many were refused, wraps"),
     Register("refusal", 250, "uint16", "1", "why the last one was refused, as in *_reason; 0: it was applied"),
     *_estimate_registers_of("breakaway", 252, "Pa", "static friction F_s / A, from where the stem broke away"),
+    *_estimate_registers_of("static_slope", 260, "Pa/m", "k_s / A of the static law, from landings"),
+    *_estimate_registers_of("static_up", 266, "Pa", "friction and preload after a slide up, (F_c + F_0) / A"),
+    *_estimate_registers_of("static_down", 272, "Pa", "friction less preload after a slide down, (F_c - F_0) / A"),
+    Register("landings", 278, "uint16", "1", "slides that ended in rest, which the static law is taken from"),
+    Register("static_residual", 280, "float32", "p.u.", "how far landings lie off the static law, standard deviation"),
+    Register("offset_applied", 282, "float32", "Pa", "(up - down) / 2 as the law uses it; 0 in the seed's model"),
 )
 
 STATISTICS = (

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from positioner.estimation.batch import BatchResult
+    from positioner.estimation.recording_estimates import RecordingEstimates
 
 HELP = "identify a, b, c, k and their ratios from a recording; exit status 1 if not even the ratios are valid"
 EXAMPLE = "positioner estimate rec.csv --json estimated.json"
@@ -36,23 +36,25 @@ def run(arguments: argparse.Namespace) -> int:
     recording = Recording.read(arguments.recording)
     with naming({"noise_std_m": "--noise-m"}):
         estimated = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held)
-    found = estimated.found
     print(f"{arguments.recording}: {estimated.summary()}")
     if arguments.json is not None:
         try:
-            arguments.json.write_text(json.dumps(as_json(found), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            arguments.json.write_text(
+                json.dumps(as_json(estimated), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+            )
         except OSError as error:
             raise InputError(f"--json {arguments.json}", f"cannot be written: {error.strerror}") from None
-    return 0 if found.estimates.law_ready else 1
+    return 0 if estimated.law_ready else 1
 
 
-def as_json(found: "BatchResult") -> dict[str, object]:
+def as_json(estimated: "RecordingEstimates") -> dict[str, object]:
     """Return the numbers: per name value, std, valid and reason; null where there is none."""
     from positioner.estimation.recording_estimates import UNITS
 
-    numbers: dict[str, object] = {name: _one(getattr(found.estimates, name)) for name in UNITS}
+    found, law = estimated.found, estimated.static_law
+    numbers: dict[str, object] = {name: _one(getattr(estimated.estimates, name)) for name in UNITS}
     return numbers | {
-        "breakaway_pa": _one(found.estimates.breakaway),
+        "breakaway_pa": _one(estimated.estimates.breakaway),
         "noise_std_m": found.noise_std_m,
         "residual_std_m": found.fit.residual_std_m if found.fit is not None else None,
         "condition": _finite(found.condition),
@@ -60,6 +62,14 @@ def as_json(found: "BatchResult") -> dict[str, object]:
         "time_stamps_evened": found.evened,
         "motions": found.segments,
         "left_out": found.left_out,
+        "static_law": {
+            "slope_pa_per_m": _one(law.slope),
+            "up_pa": _one(law.up),
+            "down_pa": _one(law.down),
+            "offset_pa": _one(law.offset),
+            "landings": law.landings,
+            "residual_m": _finite(law.residual_m),
+        },
     }
 
 

@@ -18,7 +18,7 @@ HELP = "closed loop in virtual time: identify first, then follow a reference"
 EXAMPLE = "positioner play seed --reference reference.csv --noise-m 1e-5 -o run.csv"
 
 IDENTIFY_S = 1.5
-"""Time given to the identification before the reference begins."""
+"""Time given to the identification by a sine before the reference begins; one by slides takes what it takes."""
 ROUNDING_S = 1e-9
 """What a sum of periods may fall short of a time by rounding."""
 
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
     parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
-    parser.add_argument("--law", choices=("seed", "breakaway"), default="seed", help="the control law (seed)")
+    parser.add_argument("--law", choices=("seed", "breakaway", "slides"), default="seed", help="the control law (seed)")
     parser.add_argument("--period-s", type=float, default=1e-3, help="period of the loop (1e-3)")
     parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
     parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.recording import write_recording
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
-    from positioner.virtual.virtual_cycle import played, virtual_cycle
+    from positioner.virtual.virtual_cycle import identified, played, virtual_cycle
     from sim.slave.modbus_slave import device_of
 
     path = find_valve(arguments.valve)
@@ -49,10 +49,13 @@ def run(arguments: argparse.Namespace) -> int:
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
     daemon, slave = _files(arguments, valve)
     cycle = virtual_cycle(daemon, device_of(slave, path), _first_requests(valve))
-    script = _script(time_s, reference_m)
-    until_s = IDENTIFY_S + float(time_s[-1] - time_s[0])
-    snapshots = list(played(cycle, script, until_s))
-    write_recording(arguments.out, _recording(snapshots, float(time_s[0]) - IDENTIFY_S, valve.name))
+    by_slides = arguments.law == "slides"
+    snapshots = list(
+        identified(cycle, daemon.excitation.staircase_limit_s if by_slides else IDENTIFY_S, wait=not by_slides)
+    )
+    begin_s = snapshots[-1].sample.time_s
+    snapshots += list(played(cycle, _script(time_s, reference_m, begin_s), begin_s + float(time_s[-1] - time_s[0])))[1:]
+    write_recording(arguments.out, _recording(snapshots, float(time_s[0]) - begin_s, valve.name))
     last = snapshots[-1].decision
     ratios = last.applied.ratios
     if ratios is None:
@@ -109,17 +112,14 @@ def _first_requests(valve: "ValveParameters") -> "Requests":
     )
 
 
-def _script(time_s: "Column", reference_m: "Column") -> "Script":
-    """Return a DCS that has the valve identified and then writes the reference."""
+def _script(time_s: "Column", reference_m: "Column", begin_s: float) -> "Script":
+    """Return a DCS that writes the reference, from a time of the device on, s."""
     import numpy as np
 
     from positioner.control.requests import QUIET
 
     def ask(snapshot: "Snapshot", requests: "Requests") -> "Requests":
-        elapsed_s = snapshot.sample.time_s - IDENTIFY_S + ROUNDING_S
-        if elapsed_s < 0:
-            identified = snapshot.decision.estimates.progress >= 1
-            return replace(requests, eta=QUIET if identified else (0, 0, 0))
+        elapsed_s = snapshot.sample.time_s - begin_s + ROUNDING_S
         wanted_m = float(reference_m[int(np.searchsorted(time_s, time_s[0] + elapsed_s, side="right")) - 1])
         new = wanted_m != requests.reference_m or not requests.reference_writes
         return replace(requests, eta=QUIET, reference_m=wanted_m, reference_writes=requests.reference_writes + int(new))

@@ -8,6 +8,9 @@ real time.
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
     balance_law                                 the seed's law: the pressure that balances spring and friction
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
+    slide_law, slide_memory, local_balance      the law of slides: how far a slide is sent, and what pressure lands it
     pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress
-    rest_detector, sine_excitation              where the stem rests; the excitation of S3
+    rest_detector                               where the stem rests
+    excitation                                  S3: which excitation is under way, and when it ends
+    sine_excitation, staircase_excitation       a sine, or a staircase of slides
 """

@@ -8,28 +8,25 @@ from dataclasses import dataclass, replace
 
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control import breakaway_law as breakaway
+from positioner.control import slide_law as slides
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawayMemory, Observation, initial_memory
+from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
-from positioner.control.sine_excitation import SineExcitation
+from positioner.control.slide_memory import SlideMemory, StemObservation
+from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import SupervisionMemory, supervise, usable
 from positioner.estimation.acceptance import Applied, accept
 from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_identification import StaticIdentification
+from positioner.estimation.landings.static_law import StaticLaw
 from positioner.estimation.online import Identification
 from positioner.estimation.refiner import Refiner
-
-
-@dataclass(frozen=True, slots=True)
-class ActiveExcitation:
-    """An excitation under way, or one that ended by its time limit and waits for eta_1 = 1."""
-
-    sine: SineExcitation
-    start_s: float
-    ended: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +53,9 @@ class ControllerMemory:
     excitation: ActiveExcitation | None
     identifying: bool
     breakaway: BreakawayMemory | None
-    """Of the law for small moves; None: the seed's law."""
+    """Of the law for small moves by pulses; None: another law."""
+    slides: SlideMemory | None
+    """Of the law of slides; None: another law."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +72,7 @@ class Decision:
     sample_age_s: float
     estimates: Estimates
     applied: Applied
+    static_law: StaticLaw
 
 
 class Controller:
@@ -81,6 +81,7 @@ class Controller:
     def __init__(self, settings: Settings, held_pa: float, refiner: Refiner | None = None) -> None:
         self._settings = settings
         self._identification = Identification(settings.identification, refiner)
+        self._statics = StaticIdentification(settings.limits.stroke_m)
         self._memory = ControllerMemory(
             command_pa=held_pa,
             held_pa=held_pa,
@@ -92,6 +93,7 @@ class Controller:
             excitation=None,
             identifying=False,
             breakaway=initial_memory(settings.breakaway) if settings.breakaway else None,
+            slides=SlideMemory(level_pa=held_pa) if settings.slides else None,
         )
 
     @property
@@ -101,19 +103,42 @@ class Controller:
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
-        self._memory, decision = step(self._memory, sample, requests, self._settings, self._identification)
+        self._memory, decision = step(
+            self._memory, sample, requests, self._settings, self._identification, self._statics
+        )
         return decision
 
 
 def step(
-    memory: ControllerMemory, sample: Sample, requests: Requests, settings: Settings, identification: Identification
+    memory: ControllerMemory,
+    sample: Sample,
+    requests: Requests,
+    settings: Settings,
+    identification: Identification,
+    statics: StaticIdentification,
 ) -> tuple[ControllerMemory, Decision]:
     """Return what is remembered and what is decided after one sample."""
     supervision = supervise(memory.supervision, sample, memory.command_pa, requests, settings.limits)
     consumed = _consumed(memory, supervision.mode, requests)
     reference = _reference(memory, supervision.mode, consumed, sample, requests, settings)
-    excitation, excitation_inhibit = _excitation(memory, supervision.mode, reference, sample, requests, settings)
-    identifying, applied = _identify(memory, excitation, sample, requests, settings, identification)
+    excitation, excitation_inhibit = excitation_after(
+        memory.excitation,
+        supervision.mode,
+        sample,
+        requests,
+        settings,
+        held_pa=memory.command_pa,
+        balanced_pa=_balanced_pa(memory, reference),
+    )
+    if excitation is not None and memory.excitation is None:
+        statics.restart()
+    outcome = _slide_outcome(memory, sample, settings, statics)
+    if excitation is not None:
+        excitation = climbed(excitation, outcome, statics, settings)
+        excitation_inhibit = excitation.inhibit_reason
+    identifying, applied = _identify(memory, excitation, sample, requests, settings, identification, statics)
+    if outcome is not None and outcome.landing:
+        applied = statics.corrected(applied)
     situation = Situation(
         automatic=supervision.mode is Mode.AUTOMATIC,
         exciting=excitation is not None and not excitation.ended,
@@ -123,6 +148,7 @@ def step(
     state = state_in(situation)
     held_pa = _held_pa(memory, state, supervision, sample)
     breakaway_memory = _breakaway_memory(memory, state, reference, sample, settings, applied, identification.estimates)
+    slide_memory = _slide_memory(memory, state, reference, sample, settings, applied, outcome, statics)
 
     if supervision.fault is not Fault.NONE:
         wanted_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
@@ -130,7 +156,7 @@ def step(
         wanted_pa = requests.manual_pa
     else:
         wanted_pa = _pressure_pa(
-            state, held_pa, excitation, sample.now_s, reference, applied, settings, breakaway_memory
+            state, held_pa, excitation, sample.now_s, reference, applied, settings, breakaway_memory or slide_memory
         )
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
 
@@ -139,8 +165,9 @@ def step(
     )
     if inhibit_reason is InhibitReason.NOTHING and command_pa != wanted_pa:
         inhibit_reason = InhibitReason.LAW_BEYOND_LIMITS
-    if inhibit_reason is InhibitReason.NOTHING and breakaway_memory is not None:
-        inhibit_reason = breakaway_memory.inhibit_reason
+    small_moves = breakaway_memory or slide_memory
+    if inhibit_reason is InhibitReason.NOTHING and small_moves is not None:
+        inhibit_reason = small_moves.inhibit_reason
     decision = Decision(
         command_pa=command_pa,
         state=state,
@@ -150,11 +177,22 @@ def step(
         reference_m=reference.value_m,
         delta_r_m=reference.delta_m,
         sample_age_s=sample.now_s - supervision.good_s,
-        estimates=identification.estimates,
+        estimates=_estimates(excitation, identification, statics),
         applied=applied,
+        static_law=statics.law,
     )
     return ControllerMemory(
-        command_pa, held_pa, supervision, reference, applied, consumed, state, excitation, identifying, breakaway_memory
+        command_pa,
+        held_pa,
+        supervision,
+        reference,
+        applied,
+        consumed,
+        state,
+        excitation,
+        identifying,
+        breakaway_memory,
+        slide_memory,
     ), decision
 
 
@@ -189,34 +227,7 @@ def _reference_at_stem(memory: ControllerMemory, sample: Sample, settings: Setti
     return Reference(sample.position_m if usable(sample, settings.limits) else memory.reference.value_m)
 
 
-def _excitation(
-    memory: ControllerMemory, mode: Mode, reference: Reference, sample: Sample, requests: Requests, settings: Settings
-) -> tuple[ActiveExcitation | None, InhibitReason]:
-    """Return the excitation under way, and what inhibits one that was asked for."""
-    if mode is not Mode.AUTOMATIC or requests.eta[0] != 0:
-        return None, InhibitReason.NOTHING
-    excitation = memory.excitation
-    if excitation is None:
-        return _begin_excitation(memory, reference, sample, requests, settings)
-    if excitation.ended:
-        return excitation, InhibitReason.EXCITATION_TOO_LONG
-    if sample.now_s - excitation.start_s > settings.excitation_limit_s:
-        return replace(excitation, ended=True), InhibitReason.EXCITATION_TOO_LONG
-    return excitation, InhibitReason.NOTHING
-
-
-def _begin_excitation(
-    memory: ControllerMemory, reference: Reference, sample: Sample, requests: Requests, settings: Settings
-) -> tuple[ActiveExcitation | None, InhibitReason]:
-    alpha_pa = requests.alpha_pa if requests.alpha_pa > 0 else _default_alpha_pa(memory, reference)
-    sine = SineExcitation(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
-    excitation_inhibit = sine.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
-    return (
-        ActiveExcitation(sine, sample.now_s) if excitation_inhibit is InhibitReason.NOTHING else None
-    ), excitation_inhibit
-
-
-def _default_alpha_pa(memory: ControllerMemory, reference: Reference) -> float:
+def _balanced_pa(memory: ControllerMemory, reference: Reference) -> float:
     """Return the constant pressure that keeps the stem near its reference (seed, 4.1)."""
     ratios = memory.applied.ratios
     if ratios is None:
@@ -231,12 +242,17 @@ def _identify(
     requests: Requests,
     settings: Settings,
     identification: Identification,
+    statics: StaticIdentification,
 ) -> tuple[bool, Applied]:
     """Run the estimators while eta_2 or eta_3 asks for it; what they find is applied when they are switched off."""
     parameters, friction = requests.eta[1] == 0, requests.eta[2] == 0
     wanted = (parameters or friction) and not (excitation is not None and excitation.ended)
     if not wanted:
-        return False, accept(memory.applied, identification.estimates) if memory.identifying else memory.applied
+        if not memory.identifying:
+            return False, memory.applied
+        if memory.excitation is not None and memory.excitation.by_slides:
+            return False, statics.accepted(memory.applied)
+        return False, accept(memory.applied, statics.tested(identification.estimates))
     if not memory.identifying or (excitation is not None and memory.excitation is None):
         identification.restart()
     moves_before = identification.moves
@@ -251,7 +267,26 @@ def _identify(
         )
     # No excitation ends, so the estimates of ordinary moves are applied move by move.
     move_identified = identification.moves != moves_before
-    return True, accept(memory.applied, identification.estimates) if move_identified else memory.applied
+    return True, accept(memory.applied, statics.tested(identification.estimates)) if move_identified else memory.applied
+
+
+def _slide_outcome(
+    memory: ControllerMemory, sample: Sample, settings: Settings, statics: StaticIdentification
+) -> SlideOutcome | None:
+    """Return what the last change of the command did to the stem, in the step in which that is known."""
+    if not usable(sample, settings.limits):
+        return None
+    return statics.update(sample.now_s, sample.position_m, memory.command_pa, sample.pressure_pa)
+
+
+def _estimates(
+    excitation: ActiveExcitation | None, identification: Identification, statics: StaticIdentification
+) -> Estimates:
+    """Return the estimates as tested on the landings; the progress of a staircase is its own."""
+    estimates = statics.tested(identification.estimates)
+    if excitation is None or not isinstance(excitation.signal, Staircase):
+        return estimates
+    return replace(estimates, progress=excitation.signal.progress if statics.law.valid else 0.0)
 
 
 def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMemory, sample: Sample) -> float:
@@ -286,6 +321,33 @@ def _breakaway_memory(
     return breakaway.while_not_commanding(memory.breakaway, observation, memory.command_pa)
 
 
+def _slide_memory(
+    memory: ControllerMemory,
+    state: State,
+    reference: Reference,
+    sample: Sample,
+    settings: Settings,
+    applied: Applied,
+    outcome: SlideOutcome | None,
+    statics: StaticIdentification,
+) -> SlideMemory | None:
+    """Return what the law of slides remembers after this step, if it is the law."""
+    if memory.slides is None or settings.slides is None:
+        return None
+    if state not in (State.S1_UP, State.S2_DOWN) or applied.ratios is None:
+        return slides.while_not_commanding(memory.slides, memory.command_pa)
+    observation = StemObservation(
+        now_s=sample.now_s,
+        position_m=sample.position_m,
+        usable=usable(sample, settings.limits),
+        rest=statics.detector.rest,
+        quantum_m=statics.detector.quantum_m,
+        outcome=outcome,
+    )
+    balance = slides.Balance(applied.ratios, statics.landings, settings.limits.stroke_m)
+    return slides.step(memory.slides, observation, reference.value_m, balance, settings.slides)
+
+
 def _pressure_pa(
     state: State,
     held_pa: float,
@@ -294,13 +356,13 @@ def _pressure_pa(
     reference: Reference,
     applied: Applied,
     settings: Settings,
-    breakaway_memory: BreakawayMemory | None,
+    small_moves: BreakawayMemory | SlideMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
     if state is State.S3_IDENTIFY and excitation is not None:
-        return excitation.sine.pressure_pa(now_s - excitation.start_s)
+        return excitation.pressure_pa(now_s)
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
-        if breakaway_memory is not None:
-            return breakaway_memory.level_pa
+        if small_moves is not None:
+            return small_moves.level_pa
         return settings.law(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
     return held_pa

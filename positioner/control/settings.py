@@ -7,6 +7,8 @@ from config.daemon_file import DaemonFile, LawTable
 from config.quantities import ActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
+from positioner.control.slide_memory import SlideSettings
+from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.online import IdentificationSettings
@@ -31,7 +33,11 @@ class Settings:
     law: Callable[[float, int, Ratios], float]
     """Without a memory, see `LAWS`; what commands unless `breakaway` does."""
     breakaway: BreakawaySettings | None
-    """Of the law for small moves; None: `law` commands."""
+    """Of the law for small moves by pulses; None: another commands."""
+    slides: SlideSettings | None
+    """Of the law of slides; None: another commands."""
+    staircase: StaircaseLimits | None
+    """Of the excitation by slides; None: it is a sine."""
 
     @classmethod
     def of(cls, file: DaemonFile) -> "Settings":
@@ -51,7 +57,7 @@ class Settings:
             minimum_pa=file.pressure.minimum_pa,
             maximum_pa=file.pressure.maximum_pa,
             breakaway_pa=file.valve.breakaway_pa,
-            excitation_limit_s=file.excitation.limit_s,
+            excitation_limit_s=file.excitation.staircase_limit_s if _by_slides(file) else file.excitation.limit_s,
             identification=IdentificationSettings(
                 stroke_m=file.valve.stroke_m,
                 pressure_pa=file.pressure.maximum_pa - file.pressure.minimum_pa,
@@ -65,6 +71,8 @@ class Settings:
             applied=Applied(_ratios(file.law) if file.law else None),
             law=LAWS.get(file.control.law, balance_pa),
             breakaway=_breakaway(file) if file.control.law == "breakaway" else None,
+            slides=_slides(file) if file.control.law == "slides" else None,
+            staircase=_staircase(file) if _by_slides(file) else None,
         )
 
     def safe_pa(self, action: ActionName, held_pa: float) -> float:
@@ -81,6 +89,27 @@ def _breakaway(file: DaemonFile) -> BreakawaySettings:
         breakaway_pa=file.valve.breakaway_pa,
         push_limit_pa=file.control.push_limit_pa,
     )
+
+
+def _by_slides(file: DaemonFile) -> bool:
+    return (file.excitation.kind or ("staircase" if file.control.law == "slides" else "sine")) == "staircase"
+
+
+def _slides(file: DaemonFile) -> SlideSettings:
+    return SlideSettings(
+        stroke_m=file.valve.stroke_m,
+        dead_band_m=file.control.dead_band * file.valve.stroke_m,
+        minimum_pa=file.pressure.minimum_pa,
+        maximum_pa=file.pressure.maximum_pa,
+        breakaway_pa=file.valve.breakaway_pa,
+        excursion_limit_m=file.control.excursion_limit * file.valve.stroke_m,
+        excursion_interval_s=file.control.excursion_interval_s,
+    )
+
+
+def _staircase(file: DaemonFile) -> StaircaseLimits:
+    low, high = (share * file.valve.stroke_m for share in file.excitation.travel_window)
+    return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa)
 
 
 def _ratios(law: LawTable) -> Ratios:

@@ -37,6 +37,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.snapshot import Snapshot
+from positioner.estimation.estimates import Estimate
 
 log = logging.getLogger(__name__)
 
@@ -199,7 +200,7 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     getters = {
         **_command_getters(stroke_m),
         **_status_getters(stroke_m),
-        **_estimate_getters(),
+        **_estimate_getters(stroke_m),
         **_statistics_getters(cycle),
         **_identity_getters(),
         **_health_getters(cycle, stroke_m),
@@ -246,27 +247,38 @@ def _status_getters(stroke_m: float) -> dict[str, Getter]:
     }
 
 
-def _estimate_getters() -> dict[str, Getter]:
+def _estimate_getters(stroke_m: float) -> dict[str, Getter]:
     getters: dict[str, Getter] = {
         "progress": lambda s, _: s.decision.estimates.progress,
         "estimate_age": lambda s, _: s.sample.time_s - s.decision.estimates.time_s,
         "b_over_c_applied": lambda s, _: r.b_over_c if (r := s.decision.applied.ratios) else math.nan,
         "k_over_c_applied": lambda s, _: r.k_over_c if (r := s.decision.applied.ratios) else math.nan,
+        "offset_applied": lambda s, _: r.offset_pa if (r := s.decision.applied.ratios) else math.nan,
+        "landings": lambda s, _: s.decision.static_law.landings,
+        "static_residual": lambda s, _: s.decision.static_law.residual_m / stroke_m,
         "identifications": lambda s, _: s.decision.applied.count & 0xFFFF,
         "refusals": lambda s, _: s.decision.applied.refusals & 0xFFFF,
         "refusal": lambda s, _: s.decision.applied.last_refusal,
     }
     for name in (*ESTIMATED, "breakaway"):
-        getters |= _estimate_getters_of(name)
+        getters |= _estimate_getters_of(name, "estimates", name)
+    for name in ("slope", "up", "down"):
+        getters |= _estimate_getters_of(f"static_{name}", "static_law", name)
     return getters
 
 
-def _estimate_getters_of(name: str) -> dict[str, Getter]:
+def _estimate_getters_of(name: str, found: str, attribute: str) -> dict[str, Getter]:
+    """Return the getters of an estimate that is an attribute of what a decision holds under `found`."""
+
+    def estimate(snapshot: Snapshot) -> Estimate:
+        one: Estimate = getattr(getattr(snapshot.decision, found), attribute)
+        return one
+
     return {
-        f"{name}_e": lambda s, _: getattr(s.decision.estimates, name).value,
-        f"{name}_std": lambda s, _: getattr(s.decision.estimates, name).std,
-        f"{name}_valid": lambda s, _: getattr(s.decision.estimates, name).valid,
-        f"{name}_reason": lambda s, _: getattr(s.decision.estimates, name).reason,
+        f"{name}_e": lambda s, _: estimate(s).value,
+        f"{name}_std": lambda s, _: estimate(s).std,
+        f"{name}_valid": lambda s, _: estimate(s).valid,
+        f"{name}_reason": lambda s, _: estimate(s).reason,
     }
 
 

@@ -12,6 +12,7 @@ time comes in with the samples.
     likelihood, likelihood_search                   the fit by maximum likelihood: result and search
     motion_preparation, linear_problem              its rows and its least squares
     stem_response, array                            the stem's exact response, which is fitted; the type of all arrays
+    landings                                        the static law, from where slides end in rest
     refiner, passive, breakaway_force               who runs a fit; from ordinary moves, one after another; F_s/A
 """
 

@@ -17,10 +17,12 @@ LARGEST_CHANGE = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Ratios:
-    """What the law needs of the valve: b/c in Pa/m and k/c in Pa, both negative."""
+    """What the law needs of the valve: b/c in Pa/m, k/c in Pa, both negative; the offset of the balance in Pa."""
 
     b_over_c: float
     k_over_c: float
+    offset_pa: float = 0.0
+    """What preload and unlike friction up and down add to the balance of either direction; 0 in the seed's model."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,9 @@ from config.results.result import Result
 from positioner.estimation.array import Array
 from positioner.estimation.batch import BatchResult, BatchSettings, identify
 from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.landings.recording_landings import recording_landings
+from positioner.estimation.landings.static_identification import StaticIdentification
+from positioner.estimation.landings.static_law import StaticLaw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,17 +39,38 @@ class RecordingEstimates(Result):
 
     found: BatchResult
     samples: int
+    statics: StaticIdentification
 
     @property
     def estimates(self) -> Estimates:
-        """a, b, c, k, b/c, k/c and the break-away pressure, each with its standard deviation or why it is refused."""
-        return self.found.estimates
+        """a, b, c, k, b/c, k/c and the break-away pressure, each with its standard deviation or why it is refused.
+
+        They are tested on the landings: friction that lands elsewhere than the stem did is refused.
+        """
+        return self.statics.tested(self.found.estimates)
+
+    @property
+    def static_law(self) -> StaticLaw:
+        """k_s/A, and friction with preload up and down, from where slides ended in rest."""
+        return self.statics.law
+
+    @property
+    def law_ready(self) -> bool:
+        """Whether the numbers of a control law are valid, from motion or from landings."""
+        return self.estimates.law_ready or self.static_law.valid
 
     @property
     def by_name(self) -> Mapping[str, tuple[Estimate, str]]:
-        """Each estimate with its unit, the break-away pressure F_s / A last."""
+        """Each estimate with its unit: of motion, the break-away pressure F_s / A, and of landings."""
         named = {name: (getattr(self.estimates, name), unit) for name, unit in UNITS.items()}
-        return named | {"F_s/A": (self.estimates.breakaway, "Pa")}
+        law = self.static_law
+        return named | {
+            "F_s/A": (self.estimates.breakaway, "Pa"),
+            "slope": (law.slope, "Pa/m"),
+            "up": (law.up, "Pa"),
+            "down": (law.down, "Pa"),
+            "offset": (law.offset, "Pa"),
+        }
 
     def blocks(self) -> list[Block]:
         """Say what was fitted, and each estimate or why it is refused."""
@@ -66,6 +90,8 @@ class RecordingEstimates(Result):
             f"noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples{stamps}",
             Table(("", "value", "std", "unit", ""), rows),
             *quality,
+            f"{self.static_law.landings} landings"
+            + (f"; they lie {self.static_law.residual_m:.3g} m off the static law" if self.static_law.valid else ""),
         ]
 
     def frame_columns(self) -> dict[str, list[object]]:
@@ -116,7 +142,7 @@ def estimate(
         raise InputError("noise_std_m", f"must be positive, it is {noise_std_m:g}")
     pressure_pa, settings = _pressure(recording, noise_std_m, pressure_held)
     found = identify(recording.time_s, recording.position_m, pressure_pa, settings)
-    return RecordingEstimates(found, len(recording))
+    return RecordingEstimates(found, len(recording), recording_landings(recording))
 
 
 def _pressure(

@@ -5,11 +5,12 @@ the device's clock. The device is the one that the slaves on a bus serve, so the
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from config.daemon_file import DaemonFile
 from drivers.in_memory import MemoryDriver, Plant
 from positioner.control.controller import Controller
-from positioner.control.requests import Requests
+from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, HealthSettings
@@ -30,6 +31,24 @@ def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests) -> Cycl
     health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
     controller = Controller(Settings.of(daemon), held_pa, InProcessRefiner())
     return Cycle(link, controller, pace, requests, recorder=None, health=health)
+
+
+def identified(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapshot]:
+    """Yield the snapshots of an identification: eta switches it on until it is complete.
+
+    Args:
+        cycle: of a valve in automatic.
+        within_s: time that it may take at the most, s.
+        wait: whether to let all of that time pass.
+    """
+
+    def ask(snapshot: Snapshot, requests: Requests) -> Requests:
+        return replace(requests, eta=QUIET if snapshot.decision.estimates.progress >= 1 else (0, 0, 0))
+
+    for snapshot in played(cycle, ask, cycle.snapshot.sample.time_s + within_s):
+        yield snapshot
+        if snapshot.decision.applied.count and not wait:
+            return
 
 
 def played(cycle: Cycle, script: Script, until_s: float) -> Iterator[Snapshot]:

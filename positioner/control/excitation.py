@@ -1,0 +1,90 @@
+"""The excitation under way in S3: a sine as the DCS asks for it, or a staircase of slides, and when it ends.
+
+S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or a staircase that came to nothing, has
+ended: S3 is left, and only eta_1 = 1 makes room for another.
+"""
+
+from dataclasses import dataclass, replace
+
+from config.codes import InhibitReason, Mode
+from positioner.control.requests import Requests
+from positioner.control.sample import Sample
+from positioner.control.settings import Settings
+from positioner.control.sine_excitation import SineExcitation
+from positioner.control.staircase_excitation import Staircase
+from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_identification import StaticIdentification
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveExcitation:
+    """An excitation under way, or one that has ended and waits for eta_1 = 1; `inhibit_reason` then says why."""
+
+    signal: SineExcitation | Staircase
+    start_s: float
+    inhibit_reason: InhibitReason = InhibitReason.NOTHING
+
+    @property
+    def ended(self) -> bool:
+        """Whether S3 is over."""
+        return self.inhibit_reason is not InhibitReason.NOTHING
+
+    @property
+    def by_slides(self) -> bool:
+        """Whether it is a staircase."""
+        return isinstance(self.signal, Staircase)
+
+    def pressure_pa(self, now_s: float) -> float:
+        """Return the pressure at a time, Pa."""
+        if isinstance(self.signal, Staircase):
+            return self.signal.level_pa
+        return self.signal.pressure_pa(now_s - self.start_s)
+
+
+def excitation_after(
+    excitation: ActiveExcitation | None,
+    mode: Mode,
+    sample: Sample,
+    requests: Requests,
+    settings: Settings,
+    held_pa: float,
+    balanced_pa: float,
+) -> tuple[ActiveExcitation | None, InhibitReason]:
+    """Return the excitation under way, and what inhibits one that was asked for.
+
+    Args:
+        excitation: before.
+        mode: in force.
+        sample: the latest.
+        requests: of the DCS.
+        settings: limits, and which excitation.
+        held_pa: the last command, from which a staircase begins.
+        balanced_pa: about which a sine swings where nobody says alpha.
+    """
+    if mode is not Mode.AUTOMATIC or requests.eta[0] != 0:
+        return None, InhibitReason.NOTHING
+    if excitation is not None:
+        if not excitation.ended and sample.now_s - excitation.start_s > settings.excitation_limit_s:
+            excitation = replace(excitation, inhibit_reason=InhibitReason.EXCITATION_TOO_LONG)
+        return excitation, excitation.inhibit_reason
+    if settings.staircase is not None:
+        return ActiveExcitation(Staircase(held_pa), sample.now_s), InhibitReason.NOTHING
+    alpha_pa = requests.alpha_pa if requests.alpha_pa > 0 else balanced_pa
+    sine = SineExcitation(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
+    inhibit_reason = sine.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
+    if inhibit_reason is not InhibitReason.NOTHING:
+        return None, inhibit_reason
+    return ActiveExcitation(sine, sample.now_s), inhibit_reason
+
+
+def climbed(
+    excitation: ActiveExcitation, outcome: SlideOutcome | None, statics: StaticIdentification, settings: Settings
+) -> ActiveExcitation:
+    """Return a staircase with its next step, if the stem rests; any other excitation as it is."""
+    stairs, rest = excitation.signal, statics.detector.rest
+    if not isinstance(stairs, Staircase) or settings.staircase is None or excitation.ended or rest is None:
+        return excitation
+    if stairs.over(statics.law.valid):
+        valid = statics.law.valid
+        return excitation if valid else replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
+    return replace(excitation, signal=stairs.after(outcome, rest.position_m, settings.staircase))

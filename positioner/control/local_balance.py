@@ -1,0 +1,45 @@
+"""The pressure that lands a slide at a position: the straight law, corrected by the landings near it.
+
+    B(x, s) = κ x + s φ + offset + Σ w_j e_j / (w_0 + Σ w_j)       e_j = p_j - (κ x_j + s φ + offset),  s_j = s
+    w_j = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
+
+Where spring or friction change over the travel no straight law holds, but a slide to x that missed says what is
+missing there: the next one lands. w_0 holds the correction back where there is little to go by.
+"""
+
+from collections.abc import Iterable
+from math import exp
+
+from positioner.control.balance_law import balance_pa
+from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.landing_detector import SlideOutcome
+
+WIDTH = 0.04
+"""h, of the stroke."""
+FADING = 0.7
+"""ρ"""
+HELD_BACK = 0.1
+"""w_0"""
+
+
+def landing_pa(
+    position_m: float, direction: int, ratios: Ratios, landings: Iterable[SlideOutcome], stroke_m: float
+) -> float:
+    """Return the pressure, Pa, under which a slide up (+1) or down (-1) lands at a position, m.
+
+    Args:
+        position_m: where it is to land.
+        direction: of the slide.
+        ratios: the straight law.
+        landings: the latest first.
+        stroke_m: full travel.
+    """
+    weighted_pa, weights, age = 0.0, HELD_BACK, 1.0
+    for each in landings:
+        if each.direction != direction:
+            continue
+        weight = age * exp(-(((each.position_m - position_m) / (WIDTH * stroke_m)) ** 2) / 2)
+        weighted_pa += weight * (each.command_pa - balance_pa(each.position_m, direction, ratios))
+        weights += weight
+        age *= FADING
+    return balance_pa(position_m, direction, ratios) + weighted_pa / weights

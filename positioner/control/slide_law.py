@@ -1,0 +1,212 @@
+"""The law of slides: a stem that slides into rest lands where spring and friction balance, however slow the loop.
+
+    B(x, s)    pressure under which a slide in direction s lands at x            (local_balance.py)
+    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_memory.py)
+
+With the stem at rest at x, e = r - x and s = sign(e):
+
+    abs(e) <= dead band              nothing
+    abs(e) >= m_s                    one slide:   u = B(r, s)
+    else                             two slides:  u = B(r + s M, s), wait until it rests, u = B(r, -s)
+                                                  M = max(1.05 m_-s, m_s - abs(e))
+
+The first of two slides leaves the way between x and r by M: an excursion. It goes the other way round,
+by r - s M with M = max(1.05 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits.
+Only resting times depend on the period of the loop, not where the stem lands.
+
+While the stem moves, a reference that goes on in the same direction, or lies far enough the other way, is followed at
+once; another waits for the rest. Why there is no limit cycle: what a slide missed corrects B for the next (each miss is
+a fraction of the one before), the dead band widens from slide to slide, and their number is limited. After the end of a
+move nothing happens until the reference changes, or something else has visibly moved the stem.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from config.codes import InhibitReason
+from positioner.control.local_balance import landing_pa
+from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
+from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.landing_detector import SlideOutcome
+
+RETURN = 1.05
+"""Margins that the second slide is given, for a stem must not stay where the first took it."""
+FIRST_MARGIN = 0.1
+"""Of F_c/k_s: the first margin, where nothing is known of static friction."""
+FAR = 2.0
+"""Margins beyond which a stem that moves is sent the other way."""
+WITHIN_NOISE, WITHIN_QUANTUM = 2.5, 0.6
+"""Deviations of a mean, and quanta, that an error may be."""
+WIDENS, FREE_SLIDES = 1.5, 4
+"""Factor on the dead band for each two slides beyond the first few."""
+MOST_SLIDES = 14
+"""Given for one reference."""
+REFILL_S = 60.0
+"""At rest, after this time each, two slides come back to the number that is left."""
+STUCK_MARGIN = 3.0
+"""Of F_c/k_s: a margin beyond it moves nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """What the law knows of the valve: the straight law and the landings, the latest first."""
+
+    ratios: Ratios
+    landings: Sequence[SlideOutcome]
+    stroke_m: float
+
+    def pressure_pa(self, position_m: float, direction: int) -> float:
+        """Return B(x, s), Pa."""
+        return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
+
+    def position_m(self, from_m: float, pressure_pa: float, direction: int) -> float:
+        """Return where a slide under a pressure lands, m, by the balance at the place it starts from."""
+        return from_m + (pressure_pa - self.pressure_pa(from_m, direction)) / -self.ratios.b_over_c
+
+    @property
+    def friction_m(self) -> float:
+        """F_c/k_s, m."""
+        return self.ratios.k_over_c / self.ratios.b_over_c
+
+
+def while_not_commanding(memory: SlideMemory, command_pa: float) -> SlideMemory:
+    """Return the memory while another state commands: nothing of a move."""
+    return replace(
+        memory, level_pa=command_pa, target_m=None, direction=0, excursion=False, inhibit_reason=InhibitReason.NOTHING
+    )
+
+
+def step(
+    memory: SlideMemory, observation: StemObservation, reference_m: float, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
+    """Return what is remembered after one step of the law; its `level_pa` is the pressure asked for."""
+    if not observation.usable:
+        return memory
+    if not memory.up.way_m:
+        memory = _first_margins(memory, balance, settings)
+    if observation.outcome is not None:
+        memory = _learnt(memory, observation.outcome, balance)
+    if observation.rest is None:
+        return _redirected(memory, observation, reference_m, balance, settings)
+    if reference_m != memory.target_m:
+        memory = replace(memory, target_m=reference_m, slides=0, inhibit_reason=InhibitReason.NOTHING)
+    return _next_slide(memory, observation, balance, settings)
+
+
+def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSettings) -> SlideMemory:
+    """Return the memory with a first margin each way: the shortest slide seen, or what the data sheet says."""
+    guess_m = FIRST_MARGIN * balance.friction_m
+    if settings.breakaway_pa is not None:
+        guess_m = max(guess_m, (settings.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
+    for direction in (1, -1):
+        seen_m = [abs(each.position_m - each.from_m) for each in balance.landings if each.direction == direction]
+        margin = Margin(min(seen_m), broke=True, held=True) if seen_m else Margin(guess_m)
+        memory = memory.with_margin(direction, margin)
+    return memory
+
+
+def _learnt(memory: SlideMemory, outcome: SlideOutcome, balance: Balance) -> SlideMemory:
+    """Return the memory after a slide: its margin."""
+    s = outcome.direction
+    meant_m = s * (balance.position_m(outcome.from_m, outcome.command_pa, s) - outcome.from_m)
+    way_m = s * (outcome.position_m - outcome.from_m) if outcome.moved else meant_m
+    return memory.with_margin(s, memory.margin(s).after(way_m, outcome.moved))
+
+
+def _redirected(
+    memory: SlideMemory, observation: StemObservation, reference_m: float, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
+    """Follow a reference that changes while the stem moves, where that can be done at once."""
+    target_m = memory.target_m
+    if target_m is None or reference_m == target_m:
+        return replace(memory, target_m=reference_m)
+    s = 1 if reference_m > observation.position_m else -1
+    way_m = abs(reference_m - observation.position_m)
+    goes_on = not memory.excursion and s == memory.direction and s * (reference_m - target_m) > 0
+    if not goes_on and way_m < FAR * memory.margin(s).way_m:
+        return memory
+    level_pa = min(max(balance.pressure_pa(reference_m, s), settings.minimum_pa), settings.maximum_pa)
+    return replace(
+        memory,
+        level_pa=level_pa,
+        target_m=reference_m,
+        direction=s,
+        excursion=False,
+        slides=1,
+        slide_s=observation.now_s,
+    )
+
+
+def _next_slide(
+    memory: SlideMemory, observation: StemObservation, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
+    """End the move, or give the next slide."""
+    rest, target_m = observation.rest, memory.target_m
+    assert rest is not None
+    assert target_m is not None
+    error_m = target_m - rest.position_m
+    widened = WIDENS ** (max(0, memory.slides - FREE_SLIDES) // 2)
+    known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m)
+    if abs(error_m) <= max(settings.dead_band_m, known_m) * widened:
+        return replace(memory, inhibit_reason=InhibitReason.NOTHING)
+    again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0
+    memory = replace(memory, slides=max(0, memory.slides - 2 * again)) if again else memory
+    if memory.slides >= MOST_SLIDES:
+        stuck = max(memory.up.way_m, memory.down.way_m) > STUCK_MARGIN * balance.friction_m
+        return replace(memory, inhibit_reason=InhibitReason.STUCK if stuck else InhibitReason.TRIM_ENDED)
+    s = 1 if error_m > 0 else -1
+    if abs(error_m) >= memory.margin(s).way_m:
+        return _slide(memory, observation.now_s, target_m, s, balance, settings, excursion=False)
+    return _excursion(memory, rest.position_m, observation.now_s, balance, settings)
+
+
+def _excursion(
+    memory: SlideMemory, position_m: float, now_s: float, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
+    """Give the first of two slides, by whichever side it may."""
+    target_m = memory.target_m
+    assert target_m is not None
+    error_m = target_m - position_m
+    s = 1 if error_m > 0 else -1
+    there, back = memory.margin(s).way_m, memory.margin(-s).way_m
+    ways = (
+        (s, target_m + s * max(RETURN * back, there - abs(error_m))),
+        (-s, target_m - s * max(RETURN * there, back + abs(error_m))),
+    )
+    if now_s - memory.excursion_s < settings.excursion_interval_s:
+        return replace(memory, inhibit_reason=InhibitReason.EXCURSION_WAITS)
+    why = InhibitReason.EXCURSION_BEYOND_LIMIT
+    for direction, by_m in ways:
+        if abs(by_m - target_m) > settings.excursion_limit_m or not 0.0 <= by_m <= settings.stroke_m:
+            continue
+        if not settings.minimum_pa <= balance.pressure_pa(by_m, direction) <= settings.maximum_pa:
+            why = InhibitReason.LAW_BEYOND_LIMITS
+            continue
+        memory = replace(memory, excursion_s=now_s)
+        return _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
+    return replace(memory, inhibit_reason=why)
+
+
+def _slide(
+    memory: SlideMemory,
+    now_s: float,
+    to_m: float,
+    direction: int,
+    balance: Balance,
+    settings: SlideSettings,
+    *,
+    excursion: bool,
+) -> SlideMemory:
+    wanted_pa = balance.pressure_pa(to_m, direction)
+    level_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
+    if level_pa == memory.level_pa:  # nothing would change: what the stem does not do now it will not do then
+        return replace(memory, slides=MOST_SLIDES, slide_s=now_s)
+    return replace(
+        memory,
+        level_pa=level_pa,
+        direction=direction,
+        excursion=excursion,
+        slides=memory.slides + 1,
+        slide_s=now_s,
+        inhibit_reason=InhibitReason.NOTHING if level_pa == wanted_pa else InhibitReason.LAW_BEYOND_LIMITS,
+    )

@@ -1,0 +1,12 @@
+"""Landings: what a valve says of itself where a slide of its stem ends in rest, at any period of the loop.
+
+    p = κ x + φ_up    after a slide upward            κ = k_s/A      φ_up   = (F_c,up + F_0)/A
+    p = κ x - φ_down  after a slide downward                         φ_down = (F_c,down - F_0)/A
+
+Neither mass nor viscous friction, lag nor sampling stands in it, and a preload F_0 is no error but a parameter.
+
+    stem_at_rest, landing_detector    does the stem rest, and where; which rests are landings, sample by sample
+    static_law                        κ, φ_up, φ_down with their deviations
+    static_identification             all of it, sample by sample, and what it says of other estimates
+    recording_landings                the same from a whole recording
+"""

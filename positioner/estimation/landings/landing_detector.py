@@ -1,0 +1,179 @@
+"""Which rests are landings: sample by sample, from the command and the position.
+
+A landing ends a slide: the stem rested, the command stepped (or went on in the same direction), the stem moved that
+way visibly under the last command, and rests again. Then the balance of the moving stem holds where it rests. No
+landing is
+
+- a rest that begins while the command went to and fro: a braked stem is held by friction, anywhere in its band,
+- a rest at a stop, where the stop bears the rest,
+- a rest under a pressure that still moves (`stem_at_rest`).
+
+How long a stem takes to answer is learnt: a stem that has not moved may yet, so it is waited for as long as the longest
+answer seen, for the size of the step (a rate limit). One that answers later still corrects what was learnt.
+"""
+
+from math import nan
+from typing import NamedTuple
+
+from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
+
+VISIBLE = 2e-3
+"""Of the stroke: a way shorter than this is no slide."""
+VISIBLE_NOISES = 6.0
+PRECISE, LONG = 2e-4, 60
+"""Of the stroke: a rest known no better is averaged on, up to so many samples."""
+STOP = 0.01
+"""Of the stroke: as near as this to an end it may be a stop."""
+FIRST_ANSWER_S = 1.0
+"""Longest answer, until one was seen."""
+PATIENCE = 1.5
+"""Longest answers for which a stem must have rested."""
+FORGOTTEN = 0.9
+"""Factor from answer to answer, so that one slow answer is not waited for ever."""
+SAME = 1e-9
+"""Of the stroke: positions nearer than this are one."""
+LARGE = 0.5
+"""Of the largest step: from a smaller one nothing is learnt of a rate limit."""
+DISTURBED = 4
+"""Samples in a row that must be elsewhere."""
+
+
+class SlideOutcome(NamedTuple):
+    """What a change of the command did to a stem at rest: m, Pa, s."""
+
+    time_s: float
+    direction: int
+    """Of the change: +1 up, -1 down."""
+    from_m: float
+    held_pa: float
+    """Command under which it rested before ..."""
+    command_pa: float
+    """... and under which it rests now."""
+    position_m: float
+    std_m: float
+    moved: bool
+    landing: bool
+    """Whether the balance of the moving stem holds here."""
+
+
+class LandingDetector:
+    """The rests of a stem and how they came about.
+
+    Args:
+        stroke_m: full travel, m.
+        stops_m: positions of the stops, m; by default 0 and the stroke.
+
+    Attributes:
+        rest: of the stem under the command in force; None while it moves or may yet move.
+        quantum_m: of the position; 0 until a sample differed from the one before it.
+    """
+
+    def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None) -> None:
+        self._stroke_m = stroke_m
+        low_m, high_m = stops_m if stops_m is not None else (0.0, stroke_m)
+        self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
+        self._window = RestWindow(stroke_m)
+        self._level_pa = self._held_pa = nan
+        self._from: Rest | None = None
+        """The last rest before the command was changed."""
+        self._sense = 0
+        self._one_way = False
+        self._position_m = self._start_m = nan
+        self._away = 0
+        self._known = True
+        """Whether what the last change of the command did is known."""
+        self._answer_s = self._slowness_s_per_pa = self._step_pa = self._large_pa = 0.0
+        self._level_s = 0.0
+        self.rest: Rest | None = None
+        self.quantum_m = 0.0
+
+    def _patience_s(self, rest: Rest) -> float:
+        """Return for how long a stem must have been waited for: longer, if it has not moved after a large step."""
+        if self._from is None or abs(rest.position_m - self._from.position_m) > self._visible_m(rest):
+            return PATIENCE * self._answer_s
+        return PATIENCE * (max(self._answer_s, self._slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S)
+
+    def _visible_m(self, rest: Rest) -> float:
+        return max(VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m)
+
+    def update(self, time_s: float, position_m: float, command_pa: float, pressure_pa: float) -> SlideOutcome | None:
+        """Take a sample and the command in force since; return what a change of the command did once it is known."""
+        self._learn_quantum(position_m)
+        if command_pa != self._level_pa:
+            self._change_level(time_s, position_m, command_pa)
+        self._position_m = position_m
+        self._window.add(time_s, position_m, pressure_pa)
+        rest = self._window.rest
+        if self.rest is not None:
+            self._watch(time_s, position_m, self.rest)
+            self.rest = rest if self.rest is not None and rest is not None else self.rest
+            return None
+        if rest is None or time_s - self._level_s < self._patience_s(rest):
+            return None
+        if rest.std_m > PRECISE * self._stroke_m and rest.count < LONG:
+            return None
+        self.rest, self._away = rest, 0
+        self._window.learn_noise(rest)
+        outcome = None if self._known else self._outcome(time_s, rest)
+        self._known = self._known or (outcome is not None and outcome.moved)
+        return outcome
+
+    def _learn_quantum(self, position_m: float) -> None:
+        step_m = abs(position_m - self._position_m)
+        if step_m > SAME * self._stroke_m:
+            self.quantum_m = min(step_m, self.quantum_m or step_m)
+
+    def _change_level(self, time_s: float, position_m: float, command_pa: float) -> None:
+        sense = 1 if command_pa > self._level_pa else -1
+        if self.rest is not None:
+            self._from, self._held_pa, self._one_way = self.rest, self._level_pa, True
+            self._start_m = self.rest.position_m
+        else:
+            self._one_way = self._one_way and sense == self._sense
+            self._start_m = position_m
+        step_pa = abs(command_pa - self._level_pa)
+        self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
+        self._level_pa, self._sense, self._level_s = command_pa, sense, time_s
+        self.rest, self._known = None, self._from is None
+        self._window.restart(time_s)
+
+    def _watch(self, time_s: float, position_m: float, rest: Rest) -> None:
+        """Find a stem that moves: later than was waited for, or moved by something else than the command."""
+        off_m = abs(position_m - rest.position_m)
+        self._away = self._away + 1 if off_m > self._visible_m(rest) else 0
+        if self._away < DISTURBED:
+            return
+        self.rest = None
+        if self._known:
+            self._level_s = time_s
+            self._window.restart(time_s)
+        else:
+            self._learn_answer(time_s - self._level_s)
+            self._window.look_again(time_s)
+
+    def _learn_answer(self, answer_s: float) -> None:
+        """Learn how long the stem takes to answer, in all and for a pressure step (a rate limit)."""
+        self._answer_s = max(answer_s, FORGOTTEN * self._answer_s)
+        self._large_pa = max(self._step_pa, FORGOTTEN * self._large_pa)
+        if self._step_pa > LARGE * self._large_pa:
+            self._slowness_s_per_pa = max(answer_s / self._step_pa, FORGOTTEN * self._slowness_s_per_pa)
+
+    def _outcome(self, time_s: float, rest: Rest) -> SlideOutcome | None:
+        assert self._from is not None
+        visible_m = self._visible_m(rest)
+        way_m = self._sense * (rest.position_m - self._from.position_m)
+        moved = way_m > visible_m
+        slid = self._one_way and moved and self._sense * (rest.position_m - self._start_m) > visible_m
+        if moved:
+            self._learn_answer(rest.came_to_rest_s)
+        return SlideOutcome(
+            time_s=time_s,
+            direction=self._sense,
+            from_m=self._from.position_m,
+            held_pa=self._held_pa,
+            command_pa=self._level_pa,
+            position_m=rest.position_m,
+            std_m=max(rest.std_m, self.quantum_m / 12**0.5),
+            moved=moved,
+            landing=slid and self._free_m[0] < rest.position_m < self._free_m[1],
+        )

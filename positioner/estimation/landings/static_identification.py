@@ -1,0 +1,90 @@
+"""The static law of one valve from its samples: landings as they come, the law anew after each.
+
+The newest landings count, `EACH` in either direction, so that a spring or a packing that changes is followed. What
+others say of b/c and k/c is tested on them: `tested` refuses what lands elsewhere than the stem did.
+"""
+
+from collections import deque
+from dataclasses import replace
+
+from config.codes import Refusal
+from positioner.estimation.acceptance import Applied, Ratios
+from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
+from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
+
+EACH = 20
+"""Landings remembered in a direction."""
+
+
+class StaticIdentification:
+    """Landings and the static law.
+
+    Args:
+        stroke_m: full travel, m.
+        stops_m: positions of the stops, m; by default 0 and the stroke.
+        each: landings remembered in a direction.
+
+    Attributes:
+        detector: of the rests.
+        landings: the latest first.
+        law: from the landings.
+    """
+
+    def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None, each: int = EACH) -> None:
+        self._stroke_m = stroke_m
+        self._each = each
+        self.detector = LandingDetector(stroke_m, stops_m)
+        self._tested: tuple[Estimates, StaticLaw, Estimates] | None = None
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the landings."""
+        self._in_direction: dict[int, deque[SlideOutcome]] = {
+            1: deque(maxlen=self._each),
+            -1: deque(maxlen=self._each),
+        }
+        self.landings: tuple[SlideOutcome, ...] = ()
+        self.law: StaticLaw = no_static_law(Refusal.LANDINGS_TOO_FEW)
+
+    def update(self, time_s: float, position_m: float, command_pa: float, pressure_pa: float) -> SlideOutcome | None:
+        """Take a sample, the command in force and the measured pressure (NaN: none): s, m, Pa.
+
+        Returns:
+            What a change of the command did, once that is known.
+        """
+        outcome = self.detector.update(time_s, position_m, command_pa, pressure_pa)
+        if outcome is not None and outcome.landing:
+            self._in_direction[outcome.direction].appendleft(outcome)
+            both = (*self._in_direction[1], *self._in_direction[-1])
+            self.landings = tuple(sorted(both, key=lambda each: -each.time_s))
+            self.law = static_law(self.landings, self._stroke_m)
+        return outcome
+
+    def tested(self, estimates: Estimates) -> Estimates:
+        """Return estimates whose friction is refused if the landings contradict it."""
+        if self._tested is None or self._tested[0] is not estimates or self._tested[1] is not self.law:
+            self._tested = (estimates, self.law, self._tested_anew(estimates))
+        return self._tested[2]
+
+    def _tested_anew(self, estimates: Estimates) -> Estimates:
+        slope, friction = estimates.b_over_c, estimates.k_over_c
+        if not (self.law.valid and slope.valid and friction.valid):
+            return estimates
+        if not self.law.contradicts(Ratios(slope.value, friction.value), self._stroke_m):
+            return estimates
+        refused = Refusal.CONTRADICTED_BY_LANDINGS
+        k = replace(estimates.k, reason=refused) if estimates.k.valid else estimates.k
+        return replace(estimates, k=k, k_over_c=replace(friction, reason=refused))
+
+    def corrected(self, applied: Applied) -> Applied:
+        """Return what is applied after a landing: the law's own numbers in place of such as it contradicts."""
+        if applied.ratios is None or not self.law.contradicts(applied.ratios, self._stroke_m):
+            return applied
+        return Applied(self.law.ratios, applied.count + 1, applied.refusals, Refusal.CONTRADICTED_BY_LANDINGS)
+
+    def accepted(self, applied: Applied) -> Applied:
+        """Return what is applied after an identification by landings alone: the law's numbers, or those in use."""
+        if not self.law.valid:
+            return replace(applied, refusals=applied.refusals + 1, last_refusal=self.law.reason)
+        return Applied(self.law.ratios, applied.count + 1, applied.refusals, Refusal.VALID)

@@ -1,0 +1,179 @@
+"""The static law of a valve from its landings, each direction for itself.
+
+    p_j = κ x_j + φ_up + e_j       after a slide upward          κ = k_s/A,  φ_up   = (F_c,up + F_0)/A
+    p_j = κ x_j - φ_down + e_j     after a slide downward                    φ_down = (F_c,down - F_0)/A
+
+Three unknowns θ, least squares with Huber's weights, for a slide that ended under a moving pressure is an outlier.
+The residuals say how well the law holds: with n landings,
+
+    s^2 = max(Σ w e^2 / (n - 3), (κ σ_x)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
+
+which is the Cramér-Rao bound of white residuals, widened so that three deviations are 99.7 % for few landings, too.
+The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what that model calls impossible is the offset
+
+    (φ_up - φ_down)/2        0 without preload and with the same friction both ways
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite, nan, sqrt
+
+import numpy as np
+
+from config.codes import Refusal
+from positioner.estimation.acceptance import Ratios
+from positioner.estimation.array import Array
+from positioner.estimation.estimates import Estimate, no_estimate
+from positioner.estimation.landings.landing_detector import SlideOutcome
+
+FEWEST, FEWEST_EACH = 5, 2
+"""Landings in all, and in each direction."""
+LARGEST_RELATIVE_STD = 0.05
+"""Of κ."""
+LARGEST_SHIFT = 0.01
+"""Of the stroke: by which a deviation of φ may shift where a slide lands."""
+LARGEST_RESIDUAL = 0.05
+"""Of the stroke: landings that miss the law by more, as a standard deviation, lie on no straight line."""
+HUBER, ROUNDS = 2.0, 5
+DEVIATIONS = 3.0
+LEAST_SHIFT = 2e-3
+"""Of the stroke: two laws nearer to each other than this agree."""
+
+
+@dataclass(frozen=True, slots=True)
+class StaticLaw:
+    """κ, φ_up and φ_down as estimates, and how the landings lie about them.
+
+    Attributes:
+        slope: κ = k_s/A, Pa/m.
+        up: φ_up, Pa.
+        down: φ_down, Pa.
+        landings: that it was taken from.
+        residual_m: standard deviation of where a slide lands about the law, m.
+        covariance: of (κ, φ_up, φ_down); (3, 3).
+    """
+
+    slope: Estimate
+    up: Estimate
+    down: Estimate
+    landings: int
+    residual_m: float
+    covariance: Array
+
+    @property
+    def valid(self) -> bool:
+        """Whether the law may be used."""
+        return self.slope.valid
+
+    @property
+    def reason(self) -> Refusal:
+        """Why it may not, or `Refusal.VALID`."""
+        return self.slope.reason
+
+    @property
+    def ratios(self) -> Ratios:
+        """What the control laws need: b/c, k/c and the offset."""
+        up, down = self.up.value, self.down.value
+        return Ratios(-self.slope.value, -(up + down) / 2, (up - down) / 2)
+
+    @property
+    def offset(self) -> Estimate:
+        """(φ_up - φ_down)/2, Pa, which the seed's model takes for 0."""
+        if not isfinite(self.slope.std):
+            return no_estimate(self.reason)
+        gradient = np.array((0.0, 0.5, -0.5))
+        std = sqrt(max(0.0, float(gradient @ self.covariance @ gradient)))
+        return Estimate((self.up.value - self.down.value) / 2, std, self.reason)
+
+    def contradicts(self, ratios: Ratios, stroke_m: float) -> bool:
+        """Whether ratios land elsewhere than the stem did: beyond three deviations, in the middle of either line."""
+        if not self.valid:
+            return False
+        theta = np.array((self.slope.value, self.up.value, self.down.value))
+        theirs = np.array((-ratios.b_over_c, ratios.offset_pa - ratios.k_over_c, -ratios.k_over_c - ratios.offset_pa))
+        for direction in (1, -1):
+            row = np.array((0.5 * stroke_m, float(direction > 0), -float(direction < 0)))
+            shift_pa = abs(float(row @ (theta - theirs)))
+            std_pa = sqrt(float(row @ self.covariance @ row))
+            if shift_pa > max(DEVIATIONS * std_pa, LEAST_SHIFT * stroke_m * self.slope.value):
+                return True
+        return False
+
+
+def no_static_law(reason: Refusal, landings: int = 0) -> StaticLaw:
+    """Return a law without values, for a reason."""
+    nothing = no_estimate(reason)
+    return StaticLaw(nothing, nothing, nothing, landings, nan, np.full((3, 3), inf))
+
+
+def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
+    """Return the static law of landings, or why there is none.
+
+    Args:
+        landings: slides that ended in rest.
+        stroke_m: full travel, m.
+    """
+    ups = sum(each.direction > 0 for each in landings)
+    if len(landings) < FEWEST or min(ups, len(landings) - ups) < FEWEST_EACH:
+        return no_static_law(Refusal.LANDINGS_TOO_FEW, len(landings))
+    x = np.array([each.position_m for each in landings])
+    p = np.array([each.command_pa for each in landings])
+    up = np.array([float(each.direction > 0) for each in landings])
+    # In strokes, so that the three columns are of one size.
+    X = np.column_stack((x / stroke_m, up, up - 1.0))
+    if np.linalg.matrix_rank(X, tol=1e-3) < 3:
+        return no_static_law(Refusal.ILL_CONDITIONED, len(landings))
+    theta, weights = _huber(X, p)
+    residual_pa = p - X @ theta
+    free = len(landings) - 3
+    seen_pa = max(each.std_m for each in landings) * abs(theta[0]) / stroke_m
+    s = max(sqrt(float(weights @ residual_pa**2) / free), seen_pa)
+    scale = np.diag((1 / stroke_m, 1.0, 1.0))
+    covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * _t_of_three_deviations(free)) ** 2
+    slope, up_pa, down_pa = (scale @ theta).tolist()
+    std = np.sqrt(np.diag(covariance))
+    reason = _refusal(slope, up_pa + down_pa, std, s, stroke_m)
+    return StaticLaw(
+        slope=Estimate(slope, float(std[0]), reason),
+        up=Estimate(up_pa, float(std[1]), reason),
+        down=Estimate(down_pa, float(std[2]), reason),
+        landings=len(landings),
+        residual_m=s / abs(slope) if slope else inf,
+        covariance=covariance,
+    )
+
+
+def _huber(X: Array, p: Array) -> tuple[Array, Array]:
+    """Return theta by least squares with Huber's weights, and the weights; scale by the median deviation."""
+    weights: Array = np.ones(p.size)
+    theta: Array = np.zeros(3)
+    for _ in range(ROUNDS):
+        root = np.sqrt(weights)
+        theta = np.asarray(np.linalg.lstsq(root[:, None] * X, root * p)[0])
+        off = np.abs(p - X @ theta)
+        scale = 1.4826 * float(np.median(off)) * sqrt(p.size / (p.size - 3))
+        weights = np.minimum(1.0, HUBER * max(scale, 1e-9) / np.maximum(off, 1e-9))
+    return theta, weights
+
+
+def _t_of_three_deviations(free: int) -> float:
+    """Return the quantile of Student's t that 3 is of the normal distribution, over 3 (Cornish and Fisher)."""
+    z = DEVIATIONS
+    terms = (
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+    )
+    return float(z + sum(term / free**power for power, term in enumerate(terms, 1))) / z
+
+
+def _refusal(slope: float, friction: float, std: Array, residual_pa: float, stroke_m: float) -> Refusal:
+    if slope <= 0:
+        return Refusal.B_OVER_C_NOT_NEGATIVE
+    if friction <= 0:
+        return Refusal.K_OVER_C_NOT_NEGATIVE
+    if residual_pa > LARGEST_RESIDUAL * slope * stroke_m:
+        return Refusal.LANDINGS_NOT_STRAIGHT
+    allowed = np.array((LARGEST_RELATIVE_STD * slope, *(2 * [LARGEST_SHIFT * slope * stroke_m])))
+    # κ and φ are known together: what counts is the law in the middle of the travel.
+    return Refusal.VALID if std[0] <= allowed[0] and (std[1:] <= 2 * allowed[1:]).all() else Refusal.TOO_UNCERTAIN

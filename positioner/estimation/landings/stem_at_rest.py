@@ -1,0 +1,149 @@
+"""Does the stem rest since the pressure was last changed, and where?
+
+Samples are kept from the change of the pressure on, at t = 0. The stem rests at time T if nothing moves in the second
+half of them, from T/2 to T: all samples within
+
+    tolerance = max(5 sigma, 1e-4 stroke)       sigma the noise, from second differences, and no more than twice that of
+                                                the rests before, or a creep would pass for noise
+
+of their mean, and the two quarters alike. So a stem must have rested for as long as it took to get there, T_s, and
+behind a slow pressure, whose rate nobody has told, it is waited for as long as it creeps. Where noise hides the end of
+the creep it is waited for longer: a creep from A down to the tolerance goes on down to 1e-4 stroke by
+
+    T/2 >= T_s (1 + ln(tolerance / 1e-4 stroke) / ln(A / tolerance))
+
+A measured pressure has to rest, too.
+"""
+
+from dataclasses import dataclass
+from math import log, sqrt
+
+import numpy as np
+
+from positioner.estimation.array import Array
+
+MOST = 512
+"""Rows kept; when they are full, each becomes the mean of two."""
+FEWEST = 4
+"""Rows in the second half."""
+TOLERANCE = 1e-4
+"""Of the stroke: motion smaller than this is none."""
+SCATTER, AGREEMENT = 5.0, 4.0
+"""Standard deviations: of a sample, of the difference of two means."""
+PRESSURE_LEFT = 0.01
+"""Share of the range of the measured pressure by which its quarters may differ."""
+POOLED = 0.2
+"""Weight of a rest in the variance of the noise."""
+NOISIER = 2.0
+"""Factor on the noise of the rests before."""
+LONGEST_HIDDEN = 3.0
+"""Of the time to come near: a creep hidden by noise is waited for no longer."""
+LOOKED_AGAIN = 1.1
+"""Factor on the time between two looks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """A stem at rest: m, s."""
+
+    position_m: float
+    std_m: float
+    """Of the position, which is a mean."""
+    noise_m: float
+    """Standard deviation of one sample."""
+    count: int
+    """Samples in the mean."""
+    came_to_rest_s: float
+    """When it was first seen there for good, after the change of the pressure."""
+
+
+class RestWindow:
+    """The samples since the pressure was changed; `rest` is None until the stem has come to rest."""
+
+    def __init__(self, stroke_m: float) -> None:
+        self._tolerance_m = TOLERANCE * stroke_m
+        self._rows = np.empty((MOST, 3))
+        self._variance_m2: float | None = None
+        self.restart(0.0)
+
+    def restart(self, time_s: float) -> None:
+        """Begin anew: the pressure is changed now."""
+        self._count, self._each, self._in_row = 0, 1, 0
+        self._sum = np.zeros(3)
+        self._start_s = time_s
+        self._look_s = time_s
+        self.rest: Rest | None = None
+
+    def add(self, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Take a sample; a pressure that is not measured is NaN."""
+        self._sum += (time_s - self._start_s, position_m, pressure_pa)
+        self._in_row += 1
+        if self._in_row == self._each:
+            self._rows[self._count] = self._sum / self._each
+            self._count += 1
+            self._in_row = 0
+            self._sum[:] = 0.0
+        if self._count == MOST:
+            self._rows[: MOST // 2] = 0.5 * (self._rows[::2] + self._rows[1::2])
+            self._count //= 2
+            self._each *= 2
+        if time_s >= self._look_s:
+            self._look_s = self._start_s + LOOKED_AGAIN * (time_s - self._start_s)
+            self.rest = self._rest()
+
+    def look_again(self, time_s: float) -> None:
+        """Look at the next sample: the stem has left its rest."""
+        self.rest, self._look_s = None, time_s
+
+    def learn_noise(self, rest: Rest) -> None:
+        """Take a rest's noise for that of the rests before."""
+        before = rest.noise_m**2 if self._variance_m2 is None else self._variance_m2
+        self._variance_m2 = (1 - POOLED) * before + POOLED * rest.noise_m**2
+
+    def _creep_ends_s(self, near_s: float, off_m: Array, within_m: float) -> float:
+        """Return when a creep that came within a tolerance at a time has ended for the eye of the finest sensor."""
+        way_m = float(np.abs(off_m).max())
+        hidden = log(within_m / self._tolerance_m) / log(way_m / within_m) if way_m > within_m else 0.0
+        return near_s * (1.0 + min(hidden, LONGEST_HIDDEN))
+
+    def _rest(self) -> Rest | None:
+        rows = self._rows[: self._count]
+        if self._count < 2 * FEWEST:
+            return None
+        time_s, position_m, pressure_pa = rows.T
+        half = int(np.searchsorted(time_s, 0.5 * time_s[-1]))
+        late_m = position_m[half:]
+        if late_m.size < FEWEST:
+            return None
+        noise_m = _noise(late_m)
+        if self._variance_m2 is not None:
+            noise_m = min(noise_m, NOISIER * sqrt(self._variance_m2 / self._each))
+        within_m = max(SCATTER * noise_m, self._tolerance_m)
+        mean_m = float(late_m.mean())
+        if np.abs(late_m - mean_m).max() > within_m or not _flat(late_m, 0.5 * self._tolerance_m):
+            return None
+        if np.isfinite(pressure_pa).all() and not _flat(pressure_pa[half:], PRESSURE_LEFT * float(np.ptp(pressure_pa))):
+            return None
+        elsewhere = np.flatnonzero(np.abs(position_m - mean_m) > within_m)
+        first = int(elsewhere[-1]) + 1 if elsewhere.size else 0
+        if elsewhere.size and 0.5 * time_s[-1] < self._creep_ends_s(time_s[first], position_m - mean_m, within_m):
+            return None
+        return Rest(
+            position_m=mean_m,
+            std_m=noise_m / sqrt(late_m.size),
+            noise_m=noise_m * sqrt(self._each),
+            count=late_m.size * self._each,
+            came_to_rest_s=float(time_s[first]) if first else 0.0,
+        )
+
+
+def _noise(values: Array) -> float:
+    """Return the standard deviation of white noise on what changes evenly."""
+    return float(np.sqrt(np.mean(np.square(np.diff(values, 2))) / 6))
+
+
+def _flat(values: Array, least: float) -> bool:
+    """Return whether the two halves have one mean, but for noise and for the least that counts."""
+    middle = values.size // 2
+    allowed = max(AGREEMENT * _noise(values) * sqrt(2 / middle), least)
+    return bool(abs(values[:middle].mean() - values[middle:].mean()) <= allowed)
