@@ -1,0 +1,327 @@
+"""Random valves as plants have them, under the law of slides: is anything wrong accepted, do small steps land?
+
+    python -m benchmarks.real_valves [--valves 50] [--steps 40] [--seed 0]
+
+Each valve is drawn anew: stroke 20 to 100 mm, bench range 60 to 100 kPa, friction 2 to 12 % of it, F_s/F_c 1.05 to 1.4,
+stops at both ends; of preload (to 40 % of the bench range), packing asymmetry (to 30 %), presliding, I/P lag (to 500 ms),
+backlash (to 1 %), friction growing over the stroke (to 30 %) and a hardening spring each with even chance; a position of
+10 to 16 bits with noise up to half a quantum; a loop of 1 to 200 ms whose commands come into force one period late and
+which loses up to 1 % of its replies. Nothing is told to the controller but stroke and pressure limits: S3 identifies by
+a staircase.
+
+Then slides to `PROBES` places each way, made by hand, tell the truth, and what the static law says of where they land is
+held against its own three deviations. Then come the steps, 0.1 to 10 % of stroke, evenly in the logarithm: landed is a
+true indicated position within 0.1 % of stroke or one quantum. The least excursion is that of the bare physics,
+max((F_s - F_c)/k_s up, down); a step whose excursion is more than 1.15 times it is counted.
+"""
+
+import argparse
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.small_moves import Late
+from config.codes import Mode
+from config.daemon_file import DaemonFile
+from config.slave_file import SlaveFile
+from config.valve_file import ValveFile
+from drivers.boundary import NoReply, Reading
+from drivers.in_memory import MemoryDriver, Plant
+from positioner.control.controller import Controller, Decision
+from positioner.control.requests import QUIET, Requests
+from positioner.control.settings import Settings
+from positioner.daemon.cycle import Cycle
+from positioner.daemon.link import Link
+from positioner.daemon.pacing import DevicePace
+from sim.slave.simulated_device import Device
+from sim.open_loop import STEP_S
+from sim.valve import Valve
+
+SMALLEST, LARGEST = 1e-3, 0.1
+WITHIN = 1e-3
+"""Of the stroke."""
+EXCURSION = 1.15
+PROBES = (0.35, 0.5, 0.65)
+DEVIATIONS = 3.0
+S3_LIMIT_S = 3600.0
+NO_PRESLIDING = {"stiffness_n_per_m": 1e12}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A valve, and how it is seen."""
+
+    file: ValveFile
+    period_s: float
+    quantum_m: float
+    noise_m: float
+    loss: float
+    maximum_pa: float
+    lag_s: float
+    present: frozenset[str]
+    """The effects that are not switched off."""
+
+    @property
+    def stroke_m(self) -> float:
+        return self.file.valve.stroke_m
+
+
+def drawn(rng: np.random.Generator) -> Drawn:
+    """Draw a valve."""
+    stroke_m, bench_pa = rng.uniform(0.02, 0.1), rng.uniform(60e3, 100e3)
+    area_m2 = 0.035 * (stroke_m / 0.02) ** 0.6 * rng.uniform(0.8, 1.25)
+    span_n = bench_pa * area_m2
+    spring = span_n / stroke_m
+    coulomb_n = span_n * np.exp(rng.uniform(np.log(0.02), np.log(0.12)))
+    mass_kg = rng.uniform(1.0, 6.0)
+    valve = {
+        "name": "drawn",
+        "mass_kg": mass_kg,
+        "diaphragm_area_m2": area_m2,
+        "spring_n_per_m": spring,
+        "viscous_ns_per_m": 2 * rng.uniform(1.0, 3.0) * np.sqrt(spring * mass_kg),
+        "coulomb_n": coulomb_n,
+        "static_n": coulomb_n * rng.uniform(1.05, 1.4),
+        "stribeck_velocity_m_per_s": 2.54e-4,
+        "deadzone_ratio": 0.6,
+        "stroke_m": stroke_m,
+    }
+    stop = {"lower_m": 0.0, "travel_m": stroke_m, "stiffness_n_per_m": 2000 * spring, "damping_ns_per_m": 1e4}
+    # Every effect is there, an absent one switched off, so that one compiled kernel serves all valves.
+    strengths: list[tuple[str, dict[str, float], dict[str, float]]] = [
+        ("preload", {"force_n": span_n * rng.uniform(0.0, 0.4)}, {"force_n": 0.0}),
+        ("asymmetric_friction", {"asymmetry": rng.uniform(-0.3, 0.3)}, {"asymmetry": 0.0}),
+        ("presliding", {"stiffness_n_per_m": coulomb_n / stroke_m * 10 ** rng.uniform(2.0, 4.0)}, NO_PRESLIDING),
+        ("ip_lag", {"time_constant_s": rng.uniform(0.0, 0.5)}, {"time_constant_s": 0.0}),
+        ("backlash", {"width_m": stroke_m * rng.uniform(0.0, 0.01)}, {"width_m": 0.0}),
+        ("position_friction", {"growth": rng.uniform(0.0, 0.3)}, {"growth": 0.0}),
+        ("spring_hardening", {"cubic_n_per_m3": spring / stroke_m**2 * rng.uniform(0.0, 0.3)}, {"cubic_n_per_m3": 0.0}),
+    ]
+    present = {name for name, _, _ in strengths if rng.random() < 0.5}
+    effects = [{"name": name, **(on if name in present else off)} for name, on, off in strengths]
+    effects[5]["travel_m"] = stroke_m
+    quantum_m = stroke_m / 2 ** int(rng.integers(10, 17))
+    return Drawn(
+        file=ValveFile.model_validate({"valve": valve, "effect": [{"name": "end_stop", **stop}, *effects]}),
+        period_s=round(float(np.exp(rng.uniform(np.log(1e-3), np.log(0.2)))), 3),
+        quantum_m=quantum_m,
+        noise_m=quantum_m * rng.uniform(0.0, 0.5),
+        loss=rng.uniform(0.0, 0.01),
+        maximum_pa=2.5 * bench_pa,
+        present=frozenset(present),
+        lag_s=float(effects[3]["time_constant_s"]),
+    )
+
+
+class Losing(MemoryDriver):
+    """A driver that loses replies."""
+
+    def __init__(self, plant: Plant, loss: float, rng: np.random.Generator) -> None:
+        super().__init__(plant)
+        self._loss, self._rng = loss, rng
+
+    def exchange(self, command_pa: float) -> Reading:
+        reading = super().exchange(command_pa)
+        if self._rng.random() < self._loss:
+            raise NoReply("lost")
+        return reading
+
+
+class Loop:
+    """A drawn valve with the daemon's cycle, in virtual time."""
+
+    def __init__(self, each: Drawn, rng: np.random.Generator) -> None:
+        self._each = each
+        period_s = each.period_s
+        daemon = {
+            "valve": {"stroke_m": each.stroke_m},
+            "cycle": {"pace": "device", "period_s": period_s},
+            "pressure": {"maximum_pa": each.maximum_pa},
+            "safety": {"stale_after_s": 5 * period_s},
+            "control": {"law": "slides", "excursion_limit": 0.5},
+            "excitation": {"staircase_limit_s": S3_LIMIT_S},
+        }
+        slave = {
+            "clock": {"mode": "lockstep", "period_s": period_s},
+            "sensor": {"noise_std_m": each.noise_m, "quantum_m": each.quantum_m, "seed": int(rng.integers(2**31))},
+            "supply": {"maximum_pa": each.maximum_pa},
+        }
+        self.valve = Valve.from_file(each.file, step_s=min(STEP_S, period_s))
+        self.valve.rest_at(0.0, 0.0)
+        device = Device(self.valve, SlaveFile.model_validate(slave), {})
+        pace = DevicePace()
+        link = Link(Losing(Late(device), each.loss, rng), pace)
+        held_pa, _ = link.open()
+        controller = Controller(Settings.of(DaemonFile.model_validate(daemon)), held_pa)
+        self.cycle = Cycle(link, controller, pace, Requests(mode=Mode.AUTOMATIC, mode_writes=1), recorder=None)
+
+    @property
+    def decision(self) -> Decision:
+        return self.cycle.snapshot.decision
+
+    @property
+    def time_s(self) -> float:
+        return self.cycle.snapshot.sample.now_s
+
+    def ask(self, **values: object) -> None:
+        self.cycle.requests = replace(self.cycle.requests, **values)  # type: ignore[arg-type]
+
+    def identify(self) -> None:
+        """Let S3 run until it is complete or has ended."""
+        self.ask(eta=(0, 0, 0))
+        self.cycle.once()
+        until_s = self.time_s + S3_LIMIT_S
+        while self.decision.estimates.progress < 1 and self.time_s < until_s:
+            self.cycle.once()
+            if self.decision.state.name != "S3_IDENTIFY":
+                break
+        self.ask(eta=QUIET)
+        self.cycle.once()
+        self.cycle.once()
+
+    def step_to(self, reference_m: float, longest_s: float) -> float:
+        """Ask for a position until the law has rested for a while; return the farthest excursion, m."""
+        at_m = self.valve.indicated_m
+        low_m, high_m = min(at_m, reference_m), max(at_m, reference_m)
+        self.ask(reference_m=reference_m, reference_writes=self.cycle.requests.reference_writes + 1)
+        farthest_m, last_pa = 0.0, float("nan")
+        begin_s = since_s = self.time_s
+        quiet_s = 0.5 + 25 * self._each.period_s + 10 * self._each.lag_s
+        while self.time_s - begin_s < longest_s and self.time_s - since_s < quiet_s:
+            self.cycle.once()
+            x_m = self.valve.indicated_m
+            farthest_m = max(farthest_m, low_m - x_m, x_m - high_m)
+            if self.decision.command_pa != last_pa:
+                last_pa, since_s = self.decision.command_pa, self.time_s
+        return farthest_m
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one valve."""
+
+    reason: str
+    worst: float
+    """Error of a predicted landing over its deviation."""
+    residual: float
+    took_s: float
+    landed: tuple[bool, ...]
+    errors: tuple[float, ...]
+    excursions: tuple[float, ...]
+    """Over the least."""
+    why: str
+
+
+def probed(each: Drawn, loop: Loop) -> float:
+    """Return how far slides land off the static law, at the worst, in its own deviations."""
+    law, valve, stroke_m = loop.decision.static_law, Valve.from_file(each.file, step_s=STEP_S), each.stroke_m
+    settle_s, worst = 0.5 + 20 * each.lag_s, 0.0
+    ratios = law.ratios
+    for s in (1, -1):
+        for probe in PROBES:
+            pressure_pa = -(ratios.b_over_c * probe * stroke_m + s * ratios.k_over_c) + ratios.offset_pa
+            if not 0.0 < pressure_pa < each.maximum_pa:
+                continue
+            valve.rest_at(0.0, 0.0)
+            for command_pa in (0.0, each.maximum_pa if s < 0 else 0.0, pressure_pa):
+                valve.advance(command_pa, settle_s)
+            off_m = valve.indicated_m - probe * stroke_m
+            row = np.array((probe * stroke_m, float(s > 0), -float(s < 0)))
+            deviation_m = np.sqrt(float(row @ law.covariance @ row)) / law.slope.value
+            worst = max(worst, abs(off_m) / float(np.hypot(deviation_m, law.residual_m)))
+    return worst
+
+
+def outcome(seed: int, steps: int) -> tuple[Drawn, Outcome]:
+    """Return a drawn valve and what became of it."""
+    rng = np.random.default_rng(seed)
+    each = drawn(rng)
+    loop = Loop(each, rng)
+    loop.identify()
+    decision = loop.decision
+    if decision.applied.ratios is None:
+        return each, Outcome(
+            decision.static_law.reason.name, 0.0, 0.0, loop.time_s, (), (), (), decision.inhibit_reason.name
+        )
+    took_s, worst = loop.time_s, probed(each, loop)
+    residual = decision.static_law.residual_m / each.stroke_m
+    valve = each.file.valve
+    asymmetry = max(
+        (abs(e.parameters["asymmetry"]) for e in each.file.effect if e.name == "asymmetric_friction"), default=0.0
+    )
+    growth = max((e.parameters["growth"] for e in each.file.effect if e.name == "position_friction"), default=0.0)
+    least_m = (valve.static_n - valve.coulomb_n) / valve.spring_n_per_m * (1 + asymmetry) * (1 + growth)
+    ratios = decision.applied.ratios
+    bottom = max(0.1, (-ratios.k_over_c - ratios.offset_pa) / -ratios.b_over_c / each.stroke_m + 0.02)
+    low, high = bottom + least_m / each.stroke_m + 0.03, 0.87 - least_m / each.stroke_m
+    longest_s = 20.0 + 400 * each.period_s + 60 * each.lag_s
+    at = 0.5 * (low + high)
+    loop.step_to(at * each.stroke_m, longest_s)
+    errors, excursions = [], []
+    for _ in range(steps):
+        size = np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))) * rng.choice((-1, 1))
+        at = at + size if low < at + size < high else at - size
+        at = min(max(at, low), high)
+        farthest_m = loop.step_to(at * each.stroke_m, longest_s)
+        errors.append(loop.valve.indicated_m / each.stroke_m - at)
+        excursions.append(farthest_m / least_m)
+    allowed = max(WITHIN, each.quantum_m / each.stroke_m)
+    return each, Outcome(
+        "accepted",
+        worst,
+        residual,
+        took_s,
+        tuple(abs(e) <= allowed for e in errors),
+        tuple(errors),
+        tuple(excursions),
+        loop.decision.inhibit_reason.name,
+    )
+
+
+def lines(seeds: range, steps: int) -> Iterator[str]:
+    """Yield a line for each valve, and what they say together."""
+    yield "seed  period   lag  effects | identified in, s | worst landing, deviations | residual, % | landed | rms % | excursion 90 %"
+    results = []
+    for seed in seeds:
+        each, found = outcome(seed, steps)
+        results.append((each, found))
+        names = ",".join(e.split("_")[0][:4] for e in sorted(each.present))
+        head = f"{seed:4d} {1e3 * each.period_s:6.0f} {each.lag_s:5.2f}  {names:40s}"
+        if found.reason != "accepted":
+            yield f"{head} | {found.took_s:6.0f} | refused: {found.reason} {found.why}"
+            continue
+        yield (
+            f"{head} | {found.took_s:6.0f} | {found.worst:5.2f} | {100 * found.residual:6.3f} | {np.mean(found.landed):5.2f}"
+            f" | {100 * np.sqrt(np.mean(np.square(found.errors))):6.3f} | {np.quantile(found.excursions, 0.9):5.2f} {found.why}"
+        )
+    accepted = [found for _, found in results if found.reason == "accepted"]
+    refused = Counter(found.reason for _, found in results if found.reason != "accepted")
+    wrong = sum(found.worst > DEVIATIONS for found in accepted)
+    yield f"\naccepted {len(accepted)} of {len(results)}; refused: {dict(refused)}"
+    yield f"accepted and off by more than three deviations: {wrong}"
+    for low_s, high_s in ((0.0, 5e-3), (5e-3, 20e-3), (20e-3, 60e-3), (60e-3, 1.0)):
+        group = [f for e, f in results if f.landed and low_s <= e.period_s < high_s]
+        landed = [ok for found in group for ok in found.landed]
+        excursions = [ratio for found in group for ratio in found.excursions]
+        if landed:
+            yield (
+                f"{1e3 * low_s:4.0f} to {1e3 * high_s:4.0f} ms: {100 * np.mean(landed):5.1f} % of {len(landed)} steps landed, "
+                f"excursion within {EXCURSION} of the least in {100 * np.mean(np.array(excursions) <= EXCURSION):5.1f} %"
+            )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--valves", type=int, default=50)
+    parser.add_argument("--steps", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=0, help="of the first valve")
+    arguments = parser.parse_args()
+    for line in lines(range(arguments.seed, arguments.seed + arguments.valves), arguments.steps):
+        print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
