@@ -24,7 +24,7 @@ from fieldbus.modbus.register_answers import RegisterAnswers
 from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.server import RegisterServer
 from positioner.cli.main import main
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
@@ -39,6 +39,7 @@ from positioner.dcs import Dcs, DcsError
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
+from tests.children import running
 
 pytestmark = pytest.mark.real_time
 

@@ -11,7 +11,7 @@ from config.device import ModbusTcpDevice
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers import driver_for
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
@@ -23,6 +23,7 @@ from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import InProcessRefiner
 from positioner.virtual.virtual_cycle import played, virtual_cycle
 from sim.slave.modbus_slave import device_of
+from tests.children import running
 
 STROKE_M = 0.1016
 SLAVE = '[clock]\nmode = "lockstep"\nperiod_s = 1e-3\n[sensor]\nnoise_std_m = 1e-5\nseed = 4\n'
