@@ -12,6 +12,7 @@ import pytest
 
 from config.codes import Fault, Mode
 from fieldbus.canopen.loopback import free_channel
+from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs, DcsError
@@ -122,7 +123,10 @@ def test_two_nodes_on_one_bus_each_have_their_daemon(tmp_path: Path) -> None:
         assert (one.get("fault"), other.get("fault")) == (Fault.NONE, Fault.NONE)
 
 
-def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "PERIODS", 50)
     channel = free_channel()
     config = daemon_file(tmp_path, channel, more=PATIENT)
     with (
