@@ -22,14 +22,14 @@ STROKE_M = FILE.valve.stroke_m
 
 
 @cache
-def run(noise: Noise, period_s: float = PERIOD_S) -> ScenarioRun:
+def run(noise: Noise, period_s: float) -> ScenarioRun:
     """Return the run of a noise, made once: the tests only read it."""
     return run_scenario(FILE, noise, period_s)
 
 
 @pytest.fixture(scope="module")
 def quiet() -> ScenarioRun:
-    return run(NONE)
+    return run(NONE, PERIOD_S)
 
 
 @pytest.fixture(scope="module")
@@ -105,13 +105,13 @@ def test_static_friction_as_printed_is_refused_in_a_valve_file() -> None:
 def test_a_sine_of_its_own_sample_rate_vanishes_and_one_in_rad_per_s_does_not(quiet: ScenarioRun) -> None:
     assert largest_sample_pu(LITERAL, quiet) < 1e-10
     assert largest_sample_pu(HONEST_SINE, quiet) == pytest.approx(0.01, rel=1e-3)
-    literal = run(LITERAL)
+    literal = run(LITERAL, PERIOD_S)
     np.testing.assert_allclose(literal.measured_m, quiet.measured_m, rtol=0, atol=1e-9)
     np.testing.assert_allclose(literal.command_pa, quiet.command_pa, rtol=1e-6)
 
 
 def test_the_sine_is_measured_and_not_true(quiet: ScenarioRun) -> None:
-    noisy = run(HONEST_SINE)
+    noisy = run(HONEST_SINE, PERIOD_S)
     sine_m = 0.01 * STROKE_M * np.sin(1e5 * noisy.time_s)
     np.testing.assert_allclose(noisy.measured_m - noisy.true_m, sine_m, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(quiet.measured_m, quiet.true_m)
