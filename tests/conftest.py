@@ -6,6 +6,7 @@ for a clock, a process or a wire ever wait for each other. The others give way t
 
 import gc
 import os
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +24,9 @@ GIVES_WAY = 3
 
 # Of every process: threads for small matrices would only take the processors from the other workers.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Nor compile our modules anew in each, where a person has switched the keeping off.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 class Groups(LoadScopeScheduling):  # type: ignore[misc]

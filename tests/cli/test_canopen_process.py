@@ -1,8 +1,6 @@
 """Daemon and slave as processes on a CAN bus: the node killed and back, a second node on the bus, probe and doctor."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,9 +12,11 @@ import pytest
 
 from config.codes import Fault, Mode
 from fieldbus.canopen.loopback import free_channel
+from positioner.cli import doctor
 from positioner.cli.main import main
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs, DcsError
+from tests.children import Child, child, running
 from tests.cli.test_daemon_process import LAW, until
 
 pytestmark = pytest.mark.real_time
@@ -46,15 +46,10 @@ def daemon_file(folder: Path, channel: str, node: int = NODE, more: str = "") ->
 
 
 @contextmanager
-def slave(config: Path) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, "-m", "positioner.cli", "sim", str(config)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline().startswith("listening on loopback node")
-            yield process
-        finally:
-            process.kill()
+def slave(config: Path) -> Iterator[Child]:
+    with child("sim", config) as (process, ready):
+        assert ready.startswith("listening on loopback node")
+        yield process
 
 
 def automatic(dcs: Dcs) -> None:
@@ -103,7 +98,7 @@ def test_a_node_killed_while_the_stem_moves_is_a_fault_with_its_reason(tmp_path:
     node, config, log = slave_file(tmp_path, channel), daemon_file(tmp_path, channel), tmp_path / f"daemon{NODE}.log"
     with slave(node) as process, running("run", config) as daemon, Dcs("127.0.0.1", port_in(daemon)) as dcs:
         in_s1(dcs, 0.6)
-        os.kill(process.pid, signal.SIGKILL)
+        process.kill()
         until(lambda: bool(faulted_s(log, "NO_REPLY")), "the fault")
         until(lambda: dcs.get("mode") == Mode.HOLD, "hold")
     reasons = {str(event["reason"]) for event in events(log) if event["event"] == "no good reply"}
@@ -128,7 +123,10 @@ def test_two_nodes_on_one_bus_each_have_their_daemon(tmp_path: Path) -> None:
         assert (one.get("fault"), other.get("fault")) == (Fault.NONE, Fault.NONE)
 
 
-def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "PERIODS", 50)
     channel = free_channel()
     config = daemon_file(tmp_path, channel, more=PATIENT)
     with (

@@ -3,8 +3,6 @@
 import signal
 import socket
 import struct
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -20,8 +18,9 @@ from config.recording import read_recording
 from config.registers import BY_NAME
 from drivers import driver_for
 from drivers.boundary import Driver
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
+from tests.children import child, ended, running
 from tests.independent import independent_client, refused_with
 
 pytestmark = pytest.mark.real_time
@@ -57,6 +56,69 @@ def daemon_file(folder: Path, device_port: int, more: str = "", device: str = ""
         f"[device]\nport = {device_port}\n{device}[cycle]\nperiod_s = 2e-3\n[supervisory]\nport = 0\n{LAW}{more}"
     )
     return path
+
+
+@pytest.fixture(scope="module")
+def lone_slave(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """Run a slave that nobody commands yet; give its port."""
+    with running("sim", slave_file(tmp_path_factory.mktemp("slave")), "--port", "0") as ready:
+        yield port_in(ready)
+
+
+@pytest.mark.parametrize(
+    ("number", "action", "left_pa"),
+    [
+        (signal.SIGTERM, "hold", 24000.0),
+        (signal.SIGINT, "hold", 24000.0),
+        (signal.SIGTERM, "vent", 0.0),
+        (signal.SIGINT, "fill", 420e3),
+    ],
+)
+def test_the_end_leaves_the_valve_in_the_safe_state(
+    lone_slave: int, tmp_path: Path, number: signal.Signals, action: str, left_pa: float
+) -> None:
+    with watcher(lone_slave) as before:
+        before.write(24000.0)
+    path = daemon_file(tmp_path, lone_slave, f'[safety]\naction = "{action}"\n', PATIENT)
+    with child("run", path) as (daemon, _):
+        daemon.signal(number)
+        status, _, log = daemon.ended()
+    assert status == 0, log
+    assert "Traceback" not in log
+    with watcher(lone_slave) as after:
+        assert after.open() == pytest.approx(left_pa), "what it was commanded last"
+
+
+@contextmanager
+def watcher(device_port: int) -> Iterator[Driver]:
+    """Talk to the device itself, and leave what it does in silence as it is."""
+    device = ModbusTcpDevice(port=device_port, reply_timeout_s=2.0)
+    driver = driver_for(device.model_copy(update={"map": device.map.model_copy(update=UNTOUCHED)}))
+    driver.open()
+    try:
+        yield driver
+    finally:
+        driver.close()
+
+
+UNTOUCHED = {"communication_timeout_s": None, "communication_action": None}
+
+
+def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(tmp_path: Path) -> None:
+    with ExitStack() as daemon:
+        with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+            device_port = port_in(slave)
+            port = port_in(daemon.enter_context(running("run", daemon_file(tmp_path, device_port))))
+        dcs = daemon.enter_context(Dcs("127.0.0.1", port))
+        until(lambda: dcs.get("fault") == Fault.NO_REPLY, "the fault")
+        assert dcs.get_all("mode", "quality") == {"mode": Mode.HOLD, "quality": 2}
+        with running("sim", slave_file(tmp_path, device_port)):
+            until(lambda: dcs.get("quality") == 0, "good measurements")
+            assert dcs.get("fault") != Fault.NONE, "latched"
+            dcs.set("acknowledge", 1)
+            until(lambda: dcs.get("fault") == Fault.NONE, "the acknowledgement")
+            assert dcs.get("command") == pytest.approx(24000.0)
+            assert dcs.get("position_m") == pytest.approx(0.03, abs=1e-4)
 
 
 @dataclass
@@ -147,39 +209,23 @@ def write_heartbeats(port: int, beat: int) -> None:
 
 def test_a_killed_daemon_leaves_a_whole_recording(shared: Site, tmp_path: Path) -> None:
     path = daemon_file(tmp_path, shared.device_port, '[recorder]\nfolder = "recordings"\n', PATIENT)
-    with daemon_process(path) as daemon:
+    with child("run", path) as (daemon, _):
         until(
             lambda: sum(each.stat().st_size for each in (tmp_path / "recordings").glob("*.csv")) > 20_000, "recording"
         )
         daemon.kill()
-        daemon.communicate()
     (recording,) = (tmp_path / "recordings").glob("*.csv")
     read = read_recording(recording)
     assert len(read) > 200
     assert "torn" not in read.metadata
 
 
-@contextmanager
-def daemon_process(path: Path) -> Iterator[subprocess.Popen[str]]:
-    """Run a daemon until it serves, and leave to the test how it ends."""
-    command = [sys.executable, "-m", "positioner.cli", "run", str(path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as daemon:
-        try:
-            assert daemon.stdout is not None
-            assert daemon.stdout.readline(), daemon.stderr and daemon.stderr.read()
-            yield daemon
-        finally:
-            daemon.kill()
-
-
 def test_a_port_in_use_is_one_line(shared: Site, tmp_path: Path) -> None:
     path = daemon_file(tmp_path, shared.device_port)
     path.write_text(path.read_text().replace("[supervisory]\nport = 0", f"[supervisory]\nport = {shared.port}"))
-    done = subprocess.run(
-        [sys.executable, "-m", "positioner.cli", "run", str(path)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert done.stderr == f"positioner run: 127.0.0.1:{shared.port}: cannot listen there: Address already in use\n"
+    done = ended("run", path)
+    assert done.status == 2
+    assert done.log == f"positioner run: 127.0.0.1:{shared.port}: cannot listen there: Address already in use\n"
 
 
 def test_a_wrong_map_is_one_line(shared: Site, tmp_path: Path) -> None:
@@ -189,72 +235,7 @@ def test_a_wrong_map_is_one_line(shared: Site, tmp_path: Path) -> None:
         shared.device_port,
         "[device.map]\nposition_m = {address = 0, type = 'uint16'}\ncommand_pa = {address = 11}\n",
     )
-    done = subprocess.run(
-        [sys.executable, "-m", "positioner.cli", "run", str(path)], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "device.map.position_m: the device says" in done.stderr
-
-
-@pytest.fixture(scope="module")
-def lone_slave(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
-    """Run a slave that nobody commands yet; give its port."""
-    with running("sim", slave_file(tmp_path_factory.mktemp("slave")), "--port", "0") as ready:
-        yield port_in(ready)
-
-
-@pytest.mark.parametrize(
-    ("number", "action", "left_pa"),
-    [
-        (signal.SIGTERM, "hold", 24000.0),
-        (signal.SIGINT, "hold", 24000.0),
-        (signal.SIGTERM, "vent", 0.0),
-        (signal.SIGINT, "fill", 420e3),
-    ],
-)
-def test_the_end_leaves_the_valve_in_the_safe_state(
-    lone_slave: int, tmp_path: Path, number: signal.Signals, action: str, left_pa: float
-) -> None:
-    with watcher(lone_slave) as before:
-        before.write(24000.0)
-    path = daemon_file(tmp_path, lone_slave, f'[safety]\naction = "{action}"\n', PATIENT)
-    with daemon_process(path) as daemon:
-        daemon.send_signal(number)
-        _, log = daemon.communicate(timeout=WITHIN_S)
-    assert daemon.returncode == 0, log
-    assert "Traceback" not in log
-    with watcher(lone_slave) as after:
-        assert after.open() == pytest.approx(left_pa), "what it was commanded last"
-
-
-@contextmanager
-def watcher(device_port: int) -> Iterator[Driver]:
-    """Talk to the device itself, and leave what it does in silence as it is."""
-    device = ModbusTcpDevice(port=device_port, reply_timeout_s=2.0)
-    driver = driver_for(device.model_copy(update={"map": device.map.model_copy(update=UNTOUCHED)}))
-    driver.open()
-    try:
-        yield driver
-    finally:
-        driver.close()
-
-
-UNTOUCHED = {"communication_timeout_s": None, "communication_action": None}
-
-
-def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(tmp_path: Path) -> None:
-    with ExitStack() as daemon:
-        with running("sim", slave_file(tmp_path), "--port", "0") as slave:
-            device_port = port_in(slave)
-            port = port_in(daemon.enter_context(running("run", daemon_file(tmp_path, device_port))))
-        dcs = daemon.enter_context(Dcs("127.0.0.1", port))
-        until(lambda: dcs.get("fault") == Fault.NO_REPLY, "the fault")
-        assert dcs.get_all("mode", "quality") == {"mode": Mode.HOLD, "quality": 2}
-        with running("sim", slave_file(tmp_path, device_port)):
-            until(lambda: dcs.get("quality") == 0, "good measurements")
-            assert dcs.get("fault") != Fault.NONE, "latched"
-            dcs.set("acknowledge", 1)
-            until(lambda: dcs.get("fault") == Fault.NONE, "the acknowledgement")
-            assert dcs.get("command") == pytest.approx(24000.0)
-            assert dcs.get("position_m") == pytest.approx(0.03, abs=1e-4)
+    done = ended("run", path)
+    assert done.status == 2
+    assert done.log.count("\n") == 1
+    assert "device.map.position_m: the device says" in done.log

@@ -10,9 +10,11 @@ from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
 from positioner.cli.demo import LARGEST_ERROR_PU, ComparedEstimate, DemoOutcome, StepOutcome
 from positioner.cli.main import main
+from positioner.cli.parts import simulated_plant
 from positioner.cli.parts.children import port_in
 from positioner.cli.parts.simulated_plant import started
 from positioner.dcs import Dcs
+from tests.children import running
 from tests.cli.test_daemon_process import until
 
 pytestmark = pytest.mark.real_time
@@ -57,8 +59,11 @@ def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
 @pytest.mark.parametrize(
     ("bus", "where"), [("canopen", "listening on loopback node 1 on channel:"), ("rtu", "listening on /dev/pts/")]
 )
-def test_on_the_other_buses_the_same_files_bring_up_a_valve_that_obeys(bus: str, where: str, tmp_path: Path) -> None:
-    """What the command does on every bus alike, playing the DCS, is shown by the test above."""
+def test_on_the_other_buses_the_same_files_bring_up_a_valve_that_obeys(
+    bus: str, where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the command does on every bus alike, starting both from nothing, is shown by the test above."""
+    monkeypatch.setattr(simulated_plant, "running", running)
     with started(bus, tmp_path, load_valve(shipped_valve("seed")).valve) as pair:
         assert pair.slave.startswith(where)
         with Dcs("127.0.0.1", port_in(pair.daemon)) as dcs:

@@ -2,27 +2,34 @@
 
 import json
 import math
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from config.codes import Refusal
-from config.valve_file import load_valve, shipped_valve
+from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.cli.main import main
 from positioner.paper import noise_table, scenario
 from positioner.paper.findings import CLAIMS, SeedFindings, findings
 from positioner.paper.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
-from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE, ScenarioRun, run_scenario
+from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Noise, ScenarioRun, run_scenario
 
 PERIOD_S = 1e-4
 FILE = load_valve(shipped_valve("seed"))
 STROKE_M = FILE.valve.stroke_m
 
 
+@cache
+def run(noise: Noise, period_s: float) -> ScenarioRun:
+    """Return the run of a noise, made once: the tests only read it."""
+    return run_scenario(FILE, noise, period_s)
+
+
 @pytest.fixture(scope="module")
 def quiet() -> ScenarioRun:
-    return run_scenario(FILE, NONE, PERIOD_S)
+    return run(NONE, PERIOD_S)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +40,7 @@ def wrong(quiet: ScenarioRun) -> dict[tuple[str, str], Erratum]:
 @pytest.fixture(scope="module")
 def slow() -> SeedFindings:
     """What a fieldbus's sample time and white noise leave."""
-    return findings(run_scenario(FILE, WHITE, 1e-3), FILE)
+    return findings(run(WHITE, 1e-3), FILE)
 
 
 def holds(found: SeedFindings) -> dict[str, bool]:
@@ -98,13 +105,13 @@ def test_static_friction_as_printed_is_refused_in_a_valve_file() -> None:
 def test_a_sine_of_its_own_sample_rate_vanishes_and_one_in_rad_per_s_does_not(quiet: ScenarioRun) -> None:
     assert largest_sample_pu(LITERAL, quiet) < 1e-10
     assert largest_sample_pu(HONEST_SINE, quiet) == pytest.approx(0.01, rel=1e-3)
-    literal = run_scenario(FILE, LITERAL, PERIOD_S)
+    literal = run(LITERAL, PERIOD_S)
     np.testing.assert_allclose(literal.measured_m, quiet.measured_m, rtol=0, atol=1e-9)
     np.testing.assert_allclose(literal.command_pa, quiet.command_pa, rtol=1e-6)
 
 
 def test_the_sine_is_measured_and_not_true(quiet: ScenarioRun) -> None:
-    noisy = run_scenario(FILE, HONEST_SINE, PERIOD_S)
+    noisy = run(HONEST_SINE, PERIOD_S)
     sine_m = 0.01 * STROKE_M * np.sin(1e5 * noisy.time_s)
     np.testing.assert_allclose(noisy.measured_m - noisy.true_m, sine_m, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(quiet.measured_m, quiet.true_m)
@@ -141,6 +148,12 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At a tenth of the seed's sample rate its trapezoidal solve misses a, b, c by 2 %, and the command says so."""
+
+    def run_of(file: ValveFile, noise: Noise, period_s: float) -> ScenarioRun:
+        assert file == FILE
+        return run(noise, period_s)
+
+    monkeypatch.setattr(scenario, "run_scenario", run_of)
     monkeypatch.setattr(scenario, "SEED_PERIOD_S", PERIOD_S)
     monkeypatch.setattr(noise_table, "PERIODS_S", (1e-3,))
     words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json"), "--seeds", "3"]

@@ -1,7 +1,5 @@
 """Daemon and slave as processes on a serial line (two pseudo-terminals): `run`, `probe`, `doctor`, bad input."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +11,11 @@ from config.daemon_file import load_daemon
 from config.errors import InputError
 from positioner.cli import doctor
 from positioner.cli.main import main
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.cli.parts.pseudo_line import pseudo_line
 from positioner.dcs import Dcs
 from sim.slave.slave import slave_of
+from tests.children import ended, running
 from tests.cli.test_daemon_process import LAW, until
 
 pytestmark = pytest.mark.real_time
@@ -88,7 +87,6 @@ def test_bad_input_is_one_line_and_status_2(line: Line, tmp_path: Path) -> None:
             slave_of(tmp_path / name, 0 if name == "port.toml" else None)
         assert words in str(caught.value)
         assert "\n" not in str(caught.value)
-    command = [sys.executable, "-m", "positioner.cli", "run", str(tmp_path / "daemon.toml")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
-    assert "/dev/ttyNONE unit 1: No such file or directory" in done.stderr
+    done = ended("run", tmp_path / "daemon.toml")
+    assert (done.status, done.out, done.log.count("\n")) == (2, "", 1), done.log
+    assert "/dev/ttyNONE unit 1: No such file or directory" in done.log

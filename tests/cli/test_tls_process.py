@@ -4,8 +4,6 @@ import json
 import socket
 import ssl
 import struct
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +20,9 @@ from config.tls_table import Tls
 from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.authority import Authority, Owner
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
+from tests.children import ended, running
 from tests.cli.test_daemon_process import LAW, until
 
 pytestmark = pytest.mark.real_time
@@ -216,11 +215,6 @@ def test_a_missing_certificate_is_one_line(tmp_path: Path) -> None:
         "[bus.tls]\nauthority = 'a.pem'\ncertificate = 'b.pem'\nkey = 'b.key'\n[clock]\nmode = 'lockstep'\n"
     )
     for command, name in (("run", "daemon.toml"), ("sim", "slave.toml")):
-        done = subprocess.run(
-            [sys.executable, "-m", "positioner.cli", command, str(tmp_path / name)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-        assert f"{tmp_path / 'a.pem'}: cannot be read: No such file" in done.stderr
+        done = ended(command, tmp_path / name)
+        assert (done.status, done.log.count("\n")) == (2, 1), done.log
+        assert f"{tmp_path / 'a.pem'}: cannot be read: No such file" in done.log

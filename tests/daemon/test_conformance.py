@@ -20,11 +20,12 @@ from config.valve_file import shipped_valve
 from fieldbus.modbus import server as modbus_server
 from fieldbus.modbus.connection import SEND_TIMEOUT_S
 from fieldbus.modbus.server import MOST_CLIENTS, RegisterServer
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
+from tests.children import running
 
 pytestmark = pytest.mark.real_time
 

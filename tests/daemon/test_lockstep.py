@@ -2,8 +2,9 @@
 
 import tomllib
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
+
+import pytest
 
 from config.codes import Mode
 from config.daemon_file import DaemonFile
@@ -11,7 +12,7 @@ from config.device import ModbusTcpDevice
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from drivers import driver_for
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
@@ -23,6 +24,7 @@ from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.refiner import InProcessRefiner
 from positioner.virtual.virtual_cycle import played, virtual_cycle
 from sim.slave.modbus_slave import device_of
+from tests.children import running
 
 STROKE_M = 0.1016
 SLAVE = '[clock]\nmode = "lockstep"\nperiod_s = 1e-3\n[sensor]\nnoise_std_m = 1e-5\nseed = 4\n'
@@ -57,19 +59,23 @@ def recorded(folder: Path) -> list[str]:
     return [line for line in path.read_text().splitlines() if not line.startswith("#")]
 
 
-def test_two_runs_give_the_same_recording_bit_by_bit(tmp_path: Path) -> None:
-    first, second = recorded(tmp_path / "first"), recorded(tmp_path / "second")
-    assert len(first) > 1800
-    assert first == second
-    states = {int(line.split(",")[5]) for line in first[1:]}
+@pytest.fixture(scope="module")
+def over_tcp(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    return recorded(tmp_path_factory.mktemp("lockstep") / "first")
+
+
+def test_two_runs_give_the_same_recording_bit_by_bit(over_tcp: list[str], tmp_path: Path) -> None:
+    assert len(over_tcp) > 1800
+    assert over_tcp == recorded(tmp_path / "second")
+    states = {int(line.split(",")[5]) for line in over_tcp[1:]}
     assert states >= {1, 2, 3}
 
 
-def test_the_bus_changes_nothing_but_float32_rounding(tmp_path: Path) -> None:
+def test_the_bus_changes_nothing_but_float32_rounding(over_tcp: list[str]) -> None:
     """The same device in memory: what the wire rounds is all that differs."""
     slave = SlaveFile.model_validate(tomllib.loads(SLAVE))
     cycle = virtual_cycle(DAEMON, device_of(slave, shipped_valve("seed")), EXCITED)
     in_memory = [snapshot.sample.position_m for snapshot in played(cycle, dcs, 1.8)]
-    over_tcp = [float(line.split(",")[2]) for line in islice(recorded(tmp_path / "tcp"), 1, None)]
-    assert len(in_memory) == len(over_tcp)
-    assert max(abs(a - b) for a, b in zip(in_memory, over_tcp, strict=True)) < 1e-6
+    measured_m = [float(line.split(",")[2]) for line in over_tcp[1:]]
+    assert len(in_memory) == len(measured_m)
+    assert max(abs(a - b) for a, b in zip(in_memory, measured_m, strict=True)) < 1e-6

@@ -3,10 +3,6 @@
 The daemon's cycle runs here, on a slave process in real time; its cycles are counted, not timed.
 """
 
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -28,6 +24,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace, RealTimePace
 from tests.certificates import folder, tls
+from tests.children import Child, child
 
 pytestmark = pytest.mark.real_time
 
@@ -87,17 +84,11 @@ def wire_of(bus: str) -> Iterator[Wire]:
 
 
 @contextmanager
-def slave(path: Path, table: str, *options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def slave(path: Path, table: str, *options: str) -> Iterator[tuple[Child, str]]:
     path.write_text(f"[bus]\n{table}{AT_REST}")
-    command = [sys.executable, "-m", "positioner.cli", "sim", str(path), *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            ready = process.stdout.readline().strip()
-            assert ready.startswith("listening on ")
-            yield process, ready
-        finally:
-            process.kill()
+    with child("sim", path, *options) as (process, ready):
+        assert ready.startswith("listening on ")
+        yield process, ready
 
 
 def cycles_until(cycle: Cycle, holds: Callable[[], bool], what: str, most: int = MOST_CYCLES) -> int:
@@ -139,8 +130,7 @@ def test_a_slave_killed_in_a_breakaway_pulse_ends_in_the_safe_state_and_no_pulse
         pushed_pa, to_follow_pa = cycle.snapshot.sample.pressure_pa, cycle.snapshot.decision.command_pa
         balance_pa = -(LAW["b_over_c_pa_per_m"] * cycle.snapshot.sample.position_m + LAW["k_over_c_pa"])
         assert pushed_pa <= balance_pa + PUSH_LIMIT_PA
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
+        process.kill()
     took = cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.NO_REPLY, "the fault")
     assert took <= 3
     for _ in range(2000):
@@ -175,8 +165,7 @@ def test_a_slave_killed_in_s1_is_a_fault_within_3_cycles_and_is_taken_up_again(b
             )
             cycles_until(cycle, lambda: cycle.snapshot.decision.state is State.S1_UP, "S1")
             commanded_pa = cycle.snapshot.decision.command_pa
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
+            process.kill()
         took = cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.NO_REPLY, "the fault")
         assert took <= file.safety.lost_after_cycles == 3
         decision = cycle.snapshot.decision

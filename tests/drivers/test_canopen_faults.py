@@ -71,6 +71,12 @@ def config(channel: str, **more: object) -> CanopenDevice:
     return CanopenDevice.model_validate({"channel": channel, "node": NODE, "reply_timeout_s": PATIENT_S, **more})
 
 
+@pytest.fixture(autouse=True)
+def nobody_listened_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A node alone on its channel looks whether its id is free, and waits for no answer."""
+    monkeypatch.setattr(canopen_slave, "LISTEN_S", 0.0)
+
+
 @pytest.fixture
 def channel() -> str:
     return free_channel()

@@ -308,7 +308,7 @@ def test_a_device_that_stays_one_reply_behind_is_never_believed(
 ) -> None:
     scripted.fault = one_behind()
     refused_as(NoReply, driver.read)
-    for _ in range(4):
+    for _ in range(2):
         refused_as(NoConnection, driver.open)
         refused_as(NoConnection, driver.read)
     scripted.fault = honest

@@ -21,7 +21,7 @@ LONGEST = 300
 
 @pytest.fixture(scope="module")
 def hidden() -> pos.Hidden:
-    return pos.hide(305, duration_s=10.0)
+    return pos.hide(305, duration_s=6.0)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from config.modbus_map import SIMULATED_MAP
+from positioner.cli.parts.children import port_in
 from sim.slave.clocks import MOST_CATCH_UP_S
+from tests.children import child, ended, running
 from tests.independent import IndependentClient, independent_client
 
 pytestmark = pytest.mark.real_time
@@ -66,8 +68,9 @@ def test_it_serves_in_lockstep_until_told_to_end(tmp_path: Path, number: signal.
 
 def test_real_time_runs_on_by_itself_and_acts_on_silence(tmp_path: Path) -> None:
     text = "[communication]\ntimeout_s = 0.02\naction = 'fill'\n[supply]\nmaximum_pa = 90e3\n"
-    with slave(tmp_path / "slave.toml", text) as (process, port):
-        with independent_client(port) as client:
+    (tmp_path / "slave.toml").write_text(text)
+    with child("sim", tmp_path / "slave.toml", "--port", "0") as (process, ready):
+        with independent_client(port_in(ready)) as client:
             first = last = sample(client)
             for _ in range(100_000):
                 if last[3] >= first[3] + 50_000:
@@ -80,13 +83,16 @@ def test_real_time_runs_on_by_itself_and_acts_on_silence(tmp_path: Path) -> None
             assert last[0] > 0.001
             time.sleep(1.2 * MOST_CATCH_UP_S)  # nobody asks; had it not gone on by itself, it would say so now
             sample(client)
-        assert end(process, signal.SIGTERM) == ENDED_WELL
+        process.signal(signal.SIGTERM)
+        assert process.ended() == ENDED_WELL
 
 
 def test_a_port_in_use_and_bad_files_are_one_line_and_status_2(tmp_path: Path) -> None:
-    with slave(tmp_path / "slave.toml", "") as (_, port):
+    (tmp_path / "slave.toml").write_text("")
+    with running("sim", tmp_path / "slave.toml", "--port", "0") as ready:
+        port = str(port_in(ready))
         said = {
-            ("slave.toml", "--port", str(port)): f"127.0.0.1:{port}: cannot listen there: Address already in use",
+            ("slave.toml", "--port", port): f"127.0.0.1:{port}: cannot listen there: Address already in use",
             ("none.toml",): "cannot be read: No such file",
             ("bad.toml",): "clock.mode",
             ("ageing.toml",): "below coulomb_n",
@@ -94,10 +100,9 @@ def test_a_port_in_use_and_bad_files_are_one_line_and_status_2(tmp_path: Path) -
         (tmp_path / "bad.toml").write_text("[clock]\nmode = 'fast'\n")
         (tmp_path / "ageing.toml").write_text("[[change]]\nat_s = 5\ncoulomb_n = 1e4\n")
         for (name, *options), line in said.items():
-            with start(tmp_path / name, *options) as process:
-                out, error = process.communicate(timeout=60)
-            assert (process.returncode, out, error.count("\n")) == (2, "", 1), error
-            assert line in error
+            done = ended("sim", tmp_path / name, *options)
+            assert (done.status, done.out, done.log.count("\n")) == (2, "", 1), done.log
+            assert line in done.log
 
 
 def test_help_does_not_load_the_model() -> None:

@@ -8,7 +8,6 @@ p is the measured pressure, or the model's where there is none. x'' comes from l
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from config.recording import Column
 from config.results.result import Brief
@@ -41,6 +40,8 @@ def forces(
     valve: ValveParameters, time_s: Column, position_m: Column, pressure_pa: Column, load_n: Column, noise_m: float
 ) -> Forces:
     """Reconstruct the friction of an unbroken stretch without NaN, arrays of (n,); none of fewer than nine samples."""
+    from scipy.signal import savgol_filter  # takes as long to load as all else together
+
     if time_s.size < PARABOLA:
         return Forces(*np.empty((5, 0)))
     velocity = velocity_m_per_s(time_s, position_m)

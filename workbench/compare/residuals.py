@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from config.recording import Column
 from config.results.result import Brief
@@ -111,5 +110,7 @@ def _correlated(first: Column, second: Column) -> Column:
 
 def spectrum(residual_m: Column, period_s: float) -> Spectrum:
     """Return Welch's estimate of the density, m^2/Hz, for an evenly sampled residual, m, (n,)."""
+    from scipy.signal import welch  # takes as long to load as all else together
+
     frequency, density = welch(residual_m, 1.0 / period_s, nperseg=min(1024, residual_m.size))
     return Spectrum(frequency, density)

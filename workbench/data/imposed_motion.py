@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from config.errors import InputError
 from config.recording import Column, Recording, read_table
@@ -34,8 +33,8 @@ FORCES = ("time_s", "pressure_pa", "position_m", "load_n")
 CURVE = ("branch", "pressure_pa", "position_m")
 BRANCHES = {"rising": 1.0, "falling": -1.0}
 TURNED = 6.0
-SMOOTHED = float(savgol_coeffs(PARABOLA, 2)[PARABOLA // 2] ** 0.5)
-"""Standard deviation that smoothing leaves of noise of 1."""
+SMOOTHED = (59.0 / 231.0) ** 0.5
+"""Standard deviation that smoothing by parabolas over nine samples leaves of noise of 1."""
 LEAST_MOTION = 10.0
 """Standard deviations of the noise that a stem moves at least; without noise, 1e-6 of the stroke."""
 NEAR_ENDS = 0.05
@@ -201,6 +200,8 @@ def _curve(recording: Recording) -> Rows:
 
 def _moved(recording: Recording, valve: ValveParameters) -> Rows:
     """Return the rows from the first motion on."""
+    from scipy.signal import savgol_filter  # takes as long to load as all else together
+
     _require_columns(recording, FORCES)
     finite = np.all([np.isfinite(recording.columns[name]) for name in FORCES], axis=0)
     time_s, pressure_pa, position_m, load_n = (recording.columns[name][finite] for name in FORCES)

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from positioner.cli.parts.children import port_in, running
+from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
+from tests.children import running
 
 pytestmark = pytest.mark.real_time
 
