@@ -36,6 +36,7 @@ from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
+from positioner.estimation.landings.landing_detector import VISIBLE
 from sim.slave.simulated_device import Device
 from sim.open_loop import STEP_S
 from sim.valve import Valve
@@ -254,6 +255,7 @@ def outcome(seed: int, steps: int) -> tuple[Drawn, Outcome]:
     )
     growth = max((e.parameters["growth"] for e in each.file.effect if e.name == "position_friction"), default=0.0)
     least_m = (valve.static_n - valve.coulomb_n) / valve.spring_n_per_m * (1 + asymmetry) * (1 + growth)
+    least_m = max(least_m, VISIBLE * each.stroke_m)
     ratios = decision.applied.ratios
     bottom = max(0.1, (-ratios.k_over_c - ratios.offset_pa) / -ratios.b_over_c / each.stroke_m + 0.02)
     low, high = bottom + least_m / each.stroke_m + 0.03, 0.87 - least_m / each.stroke_m

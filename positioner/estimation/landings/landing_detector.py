@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 
-VISIBLE = 2e-3
-"""Of the stroke: a way shorter than this is no slide."""
+VISIBLE = 5e-3
+"""Of the stroke: a way shorter than this is no slide, but the packing giving way."""
 VISIBLE_NOISES = 6.0
 PRECISE, LONG = 2e-4, 60
 """Of the stroke: a rest known no better is averaged on, up to so many samples."""
@@ -121,7 +121,7 @@ class LandingDetector:
     def _learn_quantum(self, position_m: float) -> None:
         step_m = abs(position_m - self._position_m)
         if step_m > SAME * self._stroke_m:
-            self.quantum_m = min(step_m, self.quantum_m or step_m)
+            self.quantum_m = self._window.quantum_m = min(step_m, self.quantum_m or step_m)
 
     def _change_level(self, time_s: float, position_m: float, command_pa: float) -> None:
         sense = 1 if command_pa > self._level_pa else -1

@@ -3,7 +3,8 @@
     p_j = κ x_j + φ_up + e_j       after a slide upward          κ = k_s/A,  φ_up   = (F_c,up + F_0)/A
     p_j = κ x_j - φ_down + e_j     after a slide downward                    φ_down = (F_c,down - F_0)/A
 
-Three unknowns θ, least squares with Huber's weights, for a slide that ended under a moving pressure is an outlier.
+Three unknowns θ, least squares with Huber's weights, for a slide that ended under a moving pressure is an outlier, and
+so is a stuck stem that gave way in its packing.
 The residuals say how well the law holds: with n landings,
 
     s^2 = max(Σ w e^2 / (n - 3), (κ σ_x)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
@@ -34,7 +35,8 @@ LARGEST_SHIFT = 0.01
 """Of the stroke: by which a deviation of φ may shift where a slide lands."""
 LARGEST_RESIDUAL = 0.05
 """Of the stroke: landings that miss the law by more, as a standard deviation, lie on no straight line."""
-HUBER, ROUNDS = 2.0, 5
+HUBER, FAR, ROUNDS = 2.0, 6.0, 6
+"""Deviations beyond which a landing counts less, and not at all."""
 DEVIATIONS = 3.0
 LEAST_SHIFT = 2e-3
 """Of the stroke: two laws nearer to each other than this agree."""
@@ -123,9 +125,12 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     X = np.column_stack((x / stroke_m, up, up - 1.0))
     if np.linalg.matrix_rank(X, tol=1e-3) < 3:
         return no_static_law(Refusal.ILL_CONDITIONED, len(landings))
-    theta, weights = _huber(X, p)
+    theta, weights = _robust(X, p)
     residual_pa = p - X @ theta
-    free = len(landings) - 3
+    kept = np.count_nonzero(weights)
+    if min(weights[up > 0].astype(bool).sum(), weights[up == 0].astype(bool).sum()) < FEWEST_EACH or kept < FEWEST:
+        return no_static_law(Refusal.LANDINGS_TOO_FEW, len(landings))
+    free = kept - 3
     seen_pa = max(each.std_m for each in landings) * abs(theta[0]) / stroke_m
     s = max(sqrt(float(weights @ residual_pa**2) / free), seen_pa)
     scale = np.diag((1 / stroke_m, 1.0, 1.0))
@@ -137,14 +142,17 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
         slope=Estimate(slope, float(std[0]), reason),
         up=Estimate(up_pa, float(std[1]), reason),
         down=Estimate(down_pa, float(std[2]), reason),
-        landings=len(landings),
+        landings=int(kept),
         residual_m=s / abs(slope) if slope else inf,
         covariance=covariance,
     )
 
 
-def _huber(X: Array, p: Array) -> tuple[Array, Array]:
-    """Return theta by least squares with Huber's weights, and the weights; scale by the median deviation."""
+def _robust(X: Array, p: Array) -> tuple[Array, Array]:
+    """Return theta by least squares with Huber's weights, and the weights, 0 for what is far off.
+
+    The scale is the median deviation.
+    """
     weights: Array = np.ones(p.size)
     theta: Array = np.zeros(3)
     for _ in range(ROUNDS):
@@ -153,6 +161,7 @@ def _huber(X: Array, p: Array) -> tuple[Array, Array]:
         off = np.abs(p - X @ theta)
         scale = 1.4826 * float(np.median(off)) * sqrt(p.size / (p.size - 3))
         weights = np.minimum(1.0, HUBER * max(scale, 1e-9) / np.maximum(off, 1e-9))
+    weights = np.where(off > FAR * max(scale, 1e-9), 0.0, weights)
     return theta, weights
 
 

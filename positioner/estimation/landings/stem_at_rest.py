@@ -3,8 +3,9 @@
 Samples are kept from the change of the pressure on, at t = 0. The stem rests at time T if nothing moves in the second
 half of them, from T/2 to T: all samples within
 
-    tolerance = max(5 sigma, 1e-4 stroke)       sigma the noise, from second differences, and no more than twice that of
-                                                the rests before, or a creep would pass for noise
+    tolerance = max(5 sigma, quantum, 1e-4 stroke)
+    sigma     the noise, from second differences; of few samples no more than twice that of the rests before, or a creep
+              would pass for noise
 
 of their mean, and the two quarters alike. So a stem must have rested for as long as it took to get there, T_s, and
 behind a slow pressure, whose rate nobody has told, it is waited for as long as it creeps. Where noise hides the end of
@@ -34,8 +35,8 @@ PRESSURE_LEFT = 0.01
 """Share of the range of the measured pressure by which its quarters may differ."""
 POOLED = 0.2
 """Weight of a rest in the variance of the noise."""
-NOISIER = 2.0
-"""Factor on the noise of the rests before."""
+NOISIER, FEW = 2.0, 32
+"""Factor on the noise of the rests before; rows in the second half that are few."""
 LONGEST_HIDDEN = 3.0
 """Of the time to come near: a creep hidden by noise is waited for no longer."""
 LOOKED_AGAIN = 1.1
@@ -58,11 +59,17 @@ class Rest:
 
 
 class RestWindow:
-    """The samples since the pressure was changed; `rest` is None until the stem has come to rest."""
+    """The samples since the pressure was changed.
+
+    Attributes:
+        rest: None until the stem has come to rest.
+        quantum_m: of the position, as known by now.
+    """
 
     def __init__(self, stroke_m: float) -> None:
         self._tolerance_m = TOLERANCE * stroke_m
         self._rows = np.empty((MOST, 3))
+        self.quantum_m = 0.0
         self._variance_m2: float | None = None
         self.restart(0.0)
 
@@ -116,11 +123,12 @@ class RestWindow:
         if late_m.size < FEWEST:
             return None
         noise_m = _noise(late_m)
-        if self._variance_m2 is not None:
-            noise_m = min(noise_m, NOISIER * sqrt(self._variance_m2 / self._each))
-        within_m = max(SCATTER * noise_m, self._tolerance_m)
+        if self._variance_m2 is not None and late_m.size < FEW:
+            usual_m = max(sqrt(self._variance_m2), self.quantum_m / sqrt(12))
+            noise_m = min(noise_m, NOISIER * usual_m / sqrt(self._each))
+        within_m = max(SCATTER * noise_m, 1.01 * self.quantum_m, self._tolerance_m)
         mean_m = float(late_m.mean())
-        if np.abs(late_m - mean_m).max() > within_m or not _flat(late_m, 0.5 * self._tolerance_m):
+        if np.abs(late_m - mean_m).max() > within_m or not _flat(late_m, 0.5 * max(self._tolerance_m, self.quantum_m)):
             return None
         if np.isfinite(pressure_pa).all() and not _flat(pressure_pa[half:], PRESSURE_LEFT * float(np.ptp(pressure_pa))):
             return None
