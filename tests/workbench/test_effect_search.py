@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,24 @@ Ends = Callable[[Effects, Effects], float]
 """From the effects a fit begins with, and those it is to add, to the error that it comes to, in floors."""
 
 
+@dataclass(frozen=True)
+class Begun:
+    """A fit made by hand as it is begun: what its first search came to, and what all come to."""
+
+    first: Fit
+    best: Fit
+
+    @property
+    def cost(self) -> float:
+        return self.first.cost
+
+    def judged(self, **_: object) -> Fit:
+        return self.first
+
+    def finished(self, **_: object) -> Fit:
+        return self.best
+
+
 def names(step: EffectStep) -> list[str]:
     return [each.name for each in step.candidates]
 
@@ -31,16 +50,26 @@ def names(step: EffectStep) -> list[str]:
 def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep, ...]]:
     """Search with a library of these names, each fit coming to what the test says."""
 
-    def searched(ends: Ends, *library: str, local_minimum: float = np.inf, workers: int = 2) -> tuple[EffectStep, ...]:
-        def fit(_: Recording, valve: ValveFile, *, effects: Sequence[str] = (), **__: object) -> Fit:
+    def searched(
+        ends: Ends, *library: str, local_minimum: float = np.inf, workers: int = 2, first: float = 1.0
+    ) -> tuple[EffectStep, ...]:
+        def made(valve: ValveFile, effects: Sequence[str]) -> Fit:
             there = tuple(each.name for each in valve.effect)
             floors = ends(frozenset(there), frozenset(effects))
             return fit_of(*there, *effects, cost=floors * AT_FLOOR, rms_m=floors * FLOOR_M)
+
+        def fit(_: Recording, valve: ValveFile, **__: object) -> Fit:
+            return made(valve, ())
+
+        def begun_fit(_: Recording, valve: ValveFile, effects: Sequence[str], __: Fit) -> Begun:
+            best = made(valve, effects)
+            return Begun(replace(best, cost=first * best.cost, rms_m=first * best.rms_m), best)
 
         def block_errors(found: Fit, _: object) -> BlockErrors:
             return errors_of(found.rms_m)
 
         monkeypatch.setattr(effect_search, "fit", fit)
+        monkeypatch.setattr(effect_search, "begun_fit", begun_fit)
         monkeypatch.setattr(effect_search, "block_errors", block_errors)
         monkeypatch.setattr(EffectSearch, "_local_minimum", lambda *_: local_minimum)
         search = search_of({name: LIBRARY[name] for name in library}, workers)
@@ -139,6 +168,26 @@ def test_what_the_base_left_behind_is_refitted_from_it(searched: Callable[..., t
     first = searched(ends, "backlash", "ip_lag", local_minimum=4.0 * AT_FLOOR)[0]
     errors_m = {each.name: each.model.errors.test_rmse_m for each in first.candidates if each.model}
     assert errors_m["backlash"] == pytest.approx(4.0 * FLOOR_M)
+
+
+def error_in_floors(step: EffectStep, name: str) -> float:
+    (errors,) = (each.model.errors for each in step.candidates if each.name == name and each.model)
+    return errors.test_rmse_m / FLOOR_M
+
+
+def test_what_is_far_behind_is_not_searched_further(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    floors = {"ip_lag": 1.0, "backlash": 18.0, "stribeck": 9.0}
+    (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.5)
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 1.5 * 18.0})
+
+
+def test_what_is_named_is_searched_in_full_however_far_behind(
+    searched: Callable[..., tuple[EffectStep, ...]],
+) -> None:
+    floors = {"sensor_offset": 1.0, "preload": 18.0}
+    (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.5)
+    assert {each.name for each in step.indistinguishable} == {"preload", "sensor_offset"}, "one by algebra"
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors)
 
 
 def test_the_experiment_is_for_the_first_set_that_a_record_can_tell_apart(monkeypatch: pytest.MonkeyPatch) -> None:

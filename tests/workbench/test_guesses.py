@@ -7,7 +7,8 @@ from config.recording import Recording
 from sim.composition import Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
-from workbench.fit.guesses import guessed_values, likely_quanta_m
+from workbench.fit.guesses import FEWEST_RESTS, guessed_values, likely_quanta_m
+from workbench.fit.landings import rests
 from workbench.fit.objective import SimulationError, smoothed
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -25,6 +26,19 @@ def recorded(**effect: float | str) -> Recording:
 def test_a_quantum_of_a_few_noises_is_among_the_likely_ones(quantum_m: float) -> None:
     likely_m = likely_quanta_m(ready(recorded(name="quantisation", quantum_m=quantum_m)))
     assert min(abs(each / quantum_m - 1.0) for each in likely_m) < 2e-3
+
+
+def test_without_enough_rests_all_positions_show_the_quantum() -> None:
+    quantum_m = 5e-4
+    columns = recorded(name="quantisation", quantum_m=quantum_m).columns
+    moving = Recording({name: each[:1500] for name, each in columns.items()})
+    assert len(rests(ready(moving))) < FEWEST_RESTS
+    assert likely_quanta_m(ready(moving))[0] == pytest.approx(quantum_m, rel=2e-3)
+
+
+def test_a_stem_that_hardly_moves_shows_no_quantum() -> None:
+    columns = recorded(name="quantisation", quantum_m=5e-4).columns
+    assert likely_quanta_m(ready(Recording({name: each[:300] for name, each in columns.items()}))) == []
 
 
 def test_stops_are_sought_where_the_positions_end() -> None:

@@ -6,6 +6,8 @@ resolved. The minimiser is scipy's trust region reflective, in a box round its s
 
 What is left are stairs that no derivative sees: a break-away one sample early or late. Each coordinate is scanned to
 either side over five hundredths, the lowest step taken and the descent begun again there, until the parameters stay.
+
+Where a sensor rounds, all of this is done by the position before rounding first: rounded ones show no way down.
 """
 
 from math import inf
@@ -94,16 +96,28 @@ def settled(error: SimulationError, z: Vector, scanned_below: float = inf) -> Ve
     """
     smooth = smoothed(error, z)
     if smooth is not error:
-        z = min(z, descended(smooth, z, COARSE), key=error.cost)
+        # At the wider scale first: a slip mistimed by a stair outweighs there what is little outside its quantum.
+        there = _scanned_each(smooth, descended(smooth, z, MIDDLING), MIDDLE)
+        z = min(z, _at_rest(smooth, there), key=error.cost)
+    return _at_rest(error, z, scanned_below)
+
+
+def _at_rest(error: SimulationError, z: Vector, scanned_below: float = inf) -> Vector:
+    """Return where descents and scans by turns leave z as it is."""
     for _ in range(ROUNDS):
         z = descended(error, descended(error, z, COARSE), NARROW)
         at_rest = error.cost(z)
         if at_rest > scanned_below:
             break
-        for i in range(z.size):
-            z = scanned(error, z, i)
+        z = _scanned_each(error, z, FINAL)
         if error.cost(z) > at_rest * (1.0 - SETTLED):
             break
+    return z
+
+
+def _scanned_each(error: SimulationError, z: Vector, scale: float) -> Vector:
+    for i in range(z.size):
+        z = scanned(error, z, i, scale=scale)
     return z
 
 

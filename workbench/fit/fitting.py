@@ -175,26 +175,27 @@ def fit(
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect or parameter.
     """
-    require_fittable(recording)
-    record = ready(recording)
-    require_units(record, valve.valve)
-    _require_motion(record)
-    if not effects:
-        composition = Composition.from_file(valve)
-        error = _error(composition, record, free, from_pressure)
-        origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
-        begins = base_starts(error, origins, seed, DRAWS)
-        found = _searched(composition, error, begins, OF_BASE, profile, workers, progress)
-        return replace(found, seeds=(*found.seeds, *origins))
-    ground = base or fit(recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free))
-    composition = _extended(ground.valve, effects, valve.valve)
+    record = _fittable(recording, valve)
+    if effects:
+        ground = base or fit(
+            recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free)
+        )
+        return _begun(record, valve, effects, ground, free, workers, progress).finished(profile=profile)
+    composition = Composition.from_file(valve)
     error = _error(composition, record, free, from_pressure)
-    names = {find_effect(name, "effects").name for name in effects}
-    added = [each for each in error.parameters if each.name.partition(".")[0] in names]
-    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in ground.seeds]
-    begins = effect_starts(error, added, seeds)
-    effort = replace(OF_EFFECT, improves_below=ground.cost / WITHIN)
-    return _searched(composition, error, begins, effort, profile, workers, progress)
+    origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
+    begins = base_starts(error, origins, seed, DRAWS)
+    found = _carried(composition, error, begins, OF_BASE, workers, progress).finished(profile=profile)
+    return replace(found, seeds=(*found.seeds, *origins))
+
+
+def begun_fit(recording: Recording, valve: ValveFile, effects: Sequence[str], base: Fit) -> "BegunFit":
+    """Fit a valve with effects added to a base fit, on one thread, as far as to where the best search stays.
+
+    Raises:
+        InputError: the recording holds too little, other units than SI, or an unknown effect.
+    """
+    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None).settled(1)
 
 
 def profiled(found: Fit, recording: Recording) -> Fit:
@@ -258,16 +259,42 @@ def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTa
     return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
 
 
-def _searched(
+def _fittable(recording: Recording, valve: ValveFile) -> Record:
+    require_fittable(recording)
+    record = ready(recording)
+    require_units(record, valve.valve)
+    _require_motion(record)
+    return record
+
+
+def _begun(
+    record: Record,
+    valve: ValveFile,
+    effects: Sequence[str],
+    base: Fit,
+    free: Sequence[str] | None,
+    workers: int | None,
+    progress: Progress | None,
+) -> "BegunFit":
+    """Search with effects added to a base fit, as far as the middling scale."""
+    composition = _extended(base.valve, effects, valve.valve)
+    error = _error(composition, record, free, base.from_pressure)
+    names = {find_effect(name, "effects").name for name in effects}
+    added = [each for each in error.parameters if each.name.partition(".")[0] in names]
+    seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
+    effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
+    return _carried(composition, error, effect_starts(error, added, seeds), effort, workers, progress)
+
+
+def _carried(
     composition: Composition,
     error: SimulationError,
     begins: Sequence[Place],
     effort: Effort,
-    profile: bool,
     workers: int | None,
     progress: Progress | None,
-) -> Fit:
-    """Search from every start, and judge what was found."""
+) -> "BegunFit":
+    """Search from every start at the wide scale, and from the best of these at the middling one."""
     tell = progress or (lambda _: None)
     rough = error.rough
 
@@ -277,40 +304,80 @@ def _searched(
     def carried(start: Place) -> Place:
         return replace(start, z=descended(smoothed(rough, start.z), start.z, MIDDLING))
 
-    def ended(start: Place) -> Place:
-        return replace(start, z=settled(error, start.z, effort.improves_below))
-
     def screening(start: Place) -> float:
         return rough.cost(start.z, MIDDLE)
 
     first = sorted(_each(begun, begins, workers, lambda done: tell(0.3 * done)), key=screening)[: effort.carried]
     second = _by_origins(sorted(_each(carried, first, workers, lambda done: tell(0.3 + 0.2 * done)), key=screening))
-    ends: list[Place] = []
-    while len(ends) < min(effort.settled, len(second)) and (not ends or agreeing(error, ends) < effort.agreeing):
-        pair = second[len(ends) : min(len(ends) + 2, effort.settled)]
-        ends += _each(ended, pair, workers, lambda done: tell(0.5 + 0.4 * done))
-        ends.sort(key=lambda end: error.cost(end.z))
-    agreement = agreeing(error, ends) if error.cost(ends[0].z) < effort.improves_below else 1
-    found = [end.z for end in ends]
-    best = _centred(error, found[0])
-    determined = uncertainty(error, best, found, profile=profile)
-    tell(1.0)
-    valve = _fitted_file(composition, error.theta(best))
-    return Fit(
-        valve,
-        {each.name: _fitted(error, best, determined, i) for i, each in enumerate(error.parameters)},
-        error.rms_m(best),
-        error.run.record.floor_m,
-        error.cost(best),
-        error.count,
-        tuple(_search(error, z) for z in found),
-        agreement,
-        determined.condition,
-        determined.undetermined,
-        error.run.record.notes,
-        error.run.from_pressure,
-        tuple(error.theta(z) for z in (best, *_elsewhere(found))),
-    )
+    return BegunFit(composition, error, second, effort, workers, tell)
+
+
+@dataclass(frozen=True, slots=True)
+class BegunFit:
+    """A fit whose searches have come through the middling scale, the best of them perhaps to where they stay."""
+
+    composition: Composition
+    error: SimulationError
+    places: Sequence[Place]
+    """Where the searches have come to, in the order in which they are brought to where they stay."""
+    effort: Effort
+    workers: int | None
+    tell: Progress
+    ends: tuple[Place, ...] = ()
+    """Where the first of them stay, best first."""
+
+    @property
+    def cost(self) -> float:
+        """Cost of the best end."""
+        return self.error.cost(self.ends[0].z)
+
+    def settled(self, count: int) -> "BegunFit":
+        """Bring at most so many more of the searches to where they stay."""
+
+        def ended(start: Place) -> Place:
+            return replace(start, z=settled(self.error, start.z, self.effort.improves_below))
+
+        chosen = self.places[len(self.ends) : len(self.ends) + count]
+        found = _each(ended, chosen, self.workers, lambda done: self.tell(0.5 + 0.4 * done))
+        return replace(self, ends=tuple(sorted([*self.ends, *found], key=lambda end: self.error.cost(end.z))))
+
+    def finished(self, *, profile: bool) -> Fit:
+        """Return the fit, searches brought to where they stay two at a time until they agree.
+
+        Args:
+            profile: follow the cost for the intervals.
+        """
+        here, most = self, min(self.effort.settled, len(self.places))
+        while len(here.ends) < most and (not here.ends or agreeing(here.error, here.ends) < here.effort.agreeing):
+            # One that was there already is the first of two: the fit is the same whether it was begun apart or not.
+            here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
+        return here.judged(profile=profile)
+
+    def judged(self, *, profile: bool) -> Fit:
+        """Return the fit by what has settled so far.
+
+        Args:
+            profile: follow the cost for the intervals.
+        """
+        error, found = self.error, [end.z for end in self.ends]
+        best = _centred(error, found[0])
+        determined = uncertainty(error, best, found, profile=profile)
+        self.tell(1.0)
+        return Fit(
+            _fitted_file(self.composition, error.theta(best)),
+            {each.name: _fitted(error, best, determined, i) for i, each in enumerate(error.parameters)},
+            error.rms_m(best),
+            error.run.record.floor_m,
+            error.cost(best),
+            error.count,
+            tuple(_search(error, z) for z in found),
+            agreeing(error, self.ends) if self.cost < self.effort.improves_below else 1,
+            determined.condition,
+            determined.undetermined,
+            error.run.record.notes,
+            error.run.from_pressure,
+            tuple(error.theta(z) for z in (best, *_elsewhere(found))),
+        )
 
 
 def _by_origins(places: Sequence[Place]) -> list[Place]:

@@ -1,6 +1,8 @@
 """What the positions of a record suggest for a parameter of an effect: stops at their ends, quanta of their rests.
 
 S(q) = |sum exp(2 pi i x_j / q)|      x_j median position of the j-th rest, where the noise is small; q quantum, m
+
+Where rests are few, samples spread over the record stand in for them: these show a quantum of four noises and more.
 """
 
 from collections.abc import Sequence
@@ -17,6 +19,8 @@ from workbench.model.parameters import Parameter
 ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
 """Quantiles of the positions at their ends; how far inside these, in noises; how far outside, of what is swept."""
 LEAST_REST, FEWEST_RESTS = 8, 6
+MOST_SAMPLES = 500
+"""Samples that stand in for rests."""
 LIKELY_QUANTA = 8
 FINEST, COARSEST = 2.0, 8.0
 """A quantum is sought from so many noises to the swept positions divided by so many."""
@@ -51,11 +55,14 @@ def _ends(position_m: Column, noise_m: float) -> list[dict[str, float]]:
 
 
 def likely_quanta_m(record: Record) -> list[float]:
-    """Return the steps, m, of which the places of rest look most to be multiples, of the highest S(q) first."""
+    """Return the steps, m, of which the positions look most to be multiples, of the highest S(q) first."""
     places_m = _rests_m(record)
     if places_m.size < FEWEST_RESTS:
-        return []
+        samples_m = record.position_m[record.valid]
+        places_m = samples_m[:: 1 + samples_m.size // MOST_SAMPLES]
     swept_m = float(np.ptp(places_m))
+    if swept_m < 2.0 * COARSEST * FINEST * record.noise_m:
+        return []
     frequency = np.arange(COARSEST / swept_m, 1.0 / (FINEST * record.noise_m), 1.0 / (PER_LOBE * swept_m))
     height = np.abs(np.exp(2j * np.pi * np.outer(frequency, places_m)).sum(axis=1))
     peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]))

@@ -193,9 +193,9 @@ class Landings:
             theta: parameter vector.
             kept: indices of theta that stay besides those of motion.
         """
-        pressure_pa = self._error.run.run(theta).pressure_pa
         if self.count < FEWEST:
             return None
+        pressure_pa = self._error.run.run(theta).pressure_pa
         free = [i for i, each in enumerate(self._error.parameters) if each.index not in (*NOT_IN_LANDINGS, *kept)]
         z, left = self._gauss_newton(self._error.coordinates(theta), pressure_pa, free)
         found = self._error.theta(z)
@@ -209,8 +209,14 @@ class Landings:
         The moves are made in the parameters themselves, of which most stand linearly in the balance.
         """
         error = self._error
-        scale_n = self._scale_n(error.theta(z), pressure_pa)
-        left = self._balance_n(error.theta(z), pressure_pa) / scale_n
+        # From the last motion to when the rest has settled.
+        ranges = [_range(pressure_pa[each.moved : each.first + SETTLING]) for each in self._landed]
+        scale_n = self._scale_n(error.theta(z), np.array(ranges))
+        landed = [
+            Loaded(each, each.first, pressures[each.direction > 0], each.direction)
+            for each, pressures in zip(self._landed, ranges, strict=True)
+        ]
+        left = self._balance_n(error.theta(z), landed) / scale_n
         indices = [error.parameters[i].index for i in free]
         begin = error.theta(z)[indices]
         held = HELD / np.abs(self._steps(z, free)) * DIFFERENCE
@@ -220,7 +226,7 @@ class Landings:
             for index, step in zip(indices, steps.tolist(), strict=True):
                 there = theta.copy()
                 there[index] += step
-                columns.append((self._balance_n(there, pressure_pa) / scale_n - left) / step)
+                columns.append((self._balance_n(there, landed) / scale_n - left) / step)
             outlier = OUTLIER * max(1.0, float(np.median(np.abs(left))))
             weights = (1.0 + (left / outlier) ** 2) ** -0.25
             matrix = np.vstack([weights[:, None] * np.array(columns).T, np.diag(held)])
@@ -229,7 +235,7 @@ class Landings:
                 there = theta.copy()
                 there[indices] += part * move
                 reached = error.coordinates(there)
-                after = self._balance_n(error.theta(reached), pressure_pa) / scale_n
+                after = self._balance_n(error.theta(reached), landed) / scale_n
                 if np.abs(after).sum() < np.abs(left).sum():
                     break
             else:
@@ -247,22 +253,17 @@ class Landings:
             steps.append(self._error.theta(there)[index] - theta[index])
         return np.array(steps)
 
-    def _balance_n(self, theta: Vector, pressure_pa: Column) -> Vector:
+    def _balance_n(self, theta: Vector, landed: Sequence[Loaded]) -> Vector:
         """Return A p - k_s x + F - s F_c of the landings, N."""
-        at = [
-            Loaded(each, each.first, _range(_landing(each, pressure_pa))[each.direction > 0], each.direction)
-            for each in self._landed
-        ]
         slow = SLOW * float(theta[STRIBECK])
-        forces = self._forces_n(theta, at, slow)
-        way = np.array([each.direction for each in self._landed])
+        forces = self._forces_n(theta, landed, slow)
+        way = np.array([each.direction for each in landed])
         return np.asarray(forces[:, 0] - way * (forces[:, 1] + theta[VISCOUS] * slow))
 
-    def _scale_n(self, theta: Vector, pressure_pa: Column) -> Vector:
-        """Return sigma_j, N."""
-        ranges = np.array([_range(_landing(each, pressure_pa)) for each in self._landed])
+    def _scale_n(self, theta: Vector, ranges_pa: Vector) -> Vector:
+        """Return sigma_j, N, from the lowest and highest pressures of the landings, (landings, 2)."""
         std_m = np.array([each.std_m for each in self._landed])
-        moving_n = 0.5 * theta[AREA] * (ranges[:, 1] - ranges[:, 0])
+        moving_n = 0.5 * theta[AREA] * (ranges_pa[:, 1] - ranges_pa[:, 0])
         return np.asarray(np.sqrt((theta[SPRING] * std_m) ** 2 + moving_n**2 + FORCE_N**2))
 
     def _static_n(self, theta: Vector, pressure_pa: Column) -> float:
@@ -341,11 +342,6 @@ class Landings:
             stem = self._laws.Stem(time_s, x, 0.0, pressure_pa)
             x += rest.position_m - float(self._laws.sensor(x - slide_m, LONG_S, stem, q, z))
         return x
-
-
-def _landing(rest: Rest, pressure_pa: Column) -> Column:
-    """Return the pressures from the last motion to when the rest has settled."""
-    return pressure_pa[rest.moved : rest.first + SETTLING]
 
 
 def _range(pressure_pa: Column) -> tuple[float, float]:

@@ -84,9 +84,12 @@ def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Seq
     weakest = min(
         (error.coordinates(seeds[0]), *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost
     )
-    points = [*strengths(added), *guessed_values(added, error.run.record)]
+    guesses = guessed_values(added, error.run.record)
+    points = [*strengths(added), *guesses]
+    # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
+    rounds = any(each.guess == "quantum" for each in added)
     starts = [
-        *landed_starts(error, (seeds[-2],), points, added, LANDED_EFFECT),
+        *landed_starts(error, (seeds[-2],), (rounds and guesses[:1]) or points, added, LANDED_EFFECT),
         Place(weakest, "base fit 1"),
     ]
     for number, theta in enumerate(seeds, 1):
@@ -116,7 +119,7 @@ def landed_starts(
     """
     moving = [i for i, each in enumerate(error.parameters) if each.index in (VISCOUS, STATIC) or each in added]
     return [
-        Place(_in_motion(error.rough, z, moving), origin)
+        Place(_in_motion(smoothed(error.rough, z), z, moving), origin)
         for origin, chosen in _halves(rests(error.run.record)).items()
         for z in error.screened(_landed(error, Landings(error, chosen), seeds, points, added), count)
     ]
@@ -136,7 +139,7 @@ def _landed(
     points: Sequence[tuple[float, ...]],
     added: Sequence[Parameter],
 ) -> list[Vector]:
-    kept = [each.index for each in added] if landings.behind_path else []
+    kept = [each.index for each in added if landings.behind_path or each.guess == "quantum"]
     found = []
     for theta in seeds:
         for values in points:
@@ -155,12 +158,12 @@ def _smoothed(error: SimulationError, z: Vector) -> Vector:
     return z if smooth is error.rough else descended(smooth, z, MIDDLING)
 
 
-def _in_motion(rough: SimulationError, z: Vector, moving: Sequence[int]) -> Vector:
+def _in_motion(error: SimulationError, z: Vector, moving: Sequence[int]) -> Vector:
     """Return z with what the landings do not hold moved to where the simulation comes closest, all else kept."""
     for _ in range(ALTERNATIONS):
         before = z
         for i in moving:
-            z = scanned(rough, z, i, ABOUT, MIDDLE)
+            z = scanned(error, z, i, ABOUT, MIDDLE)
         if np.array_equal(z, before):
             break
     return z

@@ -51,7 +51,7 @@ def tried_effects(steps: Sequence[RankedStep], floor: float | None, of: Quantity
     """Return the section of all steps; `parts` says of what the error must fall, part by part."""
     shown = [
         text(
-            "Each effect of the library was added in turn and the whole model refitted with it, all with equal effort. "
+            "Each effect of the library was added in turn and the whole model refitted with it. "
             f"An effect is accepted if its evidence exceeds {LEAST_BIC:g}, the held-out error, {parts}, falls by more "
             f"than {100 * LEAST_REDUCTION:g} % and by more than {LEAST_STANDARD_ERRORS:g} of its own uncertainties, "
             "and its parameters are physically possible."

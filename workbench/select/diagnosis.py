@@ -1,4 +1,4 @@
-"""Diagnose: which effect is missing. Every candidate is refitted in full; none is believed for a falling error alone.
+"""Diagnose: which effect is missing. Every candidate is refitted; none is believed for a falling error alone.
 
 The search (`effect_search`) adds effects one after another. From the fit and the errors of each follows what is
 accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all steps the verdict and its sentence.

@@ -1,13 +1,15 @@
-"""The forward search by simulation: every effect of the library refitted in full, step by step.
+"""The forward search by simulation: every effect of the library refitted, step by step.
 
-A step fits the valve with each effect added, all with the same effort. Before they are judged, the valve without is
-fitted once more from the base parameters of the best of those with: an optimiser's failure must not look like physics.
-Steps go on until the added model explains all, nothing more is accepted, or three effects are added.
+A step fits the valve with each effect added. One whose first search ends far behind another's is not searched further,
+unless the step would name it. Before they are judged, the valve without is fitted once more from the base parameters of
+the best of those with: an optimiser's failure must not look like physics. Steps go on until the added model explains
+all, nothing more is accepted, or three effects are added.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from math import inf
 
 from config.errors import InputError
 from config.valve_file import ValveFile, ValveParameters
@@ -15,7 +17,7 @@ from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.fit.descent import NARROW, descended
-from workbench.fit.fitting import Fit, fit, profiled
+from workbench.fit.fitting import BegunFit, Fit, begun_fit, fit, profiled
 from workbench.fit.objective import SimulationError
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
@@ -33,6 +35,8 @@ BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
 LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
+OUT_OF_RACE = 10.0
+"""Factor on the cost of the best first search of a step, above which an effect is not searched further."""
 
 Progress = Callable[[str, float], None]
 
@@ -115,7 +119,17 @@ class EffectSearch:
         fitted = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
         behind = [name for name, each in fitted.items() if log_likelihood_difference(before.fit, each) > LEFT_BEHIND]
         models |= self._refitted(number, before, behind)
-        return judged_step(before, models, number, self._library)
+        return self._judged_in_full(judged_step(before, models, number, self._library), models, number)
+
+    def _judged_in_full(self, step: EffectStep, models: dict[str, EvaluatedModel | str], number: int) -> EffectStep:
+        """Judge a step anew as long as it names an effect that was out of the race: refitted in full before."""
+        least = min(map(_cost, models.values()), default=inf)
+        full: set[str] = set()
+        while short := {each for each in _named(step) if _cost(models[each]) > OUT_OF_RACE * least} - full:
+            models = models | self._refitted(number, step.before, sorted(short), racing=False)
+            full |= short
+            step = judged_step(step.before, models, number, self._library)
+        return step
 
     def _judged_anew(self, steps: list[EffectStep]) -> list[EffectStep]:
         """Judge an earlier step anew if what was added last does better in it than its own search had found.
@@ -154,26 +168,57 @@ class EffectSearch:
         error = SimulationError(run, composition, parameters, composition.theta)
         return error.cost(descended(error, error.coordinates(composition.theta), NARROW))
 
-    def _refitted(self, number: int, before: EvaluatedModel, names: Sequence[str]) -> dict[str, EvaluatedModel | str]:
-        """Refit the named effects, each on one thread; where that is not possible, say why."""
+    def _refitted(
+        self, number: int, before: EvaluatedModel, names: Sequence[str], *, racing: bool = True
+    ) -> dict[str, EvaluatedModel | str]:
+        """Refit the named effects, each on one thread; where that is not possible, say why.
+
+        Args:
+            number: of the step, from 1.
+            before: the model they are added to.
+            names: of the effects.
+            racing: leave it at one search where another effect's comes to a cost `OUT_OF_RACE` times lower.
+        """
         train, here = self._split.train.recording, before.fit
         known = ValveFile(valve=self._known, effect=here.valve.effect)
 
-        def refitted(name: str) -> EvaluatedModel | str:
+        def begun(name: str) -> BegunFit | str:
             try:
-                found = fit(train, known, effects=(name,), base=here, seed=self._seed, workers=1, profile=False)
+                return begun_fit(train, known, (name,), here)
             except InputError as error:
                 return error.problem
-            return self._evaluated(found)
 
         # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
         dearest_first = sorted(names, key=lambda name: -len(self._library[name].parameters))
+        what, half = f"step {number}: refitting {len(names)} effects", 0.5 / max(1, len(names))
+        fits = []
+        for each in on_threads(begun, dearest_first, self._workers):
+            fits.append(each)
+            self._progress(what, half * len(fits))
+        least = min((each.cost for each in fits if not isinstance(each, str)), default=inf)
+
+        def finished(each: BegunFit | str) -> EvaluatedModel | str:
+            if isinstance(each, str):
+                return each
+            lost = racing and each.cost > OUT_OF_RACE * least
+            return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
+
         models: dict[str, EvaluatedModel | str] = {}
-        for name, model in zip(dearest_first, on_threads(refitted, dearest_first, self._workers), strict=True):
+        for name, model in zip(dearest_first, on_threads(finished, fits, self._workers), strict=True):
             models[name] = model
-            self._progress(f"step {number}: refitting {len(names)} effects", len(models) / len(names))
+            self._progress(what, 0.5 + half * len(models))
         return {name: models[name] for name in names}
 
     def _evaluated(self, found: Fit) -> EvaluatedModel:
         errors = block_errors(found, self._split)
         return EvaluatedModel(found, errors, errors.at_floor(self._split.floor_m))
+
+
+def _cost(model: EvaluatedModel | str) -> float:
+    return model.fit.cost if isinstance(model, EvaluatedModel) else inf
+
+
+def _named(step: EffectStep) -> set[str]:
+    """Return the effects that a step's verdict is about."""
+    one = (each for each in (step.added, step.bare_equivalent) if each)
+    return {each.name for each in (*one, *step.indistinguishable, *step.suspected) if each.model}
