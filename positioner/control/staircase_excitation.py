@@ -4,7 +4,7 @@ From the pressure in force, steps in one direction, each after the stem has come
 
     first step         2 % of the pressure span; while the stem holds, each step is 1.3 times the last (5 % at the most)
     after a slide      0.9 times the rise that broke the stem loose last, and 5 % of it more while the stem holds: so
-                       break-away is found; then 1.05 times that, so that each step is a slide
+                       break-away is found; then 1.05 times that, or more, so that each step is a slide
     at the bound       of the window, or where the next slide would leave it, the staircase turns round
 
 It ends when the landings of both directions give a valid static law, or after `MOST_TURNS`. No alpha and beta are
@@ -21,6 +21,8 @@ FIRST_STEP, LARGEST_STEP = 0.02, 0.05
 GROWTH = 1.3
 LESS, MORE, SURE = 0.9, 0.05, 1.05
 """Of the rise that broke the stem loose last: asked for next, added while it holds, asked for once less has failed."""
+SHORTEST, MOST_SLIDES = 0.025, 8
+"""Of the window: shorter slides are not sought; slides over the window, if break-away allows."""
 FEWEST_EACH = 4
 """Landings in each direction ..."""
 MANY_EACH = 8
@@ -77,7 +79,7 @@ class Staircase:
 
     def after(self, outcome: SlideOutcome | None, position_m: float, limits: StaircaseLimits) -> "Staircase":
         """Return the staircase with its next step, the stem resting at a position, m, after what the last step did."""
-        stairs = self if outcome is None else self._counted(outcome)
+        stairs = self if outcome is None else self._counted(outcome, limits.high_m - limits.low_m)
         if stairs.direction == 0:
             stairs = replace(stairs, direction=1 if position_m < limits.high_m else -1)
         bound_m = limits.high_m if stairs.direction > 0 else limits.low_m
@@ -95,27 +97,29 @@ class Staircase:
             )
         return stairs._stepped(limits)
 
-    def _counted(self, outcome: SlideOutcome) -> "Staircase":
+    def _counted(self, outcome: SlideOutcome, window_m: float) -> "Staircase":
         if not outcome.moved:
             return self
-        sure_pa, least = self._sure_pa()
+        went_m = abs(outcome.position_m - outcome.from_m)
+        sure_pa, least = self._sure_pa(went_m, window_m)
         return replace(
             self,
             ups=self.ups + (outcome.landing and outcome.direction > 0),
             downs=self.downs + (outcome.landing and outcome.direction < 0),
             sure_pa=sure_pa,
             least=least,
-            slide_m=abs(outcome.position_m - outcome.from_m),
+            slide_m=went_m,
             rise_pa=0.0,
             step_pa=0.0,
         )
 
-    def _sure_pa(self) -> tuple[float, bool]:
+    def _sure_pa(self, went_m: float, window_m: float) -> tuple[float, bool]:
         """Return the first step of the next slide, and whether it is known that less would not do."""
         if self.slide_m == 0.0:  # the first slide of a direction: its rise turned friction round, too
             return self.sure_pa, False
-        least = self.least or self.rise_pa > self.sure_pa > 0.0
-        return (SURE if least else LESS) * self.rise_pa, least
+        least = self.least or self.rise_pa > self.sure_pa > 0.0 or went_m < SHORTEST * window_m
+        wanted_m = max(SURE * went_m, window_m / MOST_SLIDES) if least else LESS * went_m
+        return wanted_m * self.rise_pa / went_m, least
 
     def _stepped(self, limits: StaircaseLimits) -> "Staircase":
         span_pa = limits.maximum_pa - limits.minimum_pa

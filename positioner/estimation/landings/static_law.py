@@ -3,11 +3,11 @@
     p_j = κ x_j + φ_up + e_j       after a slide upward          κ = k_s/A,  φ_up   = (F_c,up + F_0)/A
     p_j = κ x_j - φ_down + e_j     after a slide downward                    φ_down = (F_c,down - F_0)/A
 
-Three unknowns θ, least squares with Huber's weights, for a slide that ended under a moving pressure is an outlier, and
-so is a stuck stem that gave way in its packing.
+Three unknowns θ, least squares with Huber's weights, for a slide that ended under a moving pressure is an outlier. A
+stuck stem that gave way in its packing is no slide: it did not go as far as the law says.
 The residuals say how well the law holds: with n landings,
 
-    s^2 = max(Σ w e^2 / (n - 3), (κ σ_x)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
+    s^2 = max(Σ e^2 / (n - 3), (κ σ_x)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
 
 which is the Cramér-Rao bound of white residuals, widened so that three deviations are 99.7 % for few landings, too.
 The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what that model calls impossible is the offset
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan, sqrt
 
 import numpy as np
+import numpy.typing as npt
 
 from config.codes import Refusal
 from positioner.estimation.acceptance import Ratios
@@ -35,8 +36,8 @@ LARGEST_SHIFT = 0.01
 """Of the stroke: by which a deviation of φ may shift where a slide lands."""
 LARGEST_RESIDUAL = 0.05
 """Of the stroke: landings that miss the law by more, as a standard deviation, lie on no straight line."""
-HUBER, FAR, ROUNDS = 2.0, 6.0, 6
-"""Deviations beyond which a landing counts less, and not at all."""
+HUBER, ROUNDS = 2.0, 6
+"""Deviations beyond which a landing counts less."""
 DEVIATIONS = 3.0
 LEAST_SHIFT = 2e-3
 """Of the stroke: two laws nearer to each other than this agree."""
@@ -123,16 +124,19 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     up = np.array([float(each.direction > 0) for each in landings])
     # In strokes, so that the three columns are of one size.
     X = np.column_stack((x / stroke_m, up, up - 1.0))
+    slides = _slides(landings, X, p, stroke_m)
+    ups = int(np.count_nonzero(up[slides]))
+    kept = int(np.count_nonzero(slides))
+    if kept < FEWEST or min(ups, kept - ups) < FEWEST_EACH:
+        return no_static_law(Refusal.LANDINGS_TOO_FEW, kept)
+    X, p = X[slides], p[slides]
     if np.linalg.matrix_rank(X, tol=1e-3) < 3:
-        return no_static_law(Refusal.ILL_CONDITIONED, len(landings))
-    theta, weights = _robust(X, p)
+        return no_static_law(Refusal.ILL_CONDITIONED, kept)
+    theta, weights = _huber(X, p)
     residual_pa = p - X @ theta
-    kept = np.count_nonzero(weights)
-    if min(weights[up > 0].astype(bool).sum(), weights[up == 0].astype(bool).sum()) < FEWEST_EACH or kept < FEWEST:
-        return no_static_law(Refusal.LANDINGS_TOO_FEW, len(landings))
     free = kept - 3
     seen_pa = max(each.std_m for each in landings) * abs(theta[0]) / stroke_m
-    s = max(sqrt(float(weights @ residual_pa**2) / free), seen_pa)
+    s = max(sqrt(float(residual_pa @ residual_pa) / free), seen_pa)
     scale = np.diag((1 / stroke_m, 1.0, 1.0))
     covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * _t_of_three_deviations(free)) ** 2
     slope, up_pa, down_pa = (scale @ theta).tolist()
@@ -142,17 +146,39 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
         slope=Estimate(slope, float(std[0]), reason),
         up=Estimate(up_pa, float(std[1]), reason),
         down=Estimate(down_pa, float(std[2]), reason),
-        landings=int(kept),
+        landings=kept,
         residual_m=s / abs(slope) if slope else inf,
         covariance=covariance,
     )
 
 
-def _robust(X: Array, p: Array) -> tuple[Array, Array]:
-    """Return theta by least squares with Huber's weights, and the weights, 0 for what is far off.
+def _slides(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: float) -> npt.NDArray[np.bool_]:
+    """Return which landings end a slide, not a giving way of the packing that holds the stem: (n,).
 
-    The scale is the median deviation.
+    A slide goes as far as the law says, by half or twice, give or take how far landings lie off the law.
     """
+    way = np.array([float(each.direction) for each in landings])
+    from_m = np.array([each.from_m for each in landings])
+    went_m = way * (X[:, 0] * stroke_m - from_m)
+    slides = np.ones(p.size, dtype=bool)
+    for _ in range(ROUNDS):
+        if np.count_nonzero(slides) < FEWEST or np.linalg.matrix_rank(X[slides], tol=1e-3) < 3:
+            return slides
+        theta, _weights = _huber(X[slides], p[slides])
+        per_m = theta[0] / stroke_m
+        if per_m <= 0:
+            return slides
+        off_m = DEVIATIONS * 1.4826 * float(np.median(np.abs(p - X @ theta)[slides])) / per_m
+        to_go_m = way * ((p - X[:, 1:] @ theta[1:]) / per_m - from_m)
+        now = (went_m > 0.5 * to_go_m - off_m) & (went_m < 2.0 * to_go_m + off_m)
+        if (now == slides).all():
+            break
+        slides = now
+    return slides
+
+
+def _huber(X: Array, p: Array) -> tuple[Array, Array]:
+    """Return theta by least squares with Huber's weights, and the weights; the scale is the median deviation."""
     weights: Array = np.ones(p.size)
     theta: Array = np.zeros(3)
     for _ in range(ROUNDS):
@@ -161,7 +187,6 @@ def _robust(X: Array, p: Array) -> tuple[Array, Array]:
         off = np.abs(p - X @ theta)
         scale = 1.4826 * float(np.median(off)) * sqrt(p.size / (p.size - 3))
         weights = np.minimum(1.0, HUBER * max(scale, 1e-9) / np.maximum(off, 1e-9))
-    weights = np.where(off > FAR * max(scale, 1e-9), 0.0, weights)
     return theta, weights
 
 
