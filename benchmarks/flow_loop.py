@@ -20,18 +20,21 @@ GAINS = (0.1, 0.25, 0.4)
 RATES_PER_S = (1.0, 2.0, 4.0, 8.0, 16.0, 50.0)
 FAST_S = 2.0
 """λ of a controller as fast as the process itself."""
-OURS = (
-    ("dead band 0.1 %", {"dead_band": 1e-3}),
-    ("dead band 0.3 %", {}),
-    ("dead band 1 %", {"dead_band": 1e-2}),
-    ("5 s between excursions", {"interval_s": 5.0}),
-    ("lambda 2 s", {"closed_s": FAST_S}),
-    ("lambda 2 s, 5 s between", {"closed_s": FAST_S, "interval_s": 5.0}),
-)
-CONVENTIONAL = (
-    ("dead band 1 %", {"dead_band": 1e-2}),
-    ("lambda 2 s", {"closed_s": FAST_S}),
-)
+SLIDES, CONVENTIONAL = (FlowCase(law, PERIODS_S[0]) for law in ("slides", "conventional"))
+VARIANTS = {
+    "conventional": {
+        "dead band 1 %": replace(CONVENTIONAL, dead_band=1e-2),
+        "lambda 2 s": replace(CONVENTIONAL, closed_s=FAST_S),
+    },
+    "slides": {
+        "dead band 0.1 %": replace(SLIDES, dead_band=1e-3),
+        "dead band 0.3 %": SLIDES,
+        "dead band 1 %": replace(SLIDES, dead_band=1e-2),
+        "5 s between excursions": replace(SLIDES, interval_s=5.0),
+        "lambda 2 s": replace(SLIDES, closed_s=FAST_S),
+        "lambda 2 s, 5 s between": replace(SLIDES, closed_s=FAST_S, interval_s=5.0),
+    },
+}
 
 
 def figures_of_conventional(period_s: float, gain: float, rate_per_s: float) -> FlowFigures:
@@ -51,11 +54,10 @@ def lines() -> Iterator[str]:
     for gain, rate_per_s in product(GAINS, RATES_PER_S):
         found = [figures_of_conventional(period_s, gain, rate_per_s) for period_s in PERIODS_S]
         yield _line(f"K = {gain:g}, R = {rate_per_s:g} /s", found)
-    for law, variants in (("conventional", CONVENTIONAL), ("slides", OURS)):
-        yield f"{law}"
-        for name, keys in variants:
-            found = [virtual_outcome(replace(FlowCase(law, period_s), **keys)).figures for period_s in PERIODS_S]
-            yield _line(name, found)
+    for law, variants in VARIANTS.items():
+        yield law
+        for name, case in variants.items():
+            yield _line(name, [virtual_outcome(replace(case, period_s=each)).figures for each in PERIODS_S])
 
 
 def _heads(*names: str) -> str:
