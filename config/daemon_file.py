@@ -119,9 +119,9 @@ class LawTable(Schema):
 
 
 class ControlTable(Schema):
-    """Table `[control]`: which law follows the reference, and what the law for small moves may do."""
+    """Table `[control]`: which law follows the reference, and what it may do."""
 
-    law: Literal["seed", "breakaway", "slides"] = "seed"
+    law: Literal["seed", "breakaway", "slides", "conventional"] = "seed"
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
     push_limit_pa: Positive | None = None

@@ -4,6 +4,8 @@ A simulated slave and the daemon run as processes of their own, on the bus that 
 (`parts.simulated_plant`); this command plays the DCS over Modbus TCP: start, identification, steps up and down, ageing
 of the packing by 30 %, the same steps once more, identification anew, and the steps again. What the daemon identified
 is compared with the truth here, where it is known; the daemon never has it.
+
+`--loop flow` is another one: what the laws make of a flow loop, in virtual time (`parts.flow_demo`).
 """
 
 import argparse
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from config.valve_file import ValveParameters
     from positioner.dcs import Dcs
 
-HELP = "identify and control a simulated sticking valve over a real bus, as processes, in under a minute"
+HELP = "identify and control a simulated sticking valve over a real bus, in under a minute; or its flow loop"
 EXAMPLE = "positioner demo --out demo-out"
 
 PSI = 6894.757
@@ -90,13 +92,22 @@ class DemoOutcome:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--bus", choices=tuple(BUSES), default="modbus", help="the fieldbus (modbus)")
+    parser.add_argument("--bus", choices=tuple(BUSES), help="the fieldbus (modbus; of a loop: none, in virtual time)")
+    parser.add_argument("--loop", choices=("flow",), help="in place of steps: does the positioner calm a flow loop?")
     parser.add_argument("--out", type=Path, metavar="DIR", help="keep picture, recording, configs and logs there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the outcome there")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
+    if arguments.loop:
+        from positioner.cli.parts.flow_demo import run_flow
+
+        return run_flow(arguments)
+    return _run_steps(arguments)
+
+
+def _run_steps(arguments: argparse.Namespace) -> int:
     import json
 
     from config.valve_file import load_valve, shipped_valve
@@ -106,7 +117,7 @@ def run(arguments: argparse.Namespace) -> int:
     with _folder(arguments.out) as folder:
         started_s = time.monotonic()
         _print_line("starting a simulated valve and the daemon")
-        with started(arguments.bus, folder, valve) as pair:
+        with started(arguments.bus or "modbus", folder, valve) as pair:
             _print_line(f"slave {pair.slave}; daemon {pair.daemon}")
             outcome = _play(port_in(pair.daemon), valve, pair.powered_s)
         _report(outcome)

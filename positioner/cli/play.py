@@ -27,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
     parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
-    parser.add_argument("--law", choices=("seed", "breakaway", "slides"), default="seed", help="the control law (seed)")
+    laws = ("seed", "breakaway", "slides", "conventional")
+    parser.add_argument("--law", choices=laws, default="seed", help="the control law (seed)")
     parser.add_argument("--period-s", type=float, default=1e-3, help="period of the loop (1e-3)")
     parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
     parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control import breakaway_law as breakaway
+from positioner.control import conventional_law as conventional
 from positioner.control import slide_law as slides
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawayMemory, Observation, initial_memory
+from positioner.control.conventional_law import ConventionalMemory
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
@@ -56,6 +58,8 @@ class ControllerMemory:
     """Of the law for small moves by pulses; None: another law."""
     slides: SlideMemory | None
     """Of the law of slides; None: another law."""
+    conventional: ConventionalMemory | None
+    """Of the conventional law; None: another law."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,7 @@ class Controller:
             identifying=False,
             breakaway=initial_memory(settings.breakaway) if settings.breakaway else None,
             slides=SlideMemory(level_pa=held_pa) if settings.slides else None,
+            conventional=ConventionalMemory(level_pa=held_pa) if settings.conventional else None,
         )
 
     @property
@@ -149,15 +154,15 @@ def step(
     held_pa = _held_pa(memory, state, supervision, sample)
     breakaway_memory = _breakaway_memory(memory, state, reference, sample, settings, applied, identification.estimates)
     slide_memory = _slide_memory(memory, state, reference, sample, settings, applied, outcome, statics)
+    conventional_memory = _conventional_memory(memory, state, reference, sample, settings, applied)
+    law_memory = breakaway_memory or slide_memory or conventional_memory
 
     if supervision.fault is not Fault.NONE:
         wanted_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
         wanted_pa = requests.manual_pa
     else:
-        wanted_pa = _pressure_pa(
-            state, held_pa, excitation, sample.now_s, reference, applied, settings, breakaway_memory or slide_memory
-        )
+        wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, law_memory)
     command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
 
     inhibit_reason = (
@@ -165,9 +170,8 @@ def step(
     )
     if inhibit_reason is InhibitReason.NOTHING and command_pa != wanted_pa:
         inhibit_reason = InhibitReason.LAW_BEYOND_LIMITS
-    small_moves = breakaway_memory or slide_memory
-    if inhibit_reason is InhibitReason.NOTHING and small_moves is not None:
-        inhibit_reason = small_moves.inhibit_reason
+    if inhibit_reason is InhibitReason.NOTHING and law_memory is not None:
+        inhibit_reason = law_memory.inhibit_reason
     decision = Decision(
         command_pa=command_pa,
         state=state,
@@ -193,6 +197,7 @@ def step(
         identifying,
         breakaway_memory,
         slide_memory,
+        conventional_memory,
     ), decision
 
 
@@ -348,6 +353,25 @@ def _slide_memory(
     return slides.step(memory.slides, observation, reference.value_m, balance, settings.slides)
 
 
+def _conventional_memory(
+    memory: ControllerMemory,
+    state: State,
+    reference: Reference,
+    sample: Sample,
+    settings: Settings,
+    applied: Applied,
+) -> ConventionalMemory | None:
+    """Return what the conventional law remembers after this step, if it is the law."""
+    if memory.conventional is None or settings.conventional is None:
+        return None
+    if state not in (State.S1_UP, State.S2_DOWN) or applied.ratios is None:
+        return conventional.while_not_commanding(memory.command_pa)
+    if not usable(sample, settings.limits):
+        return memory.conventional
+    error_m = reference.value_m - sample.position_m
+    return conventional.step(memory.conventional, sample.now_s, error_m, applied.ratios, settings.conventional)
+
+
 def _pressure_pa(
     state: State,
     held_pa: float,
@@ -356,13 +380,13 @@ def _pressure_pa(
     reference: Reference,
     applied: Applied,
     settings: Settings,
-    small_moves: BreakawayMemory | SlideMemory | None,
+    law_memory: BreakawayMemory | SlideMemory | ConventionalMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
     if state is State.S3_IDENTIFY and excitation is not None:
         return excitation.pressure_pa(now_s)
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
-        if small_moves is not None:
-            return small_moves.level_pa
+        if law_memory is not None:
+            return law_memory.level_pa
         return settings.law(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
     return held_pa

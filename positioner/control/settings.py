@@ -7,6 +7,7 @@ from config.daemon_file import DaemonFile, LawTable
 from config.quantities import ActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
+from positioner.control.conventional_law import ConventionalSettings
 from positioner.control.slide_memory import SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
@@ -36,6 +37,8 @@ class Settings:
     """Of the law for small moves by pulses; None: another commands."""
     slides: SlideSettings | None
     """Of the law of slides; None: another commands."""
+    conventional: ConventionalSettings | None
+    """Of the conventional law; None: another commands."""
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
 
@@ -72,6 +75,7 @@ class Settings:
             law=LAWS.get(file.control.law, balance_pa),
             breakaway=_breakaway(file) if file.control.law == "breakaway" else None,
             slides=_slides(file) if file.control.law == "slides" else None,
+            conventional=_conventional(file) if file.control.law == "conventional" else None,
             staircase=_staircase(file) if _by_slides(file) else None,
         )
 
@@ -104,6 +108,14 @@ def _slides(file: DaemonFile) -> SlideSettings:
         breakaway_pa=file.valve.breakaway_pa,
         excursion_limit_m=file.control.excursion_limit * file.valve.stroke_m,
         excursion_interval_s=file.control.excursion_interval_s,
+    )
+
+
+def _conventional(file: DaemonFile) -> ConventionalSettings:
+    return ConventionalSettings(
+        dead_band_m=file.control.dead_band * file.valve.stroke_m,
+        minimum_pa=file.pressure.minimum_pa,
+        maximum_pa=file.pressure.maximum_pa,
     )
 
 

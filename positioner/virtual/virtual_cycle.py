@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from config.daemon_file import DaemonFile
+from drivers.boundary import Driver
 from drivers.in_memory import MemoryDriver, Plant
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
@@ -23,13 +24,25 @@ Script = Callable[[Snapshot, Requests], Requests]
 """A DCS: what it asks for after a snapshot, given what it asked for before."""
 
 
-def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests) -> Cycle:
+def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests, settings: Settings | None = None) -> Cycle:
     """Return a daemon's cycle that commands a device in memory, such as that of `sim.slave.modbus_slave`."""
+    return lockstep_cycle(daemon, MemoryDriver(device), requests, settings)
+
+
+def lockstep_cycle(daemon: DaemonFile, driver: Driver, requests: Requests, settings: Settings | None = None) -> Cycle:
+    """Return a daemon's cycle on a device in lockstep, wherever its driver finds it.
+
+    Args:
+        daemon: its file.
+        driver: of the device.
+        requests: what the DCS asks for at first.
+        settings: of the controller; those of the file where nobody says.
+    """
     pace = DevicePace()
-    link = Link(MemoryDriver(device), pace)
+    link = Link(driver, pace)
     held_pa, _ = link.open()
     health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
-    controller = Controller(Settings.of(daemon), held_pa, InProcessRefiner())
+    controller = Controller(settings or Settings.of(daemon), held_pa, InProcessRefiner())
     return Cycle(link, controller, pace, requests, recorder=None, health=health)
 
 

@@ -1,0 +1,77 @@
+"""The flow loop of `positioner demo --loop flow` under other tunings: is the comparison fair, and what does it hang on?
+
+    python -m benchmarks.flow_loop
+
+First the conventional positioner, K and R over a grid, gain margin 2 at the least: what ours is compared with is the
+pair that leaves the least deviation, summed over both periods, among those that wear the valve no more than ours.
+Then ours with other dead bands, with a least time between excursions, and under a faster controller. Takes two minutes.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+
+from positioner.cli.parts.flow_cases import FlowCase, virtual_outcome
+from positioner.cli.parts.flow_demo import PERIODS_S
+from positioner.control.settings import Settings
+from positioner.virtual.flow_course import FlowFigures
+
+GAINS = (0.1, 0.25, 0.4)
+RATES_PER_S = (1.0, 2.0, 4.0, 8.0, 16.0, 50.0)
+FAST_S = 2.0
+"""λ of a controller as fast as the process itself."""
+SLIDES, CONVENTIONAL = (FlowCase(law, PERIODS_S[0]) for law in ("slides", "conventional"))
+VARIANTS = {
+    "conventional": {
+        "dead band 1 %": replace(CONVENTIONAL, dead_band=1e-2),
+        "lambda 2 s": replace(CONVENTIONAL, closed_s=FAST_S),
+    },
+    "slides": {
+        "dead band 0.1 %": replace(SLIDES, dead_band=1e-3),
+        "dead band 0.3 %": SLIDES,
+        "dead band 1 %": replace(SLIDES, dead_band=1e-2),
+        "5 s between excursions": replace(SLIDES, interval_s=5.0),
+        "lambda 2 s": replace(SLIDES, closed_s=FAST_S),
+        "lambda 2 s, 5 s between": replace(SLIDES, closed_s=FAST_S, interval_s=5.0),
+    },
+}
+
+
+def figures_of_conventional(period_s: float, gain: float, rate_per_s: float) -> FlowFigures:
+    """Return the figures of a conventional positioner so tuned."""
+
+    def tuned(settings: Settings) -> Settings:
+        assert settings.conventional is not None
+        law = replace(settings.conventional, gain=gain, integral_rate_per_s=rate_per_s)
+        return replace(settings, conventional=law)
+
+    return virtual_outcome(FlowCase("conventional", period_s), tuned).figures
+
+
+def lines() -> Iterator[str]:
+    """Yield the tables line by line."""
+    yield f"{'conventional':28}" + _heads("added, %", "strokes/min", "reversals/min")
+    for gain, rate_per_s in product(GAINS, RATES_PER_S):
+        found = [figures_of_conventional(period_s, gain, rate_per_s) for period_s in PERIODS_S]
+        yield _line(f"K = {gain:g}, R = {rate_per_s:g} /s", found)
+    for law, variants in VARIANTS.items():
+        yield law
+        for name, case in variants.items():
+            yield _line(name, [virtual_outcome(replace(case, period_s=each)).figures for each in PERIODS_S])
+
+
+def _heads(*names: str) -> str:
+    return "".join(f"{f'{1e3 * each:g} ms: std, %':>20}" + "".join(f"{n:>15}" for n in names) for each in PERIODS_S)
+
+
+def _line(name: str, found: list[FlowFigures]) -> str:
+    return f"{name:28}" + "".join(
+        f"{100 * each.deviation_std:20.2f}{100 * each.added_std:15.2f}"
+        f"{each.strokes_per_minute:15.2f}{each.reversals_per_minute:15.1f}"
+        for each in found
+    )
+
+
+if __name__ == "__main__":
+    for line in lines():
+        print(line, flush=True)

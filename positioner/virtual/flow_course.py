@@ -1,0 +1,114 @@
+"""A daemon's cycle in a flow loop: the course of flow and stem, and figures of it.
+
+    e = q - q_set               std e, max e - min e, integral of abs(e)
+    e_v = q - q_0               std e_v, what the valve adds; q_0 is the same loop's flow, the stem at its reference
+
+Travel and reversals of the stem are counted as the daemon's own accumulator counts them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from positioner.daemon.health.travel_accumulator import TravelAccumulator
+from positioner.virtual.virtual_cycle import played
+
+if TYPE_CHECKING:
+    from positioner.control.requests import Requests
+    from positioner.daemon.cycle import Cycle
+    from positioner.daemon.snapshot import Snapshot
+    from positioner.virtual.flow_loop import FlowLoop
+
+Series = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+LEAST_MOTION = 2e-3
+"""Of the stroke: a motion that counts as travel."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlowCourse:
+    """Samples of a loop: s, shares and p.u."""
+
+    time_s: Series
+    flow: Series
+    reference_pu: Series
+    stem_pu: Series
+
+
+@dataclass(frozen=True, slots=True)
+class FlowFigures:
+    """How the flow does, and what it costs the valve; flows are shares of full flow."""
+
+    deviation_std: float
+    peak_to_peak: float
+    absolute_error_s: float
+    """Integral of the absolute deviation."""
+    added_std: float
+    """Deviation from the flow that a valve without friction would give."""
+    strokes_per_minute: float
+    reversals_per_minute: float
+
+
+def course_in(
+    cycle: "Cycle", loop: "FlowLoop", write: Callable[[float], None], stroke_m: float, duration_s: float
+) -> FlowCourse:
+    """Run a cycle in a loop for a while, s, `write` taking each reference, p.u., to the daemon."""
+    begin_s = cycle.snapshot.sample.time_s
+    rows: list[tuple[float, float, float, float]] = []
+
+    def dcs(snapshot: "Snapshot", _: "Requests") -> "Requests":
+        time_s, stem_pu = snapshot.sample.time_s, snapshot.sample.position_m / stroke_m
+        if loop.advance(time_s, stem_pu):
+            write(loop.reference_pu)
+        rows.append((time_s - begin_s, loop.flow, loop.reference_pu, stem_pu))
+        return cycle.requests
+
+    for _ in played(cycle, dcs, begin_s + duration_s):
+        pass
+    return FlowCourse(*np.array(rows).T)
+
+
+def course_of_stem(loop: "FlowLoop", time_s: Series, stem_pu: float | None = None) -> FlowCourse:
+    """Return the course of a stem without friction, always at its reference; or of one that stands somewhere, p.u."""
+    rows: list[tuple[float, float, float]] = []
+    for each in time_s.tolist():
+        stem = loop.reference_pu if stem_pu is None else stem_pu
+        loop.advance(each, stem)
+        rows.append((loop.flow, loop.reference_pu, stem))
+    return FlowCourse(time_s, *np.array(rows).T)
+
+
+def figures(course: FlowCourse, frictionless: FlowCourse, setpoint: float, from_s: float) -> FlowFigures:
+    """Return the figures of a course from a time on, s.
+
+    Args:
+        course: of the valve.
+        frictionless: of the same loop at the same times.
+        setpoint: of the flow.
+        from_s: when the steady state begins.
+    """
+    steady = course.time_s >= from_s
+    time_s, deviation = course.time_s[steady], course.flow[steady] - setpoint
+    travel, reversals = _wear(course.stem_pu, int(np.argmax(steady)))
+    minutes = float(time_s[-1] - time_s[0]) / 60
+    return FlowFigures(
+        deviation_std=float(np.std(deviation)),
+        peak_to_peak=float(np.ptp(deviation)),
+        absolute_error_s=float(np.trapezoid(np.abs(deviation), time_s)),
+        added_std=float(np.std(course.flow[steady] - frictionless.flow[steady])),
+        strokes_per_minute=travel / minutes,
+        reversals_per_minute=reversals / minutes,
+    )
+
+
+def _wear(stem_pu: Series, start: int) -> tuple[float, int]:
+    """Return how far the stem went from a sample on, strokes, and how often it turned round."""
+    accumulator = TravelAccumulator(1.0, LEAST_MOTION)
+    travel, reversals = 0.0, 0
+    for index, each in enumerate(stem_pu.tolist()):
+        if index == start:
+            travel, reversals = accumulator.travel_m, accumulator.reversals
+        accumulator.enter(each)
+    return accumulator.travel_m - travel, accumulator.reversals - reversals
