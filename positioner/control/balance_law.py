@@ -19,4 +19,4 @@ def balance_pa(reference_m: float, direction: int, ratios: Ratios) -> float:
     >>> round(balance_pa(0.05, -1, Ratios(b_over_c=-800e3, k_over_c=-22e3)))
     18000
     """
-    return -(ratios.b_over_c * reference_m + direction * ratios.k_over_c) + ratios.offset_pa
+    return ratios.balance_pa(reference_m, direction)

@@ -138,7 +138,7 @@ def step(
     if excitation is not None and memory.excitation is None:
         statics.restart()
     outcome = _slide_outcome(memory, sample, settings, statics)
-    if excitation is not None:
+    if excitation is not None and usable(sample, settings.limits):
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
     identifying, applied = _identify(memory, excitation, sample, requests, settings, identification, statics)
@@ -349,7 +349,7 @@ def _slide_memory(
         quantum_m=statics.detector.quantum_m,
         outcome=outcome,
     )
-    balance = slides.Balance(applied.ratios, statics.landings, settings.limits.stroke_m)
+    balance = slides.Balance(applied.ratios, statics.landings, statics.held, settings.limits.stroke_m)
     return slides.step(memory.slides, observation, reference.value_m, balance, settings.slides)
 
 

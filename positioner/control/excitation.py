@@ -80,11 +80,14 @@ def excitation_after(
 def climbed(
     excitation: ActiveExcitation, outcome: SlideOutcome | None, statics: StaticIdentification, settings: Settings
 ) -> ActiveExcitation:
-    """Return a staircase with its next step, if the stem rests; any other excitation as it is."""
+    """Return a staircase with its next step, if the stem rests; any other excitation as it is.
+
+    Only for a fresh sample: before the last step has been answered, the rest is that of the step before.
+    """
     stairs, rest = excitation.signal, statics.detector.rest
     if not isinstance(stairs, Staircase) or settings.staircase is None or excitation.ended or rest is None:
         return excitation
-    if stairs.over(statics.law.valid):
+    if stairs.over(statics.law.valid, settings.staircase):
         valid = statics.law.valid
         return excitation if valid else replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
     return replace(excitation, signal=stairs.after(outcome, rest.position_m, settings.staircase))

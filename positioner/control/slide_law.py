@@ -1,6 +1,6 @@
 """The law of slides: a stem that slides into rest lands where spring and friction balance, however slow the loop.
 
-    B(x, s)    pressure under which a slide in direction s lands at x            (local_balance.py)
+    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py)
     m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_memory.py)
 
 With the stem at rest at x, e = r - x and s = sign(e):
@@ -10,29 +10,34 @@ With the stem at rest at x, e = r - x and s = sign(e):
     else                             two slides:  u = B(r + s M, s), wait until it rests, u = B(r, -s)
                                                   M = max(1.05 m_-s, m_s - abs(e))
 
-The first of two slides leaves the way between x and r by M: an excursion. It goes the other way round,
+The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
+farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round,
 by r - s M with M = max(1.05 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits.
 Only resting times depend on the period of the loop, not where the stem lands.
 
-While the stem moves, a reference that goes on in the same direction, or lies far enough the other way, is followed at
-once; another waits for the rest. Why there is no limit cycle: what a slide missed corrects B for the next (each miss is
+While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. Why there is no limit cycle: what a slide missed corrects B for the next (each miss is
 a fraction of the one before), the dead band widens from slide to slide, and their number is limited. After the end of a
 move nothing happens until the reference changes, or something else has visibly moved the stem.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isnan
 
 from config.codes import InhibitReason
-from positioner.control.local_balance import landing_pa
 from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.local_balance import ahead_m, landing_pa
 
 RETURN = 1.05
 """Margins that the second slide is given, for a stem must not stay where the first took it."""
+NEARLY = 0.6
+"""Of the shortest slide: a way that held the stem and is longer says that no much shorter one breaks loose."""
 FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
+SLOW = 2e-3
+"""Of the stroke between two samples: an excursion that creeps no faster has done its work."""
 FAR = 2.0
 """Margins beyond which a stem that moves is sent the other way."""
 WITHIN_NOISE, WITHIN_QUANTUM = 2.5, 0.6
@@ -49,19 +54,20 @@ STUCK_MARGIN = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """What the law knows of the valve: the straight law and the landings, the latest first."""
+    """What the law knows of the valve: the straight law, the landings, and what held the stem; the latest first."""
 
     ratios: Ratios
     landings: Sequence[SlideOutcome]
+    held: Sequence[SlideOutcome]
     stroke_m: float
 
     def pressure_pa(self, position_m: float, direction: int) -> float:
         """Return B(x, s), Pa."""
         return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
 
-    def position_m(self, from_m: float, pressure_pa: float, direction: int) -> float:
-        """Return where a slide under a pressure lands, m, by the balance at the place it starts from."""
-        return from_m + (pressure_pa - self.pressure_pa(from_m, direction)) / -self.ratios.b_over_c
+    def way_m(self, each: SlideOutcome) -> float:
+        """Return how far a slide would have gone, m, by the balance at the place it starts from."""
+        return ahead_m(each, self.ratios, self.landings, self.stroke_m)
 
     @property
     def friction_m(self) -> float:
@@ -86,6 +92,9 @@ def step(
         memory = _first_margins(memory, balance, settings)
     if observation.outcome is not None:
         memory = _learnt(memory, observation.outcome, balance)
+    if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
+        return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
+    memory = replace(memory, last_m=observation.position_m)
     if observation.rest is None:
         return _redirected(memory, observation, reference_m, balance, settings)
     if reference_m != memory.target_m:
@@ -93,23 +102,35 @@ def step(
     return _next_slide(memory, observation, balance, settings)
 
 
+def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: float, settings: SlideSettings) -> bool:
+    """Whether the first of two slides has done its work: then the stem need not rest there."""
+    if not memory.excursion or reference_m != memory.target_m or isnan(memory.last_m):
+        return False
+    s, slow_m = memory.direction, SLOW * settings.stroke_m + observation.quantum_m
+    beyond_m = min(s * (each - reference_m) for each in (observation.position_m, memory.last_m))
+    return beyond_m > memory.margin(-s).way_m and abs(observation.position_m - memory.last_m) < slow_m
+
+
 def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSettings) -> SlideMemory:
     """Return the memory with a first margin each way: the shortest slide seen, or what the data sheet says."""
     guess_m = FIRST_MARGIN * balance.friction_m
     if settings.breakaway_pa is not None:
         guess_m = max(guess_m, (settings.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
-    for direction in (1, -1):
-        seen_m = [abs(each.position_m - each.from_m) for each in balance.landings if each.direction == direction]
-        margin = Margin(min(seen_m), broke=True, held=True) if seen_m else Margin(guess_m)
-        memory = memory.with_margin(direction, margin)
+    for s in (1, -1):
+        slid_m = [abs(each.position_m - each.from_m) for each in balance.landings if each.direction == s]
+        held_m = [balance.way_m(each) for each in balance.held if each.direction == s]
+        shortest_m = min(slid_m, default=guess_m)
+        held = NEARLY * shortest_m < max(held_m, default=0.0) < shortest_m
+        memory = memory.with_margin(s, Margin(shortest_m, broke=bool(slid_m), held=held))
     return memory
 
 
 def _learnt(memory: SlideMemory, outcome: SlideOutcome, balance: Balance) -> SlideMemory:
-    """Return the memory after a slide: its margin."""
+    """Return the memory after a slide: its margin. A slide onto a stop says nothing of it."""
+    if outcome.moved and not outcome.landing:
+        return memory
     s = outcome.direction
-    meant_m = s * (balance.position_m(outcome.from_m, outcome.command_pa, s) - outcome.from_m)
-    way_m = s * (outcome.position_m - outcome.from_m) if outcome.moved else meant_m
+    way_m = s * (outcome.position_m - outcome.from_m) if outcome.moved else balance.way_m(outcome)
     return memory.with_margin(s, memory.margin(s).after(way_m, outcome.moved))
 
 
@@ -122,8 +143,7 @@ def _redirected(
         return replace(memory, target_m=reference_m)
     s = 1 if reference_m > observation.position_m else -1
     way_m = abs(reference_m - observation.position_m)
-    goes_on = not memory.excursion and s == memory.direction and s * (reference_m - target_m) > 0
-    if not goes_on and way_m < FAR * memory.margin(s).way_m:
+    if way_m < FAR * memory.margin(s).way_m:
         return memory
     level_pa = min(max(balance.pressure_pa(reference_m, s), settings.minimum_pa), settings.maximum_pa)
     return replace(

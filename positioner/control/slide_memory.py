@@ -1,7 +1,7 @@
 """The memory of the law of slides: the move, the slide in progress, and how far a stem at rest must be sent."""
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, nan
 
 from config.codes import InhibitReason
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -9,7 +9,7 @@ from positioner.estimation.landings.stem_at_rest import Rest
 
 MARGIN_RAISE, MARGIN_LOWER = 1.06, 0.999
 """Factors on a margin after a slide that did not break loose, and after one that did."""
-MARGIN_CLIMB, MARGIN_DESCEND = 1.3, 0.95
+MARGIN_CLIMB, MARGIN_DESCEND = 1.3, 0.85
 """The same as long as no slide has done either."""
 NEAR = 1.1
 """Margins: a slide longer than this says nothing of the margin."""
@@ -79,6 +79,8 @@ class SlideMemory:
     """Given since the reference changed ..."""
     slide_s: float = -inf
     """... and when the last was."""
+    last_m: float = nan
+    """The sample before."""
     up: Margin = Margin()
     down: Margin = Margin()
     excursion_s: float = -inf

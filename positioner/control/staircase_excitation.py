@@ -1,10 +1,12 @@
 """The excitation of S3 by slides: a staircase up and down inside the travel window, at any period of the loop.
 
-From the pressure in force, steps in one direction, each after the stem has come to rest:
+From the pressure in force, steps in one direction, each after the stem has come to rest. R is the rise of the pressure
+since the stem last moved:
 
-    first step         2 % of the pressure span; while the stem holds, each step is 1.3 times the last (5 % at the most)
-    after a slide      0.9 times the rise that broke the stem loose last, and 5 % of it more while the stem holds: so
-                       break-away is found; then 1.05 times that, or more, so that each step is a slide
+    first slide        steps of 2 % of the pressure span, growing by 1.3 (5 % at the most), until the stem breaks loose
+    the next ones      break-away is halved: R = sqrt(low high) of the largest rise that held and the least that did not,
+                       till they are within 15 %, or the slides a fortieth of the window
+    from then on       1.05 times the least, or an eighth of the window if that is more: each step is a slide
     at the bound       of the window, or where the next slide would leave it, the staircase turns round
 
 It ends when the landings of both directions give a valid static law, or after `MOST_TURNS`. No alpha and beta are
@@ -13,14 +15,15 @@ limits.
 """
 
 from dataclasses import dataclass, replace
+from math import sqrt
 
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
 FIRST_STEP, LARGEST_STEP = 0.02, 0.05
 """Of the pressure span."""
-GROWTH = 1.3
-LESS, MORE, SURE = 0.9, 0.05, 1.05
-"""Of the rise that broke the stem loose last: asked for next, added while it holds, asked for once less has failed."""
+GROWTH, SURE = 1.3, 1.05
+CLOSE = 1.15
+"""The least rise that broke the stem loose over the largest that did not: near enough."""
 SHORTEST, MOST_SLIDES = 0.025, 8
 """Of the window: shorter slides are not sought; slides over the window, if break-away allows."""
 FEWEST_EACH = 4
@@ -39,6 +42,11 @@ class StaircaseLimits:
     minimum_pa: float
     maximum_pa: float
 
+    @property
+    def window_m(self) -> float:
+        """Width of the travel window."""
+        return self.high_m - self.low_m
+
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
@@ -48,10 +56,11 @@ class Staircase:
         level_pa: command.
         direction: of the steps, +1 up, -1 down.
         step_pa: the last step.
-        rise_pa: since the stem last moved, or since the staircase turned round.
-        sure_pa: first step of the next slide, at first as in the other direction; 0: not known yet.
-        least: whether a smaller one has failed in this direction.
-        slide_m: length of the last slide.
+        rise_pa: R, since the stem last moved, or since the staircase turned round.
+        low_pa: largest rise that held the stem in this direction.
+        high_pa: least that broke it loose, at first as in the other direction; 0: not known.
+        slope_pa_per_m: rise over slide of the last slide that went on in its direction.
+        slide_m: length of the last slide; 0: none in this direction.
         ups, downs: landings.
         turns: how often it turned round.
     """
@@ -60,8 +69,9 @@ class Staircase:
     direction: int = 0
     step_pa: float = 0.0
     rise_pa: float = 0.0
-    sure_pa: float = 0.0
-    least: bool = False
+    low_pa: float = 0.0
+    high_pa: float = 0.0
+    slope_pa_per_m: float = 0.0
     slide_m: float = 0.0
     ups: int = 0
     downs: int = 0
@@ -72,59 +82,67 @@ class Staircase:
         """Landings had of those wanted, 0 to 1."""
         return (min(self.ups, FEWEST_EACH) + min(self.downs, FEWEST_EACH)) / (2 * FEWEST_EACH)
 
-    def over(self, law_valid: bool) -> bool:
+    def over(self, law_valid: bool, limits: StaircaseLimits) -> bool:
         """Return whether the staircase has what it wants, or cannot have it."""
-        enough = self.least or min(self.ups, self.downs) >= MANY_EACH
+        enough = self._least_known(limits) or min(self.ups, self.downs) >= MANY_EACH
         return (law_valid and self.progress >= 1.0 and enough) or self.turns >= MOST_TURNS
 
     def after(self, outcome: SlideOutcome | None, position_m: float, limits: StaircaseLimits) -> "Staircase":
         """Return the staircase with its next step, the stem resting at a position, m, after what the last step did."""
-        stairs = self if outcome is None else self._counted(outcome, limits.high_m - limits.low_m)
+        stairs = self if outcome is None else self._counted(outcome)
         if stairs.direction == 0:
             stairs = replace(stairs, direction=1 if position_m < limits.high_m else -1)
         bound_m = limits.high_m if stairs.direction > 0 else limits.low_m
         left_m = stairs.direction * (bound_m - position_m)
         at_limit_pa = limits.maximum_pa if stairs.direction > 0 else limits.minimum_pa
         if left_m < stairs.slide_m or left_m <= 0.0 or stairs.level_pa == at_limit_pa:
-            stairs = replace(
-                stairs,
-                direction=-stairs.direction,
-                turns=stairs.turns + 1,
-                step_pa=0.0,
-                rise_pa=0.0,
-                least=False,
-                slide_m=0.0,
-            )
+            stairs = stairs._turned()
         return stairs._stepped(limits)
 
-    def _counted(self, outcome: SlideOutcome, window_m: float) -> "Staircase":
-        if not outcome.moved:
-            return self
-        went_m = abs(outcome.position_m - outcome.from_m)
-        sure_pa, least = self._sure_pa(went_m, window_m)
+    def _turned(self) -> "Staircase":
+        """Return it in the other direction."""
         return replace(
+            self, direction=-self.direction, turns=self.turns + 1, step_pa=0.0, rise_pa=0.0, low_pa=0.0, slide_m=0.0
+        )
+
+    def _counted(self, outcome: SlideOutcome) -> "Staircase":
+        """Return it with what the last step did."""
+        first = self.slide_m == 0.0  # of a direction: its rise turned friction round, too
+        if not outcome.moved:
+            return self if first else replace(self, low_pa=max(self.low_pa, self.rise_pa))
+        went_m = abs(outcome.position_m - outcome.from_m)
+        counted = replace(
             self,
             ups=self.ups + (outcome.landing and outcome.direction > 0),
             downs=self.downs + (outcome.landing and outcome.direction < 0),
-            sure_pa=sure_pa,
-            least=least,
             slide_m=went_m,
             rise_pa=0.0,
             step_pa=0.0,
         )
+        if first:
+            return counted
+        high_pa = self.rise_pa if self.high_pa < self.low_pa else min(self.high_pa or self.rise_pa, self.rise_pa)
+        return replace(counted, high_pa=high_pa, slope_pa_per_m=self.rise_pa / went_m)
 
-    def _sure_pa(self, went_m: float, window_m: float) -> tuple[float, bool]:
-        """Return the first step of the next slide, and whether it is known that less would not do."""
-        if self.slide_m == 0.0:  # the first slide of a direction: its rise turned friction round, too
-            return self.sure_pa, False
-        least = self.least or self.rise_pa > self.sure_pa > 0.0 or went_m < SHORTEST * window_m
-        wanted_m = max(SURE * went_m, window_m / MOST_SLIDES) if least else LESS * went_m
-        return wanted_m * self.rise_pa / went_m, least
+    def _least_known(self, limits: StaircaseLimits) -> bool:
+        """Return whether the least rise that breaks the stem loose in this direction is known well enough."""
+        shortest_pa = SHORTEST * limits.window_m * self.slope_pa_per_m
+        return 0.0 < self.high_pa <= max(CLOSE * self.low_pa, shortest_pa)
+
+    def _wanted_rise_pa(self, limits: StaircaseLimits) -> float:
+        """Return the rise of the next slide after the first of a direction."""
+        window_pa = limits.window_m * self.slope_pa_per_m
+        if self._least_known(limits):
+            wanted_pa = max(SURE * self.high_pa, window_pa / MOST_SLIDES)
+        else:
+            low_pa = max(self.low_pa, SHORTEST * window_pa)
+            wanted_pa = sqrt(low_pa * self.high_pa) if self.high_pa > low_pa else GROWTH * low_pa
+        return wanted_pa if wanted_pa > self.rise_pa else GROWTH * self.rise_pa
 
     def _stepped(self, limits: StaircaseLimits) -> "Staircase":
         span_pa = limits.maximum_pa - limits.minimum_pa
-        if self.sure_pa > 0.0 and self.slide_m > 0.0:
-            step_pa = MORE * self.sure_pa if self.step_pa else self.sure_pa
+        if self.slide_m > 0.0 and self.slope_pa_per_m > 0.0:
+            step_pa = self._wanted_rise_pa(limits) - self.rise_pa
         else:
             step_pa = min(GROWTH * self.step_pa, LARGEST_STEP * span_pa) if self.step_pa else FIRST_STEP * span_pa
         level_pa = min(max(self.level_pa + self.direction * step_pa, limits.minimum_pa), limits.maximum_pa)

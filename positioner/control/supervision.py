@@ -49,8 +49,11 @@ class SupervisionMemory:
     mode_writes: int = 0
     acknowledgements: int = 0
     heartbeats: int = 0
+    unanswered_pa: tuple[float, ...] = ()
+    """Commands given since the last good measurement, which the device may hold or not."""
 
 
+MOST_UNANSWERED = 8
 UNFIT_STATUS = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST)
 
 
@@ -71,7 +74,9 @@ def supervise(
     good_s = sample.now_s if good or first else memory.good_s
     heartbeat_s = sample.now_s if alive else memory.heartbeat_s
 
-    cause = _cause(sample, command_pa, bad_in_a_row, sample.now_s - good_s, limits)
+    given_pa = (*memory.unanswered_pa[-MOST_UNANSWERED:], command_pa)
+
+    cause = _cause(sample, given_pa, bad_in_a_row, sample.now_s - good_s, limits)
     silent = memory.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heartbeat_s
     if cause is Fault.NONE and silent:
         cause = Fault.DCS_SILENT
@@ -87,11 +92,13 @@ def supervise(
         mode_writes=requests.mode_writes,
         acknowledgements=requests.acknowledgements,
         heartbeats=requests.heartbeats,
+        unanswered_pa=(command_pa,) if good else given_pa,
     )
 
 
-def _cause(sample: Sample, command_pa: float, bad_in_a_row: int, age_s: float, limits: Limits) -> Fault:
-    if sample.held_pa is not None and abs(sample.held_pa - command_pa) > limits.restart_tolerance_pa:
+def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s: float, limits: Limits) -> Fault:
+    held_pa = sample.held_pa
+    if held_pa is not None and all(abs(held_pa - each) > limits.restart_tolerance_pa for each in given_pa):
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
         return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE

@@ -24,6 +24,10 @@ class Ratios:
     offset_pa: float = 0.0
     """What preload and unlike friction up and down add to the balance of either direction; 0 in the seed's model."""
 
+    def balance_pa(self, position_m: float, direction: int) -> float:
+        """Return the pressure, Pa, that balances a stem moving up (+1) or down (-1) at a position, m: (23), (24)."""
+        return -(self.b_over_c * position_m + direction * self.k_over_c) + self.offset_pa
+
 
 @dataclass(frozen=True, slots=True)
 class Applied:

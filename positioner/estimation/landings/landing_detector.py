@@ -1,10 +1,9 @@
 """Which rests are landings: sample by sample, from the command and the position.
 
-A landing ends a slide: the stem rested, the command stepped (or went on in the same direction), the stem moved that
-way visibly under the last command, and rests again. Then the balance of the moving stem holds where it rests. No
-landing is
+A landing ends a slide: the command stepped, the stem moved that way visibly under it, and rests again. Then the balance
+of the moving stem holds where it rests. No landing is
 
-- a rest that begins while the command went to and fro: a braked stem is held by friction, anywhere in its band,
+- a rest of a stem that moved against the last step: a braked stem is held by friction, anywhere in its band,
 - a rest at a stop, where the stop bears the rest,
 - a rest under a pressure that still moves (`stem_at_rest`).
 
@@ -12,7 +11,7 @@ How long a stem takes to answer is learnt: a stem that has not moved may yet, so
 answer seen, for the size of the step (a rate limit). One that answers later still corrects what was learnt.
 """
 
-from math import nan
+from math import isnan, nan, sqrt
 from typing import NamedTuple
 
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
@@ -34,6 +33,9 @@ SAME = 1e-9
 """Of the stroke: positions nearer than this are one."""
 LARGE = 0.5
 """Of the largest step: from a smaller one nothing is learnt of a rate limit."""
+CREEP, INSTANTS = 1e-3, 2
+"""Of the stroke, for each second that a slide takes beyond two samples: behind a slow pressure the stem creeps into its
+rest and sticks, its friction risen, a little before the pressure has come to an end."""
 DISTURBED = 4
 """Samples in a row that must be elsewhere."""
 
@@ -74,22 +76,19 @@ class LandingDetector:
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
         self._level_pa = self._held_pa = nan
-        self._from: Rest | None = None
-        """The last rest before the command was changed."""
         self._sense = 0
-        self._one_way = False
-        self._position_m = self._start_m = nan
+        self._position_m = self._from_m = nan
         self._away = 0
         self._known = True
         """Whether what the last change of the command did is known."""
         self._answer_s = self._slowness_s_per_pa = self._step_pa = self._large_pa = 0.0
-        self._level_s = 0.0
+        self._level_s = self._interval_s = self._time_s = 0.0
         self.rest: Rest | None = None
         self.quantum_m = 0.0
 
     def _patience_s(self, rest: Rest) -> float:
         """Return for how long a stem must have been waited for: longer, if it has not moved after a large step."""
-        if self._from is None or abs(rest.position_m - self._from.position_m) > self._visible_m(rest):
+        if self._known or abs(rest.position_m - self._from_m) > self._visible_m(rest):
             return PATIENCE * self._answer_s
         return PATIENCE * (max(self._answer_s, self._slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S)
 
@@ -101,7 +100,7 @@ class LandingDetector:
         self._learn_quantum(position_m)
         if command_pa != self._level_pa:
             self._change_level(time_s, position_m, command_pa)
-        self._position_m = position_m
+        self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
         self._window.add(time_s, position_m, pressure_pa)
         rest = self._window.rest
         if self.rest is not None:
@@ -124,17 +123,13 @@ class LandingDetector:
             self.quantum_m = self._window.quantum_m = min(step_m, self.quantum_m or step_m)
 
     def _change_level(self, time_s: float, position_m: float, command_pa: float) -> None:
-        sense = 1 if command_pa > self._level_pa else -1
-        if self.rest is not None:
-            self._from, self._held_pa, self._one_way = self.rest, self._level_pa, True
-            self._start_m = self.rest.position_m
-        else:
-            self._one_way = self._one_way and sense == self._sense
-            self._start_m = position_m
+        """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
         step_pa = abs(command_pa - self._level_pa)
         self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
-        self._level_pa, self._sense, self._level_s = command_pa, sense, time_s
-        self.rest, self._known = None, self._from is None
+        self._from_m = nan if isnan(self._level_pa) else position_m if self.rest is None else self.rest.position_m
+        self._sense = 1 if command_pa > self._level_pa else -1
+        self._held_pa, self._level_pa, self._level_s = self._level_pa, command_pa, time_s
+        self.rest, self._known = None, isnan(self._from_m)
         self._window.restart(time_s)
 
     def _watch(self, time_s: float, position_m: float, rest: Rest) -> None:
@@ -158,22 +153,19 @@ class LandingDetector:
         if self._step_pa > LARGE * self._large_pa:
             self._slowness_s_per_pa = max(answer_s / self._step_pa, FORGOTTEN * self._slowness_s_per_pa)
 
-    def _outcome(self, time_s: float, rest: Rest) -> SlideOutcome | None:
-        assert self._from is not None
-        visible_m = self._visible_m(rest)
-        way_m = self._sense * (rest.position_m - self._from.position_m)
-        moved = way_m > visible_m
-        slid = self._one_way and moved and self._sense * (rest.position_m - self._start_m) > visible_m
+    def _outcome(self, time_s: float, rest: Rest) -> SlideOutcome:
+        moved = self._sense * (rest.position_m - self._from_m) > self._visible_m(rest)
+        creep_s = max(0.0, rest.came_to_rest_s - INSTANTS * self._interval_s)
         if moved:
             self._learn_answer(rest.came_to_rest_s)
         return SlideOutcome(
             time_s=time_s,
             direction=self._sense,
-            from_m=self._from.position_m,
+            from_m=self._from_m,
             held_pa=self._held_pa,
             command_pa=self._level_pa,
             position_m=rest.position_m,
-            std_m=max(rest.std_m, self.quantum_m / 12**0.5),
+            std_m=sqrt(rest.std_m**2 + self.quantum_m**2 / 12 + (CREEP * self._stroke_m * creep_s) ** 2),
             moved=moved,
-            landing=slid and self._free_m[0] < rest.position_m < self._free_m[1],
+            landing=moved and self._free_m[0] < rest.position_m < self._free_m[1],
         )

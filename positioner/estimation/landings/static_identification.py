@@ -11,8 +11,12 @@ from config.codes import Refusal
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
-from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
+from positioner.estimation.landings.local_balance import ahead_m
+from positioner.estimation.landings.static_law import StaticLaw, no_static_law, slides_among, static_law
 
+LONGEST_WAY, OFF = 0.03, 3e-3
+"""Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should."""
+IN_A_ROW = 4
 EACH = 20
 """Landings remembered in a direction."""
 
@@ -28,6 +32,7 @@ class StaticIdentification:
     Attributes:
         detector: of the rests.
         landings: the latest first.
+        held: changes of the command that did not move the stem, the latest first.
         law: from the landings.
     """
 
@@ -45,6 +50,8 @@ class StaticIdentification:
             -1: deque(maxlen=self._each),
         }
         self.landings: tuple[SlideOutcome, ...] = ()
+        self.held: tuple[SlideOutcome, ...] = ()
+        self._elsewhere = 0
         self.law: StaticLaw = no_static_law(Refusal.LANDINGS_TOO_FEW)
 
     def update(self, time_s: float, position_m: float, command_pa: float, pressure_pa: float) -> SlideOutcome | None:
@@ -54,12 +61,37 @@ class StaticIdentification:
             What a change of the command did, once that is known.
         """
         outcome = self.detector.update(time_s, position_m, command_pa, pressure_pa)
-        if outcome is not None and outcome.landing:
-            self._in_direction[outcome.direction].appendleft(outcome)
-            both = (*self._in_direction[1], *self._in_direction[-1])
-            self.landings = tuple(sorted(both, key=lambda each: -each.time_s))
-            self.law = static_law(self.landings, self._stroke_m)
+        if outcome is None:
+            return None
+        if outcome.landing and self._gave_way(outcome):
+            outcome = outcome._replace(moved=False, landing=False)
+        if not outcome.moved:
+            self.held = (outcome, *self.held[: self._each - 1])
+        if outcome.landing:
+            self._take(outcome)
         return outcome
+
+    def _take(self, outcome: SlideOutcome) -> None:
+        self._in_direction[outcome.direction].appendleft(outcome)
+        both = (*self._in_direction[1], *self._in_direction[-1])
+        landings = tuple(sorted(both, key=lambda each: -each.time_s))
+        self.law = static_law(landings, self._stroke_m)
+        self.landings = slides_among(landings, self._stroke_m) if self.law.valid else landings
+
+    def _gave_way(self, outcome: SlideOutcome) -> bool:
+        """Whether the packing that holds the stem gave way, for a slide by the law would have gone elsewhere.
+
+        Not for long ways, nor `IN_A_ROW` times on end: then it is the law that no longer holds.
+        """
+        law, went_m = self.law, outcome.direction * (outcome.position_m - outcome.from_m)
+        if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
+            self._elsewhere = 0
+            return False
+        should_m = ahead_m(outcome, law.ratios, self.landings, self._stroke_m)
+        allowed_m = max(0.5 * abs(should_m), OFF * self._stroke_m + 3.0 * law.residual_m)
+        elsewhere = abs(went_m - should_m) > allowed_m
+        self._elsewhere = self._elsewhere + 1 if elsewhere else 0
+        return 0 < self._elsewhere < IN_A_ROW
 
     def tested(self, estimates: Estimates) -> Estimates:
         """Return estimates whose friction is refused if the landings contradict it."""

@@ -7,7 +7,7 @@ Three unknowns θ, least squares with Huber's weights, for a slide that ended un
 stuck stem that gave way in its packing is no slide: it did not go as far as the law says.
 The residuals say how well the law holds: with n landings,
 
-    s^2 = max(Σ e^2 / (n - 3), (κ σ_x)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
+    s^2 = max(Σ e^2 / (n - 3), (κ σ_x)^2, (κ 2e-4 stroke)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
 
 which is the Cramér-Rao bound of white residuals, widened so that three deviations are 99.7 % for few landings, too.
 The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what that model calls impossible is the offset
@@ -34,6 +34,8 @@ LARGEST_RELATIVE_STD = 0.05
 """Of κ."""
 LARGEST_SHIFT = 0.01
 """Of the stroke: by which a deviation of φ may shift where a slide lands."""
+FINEST = 2e-4
+"""Of the stroke: no law says better than this where a slide lands."""
 LARGEST_RESIDUAL = 0.05
 """Of the stroke: landings that miss the law by more, as a standard deviation, lie on no straight line."""
 HUBER, ROUNDS = 2.0, 6
@@ -109,6 +111,19 @@ def no_static_law(reason: Refusal, landings: int = 0) -> StaticLaw:
     return StaticLaw(nothing, nothing, nothing, landings, nan, np.full((3, 3), inf))
 
 
+def columns(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[Array, Array]:
+    """Return X, (n, 3), with positions in strokes so that its columns are of one size, and p, (n,), Pa."""
+    x = np.array([each.position_m for each in landings])
+    up = np.array([float(each.direction > 0) for each in landings])
+    return np.column_stack((x / stroke_m, up, up - 1.0)), np.array([each.command_pa for each in landings])
+
+
+def slides_among(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[SlideOutcome, ...]:
+    """Return the landings that end a slide; see `_slides`."""
+    slides = _slides(landings, *columns(landings, stroke_m), stroke_m)
+    return tuple(each for each, slid in zip(landings, slides.tolist(), strict=True) if slid)
+
+
 def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     """Return the static law of landings, or why there is none.
 
@@ -119,11 +134,8 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     ups = sum(each.direction > 0 for each in landings)
     if len(landings) < FEWEST or min(ups, len(landings) - ups) < FEWEST_EACH:
         return no_static_law(Refusal.LANDINGS_TOO_FEW, len(landings))
-    x = np.array([each.position_m for each in landings])
-    p = np.array([each.command_pa for each in landings])
-    up = np.array([float(each.direction > 0) for each in landings])
-    # In strokes, so that the three columns are of one size.
-    X = np.column_stack((x / stroke_m, up, up - 1.0))
+    X, p = columns(landings, stroke_m)
+    up = X[:, 1]
     slides = _slides(landings, X, p, stroke_m)
     ups = int(np.count_nonzero(up[slides]))
     kept = int(np.count_nonzero(slides))
@@ -135,7 +147,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     theta, weights = _huber(X, p)
     residual_pa = p - X @ theta
     free = kept - 3
-    seen_pa = max(each.std_m for each in landings) * abs(theta[0]) / stroke_m
+    seen_pa = max(FINEST, max(each.std_m for each in landings) / stroke_m) * abs(theta[0])
     s = max(sqrt(float(residual_pa @ residual_pa) / free), seen_pa)
     scale = np.diag((1 / stroke_m, 1.0, 1.0))
     covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * _t_of_three_deviations(free)) ** 2

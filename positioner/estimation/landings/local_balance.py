@@ -10,7 +10,6 @@ missing there: the next one lands. w_0 holds the correction back where there is 
 from collections.abc import Iterable
 from math import exp
 
-from positioner.control.balance_law import balance_pa
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
@@ -20,6 +19,17 @@ FADING = 0.7
 """ρ"""
 HELD_BACK = 0.1
 """w_0"""
+
+
+def ahead_m(each: SlideOutcome, ratios: Ratios, landings: Iterable[SlideOutcome], stroke_m: float) -> float:
+    """Return how far a change of the command sends a stem that breaks loose, m, by the balance where it starts from.
+
+    Args:
+        each: the change, and where the stem was.
+        ratios, landings, stroke_m: as of `landing_pa`.
+    """
+    ahead_pa = each.command_pa - landing_pa(each.from_m, each.direction, ratios, landings, stroke_m)
+    return each.direction * ahead_pa / -ratios.b_over_c
 
 
 def landing_pa(
@@ -39,7 +49,7 @@ def landing_pa(
         if each.direction != direction:
             continue
         weight = age * exp(-(((each.position_m - position_m) / (WIDTH * stroke_m)) ** 2) / 2)
-        weighted_pa += weight * (each.command_pa - balance_pa(each.position_m, direction, ratios))
+        weighted_pa += weight * (each.command_pa - ratios.balance_pa(each.position_m, direction))
         weights += weight
         age *= FADING
-    return balance_pa(position_m, direction, ratios) + weighted_pa / weights
+    return ratios.balance_pa(position_m, direction) + weighted_pa / weights
