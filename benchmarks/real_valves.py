@@ -16,10 +16,10 @@ max((F_s - F_c)/k_s up, down); a step whose excursion is more than 1.15 times it
 """
 
 import argparse
+import logging
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -37,8 +37,8 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from positioner.estimation.landings.landing_detector import VISIBLE
-from sim.slave.simulated_device import Device
 from sim.open_loop import STEP_S
+from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
 SMALLEST, LARGEST = 1e-3, 0.1
@@ -190,7 +190,7 @@ class Loop:
         self.ask(reference_m=reference_m, reference_writes=self.cycle.requests.reference_writes + 1)
         farthest_m, last_pa = 0.0, float("nan")
         begin_s = since_s = self.time_s
-        quiet_s = 0.5 + 25 * self._each.period_s + 10 * self._each.lag_s
+        quiet_s = 1.0 + 40 * self._each.period_s + 20 * self._each.lag_s
         while self.time_s - begin_s < longest_s and self.time_s - since_s < quiet_s:
             self.cycle.once()
             x_m = self.valve.indicated_m
@@ -316,6 +316,7 @@ def lines(seeds: range, steps: int) -> Iterator[str]:
 
 
 def main() -> None:
+    logging.disable(logging.CRITICAL)  # each lost reply has its line
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--valves", type=int, default=50)
     parser.add_argument("--steps", type=int, default=40)

@@ -291,7 +291,7 @@ def _estimates(
     estimates = statics.tested(identification.estimates)
     if excitation is None or not isinstance(excitation.signal, Staircase):
         return estimates
-    return replace(estimates, progress=excitation.signal.progress if statics.law.valid else 0.0)
+    return replace(estimates, progress=excitation.signal.progress)
 
 
 def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMemory, sample: Sample) -> float:

@@ -88,6 +88,7 @@ def climbed(
     if not isinstance(stairs, Staircase) or settings.staircase is None or excitation.ended or rest is None:
         return excitation
     if stairs.over(statics.law.valid, settings.staircase):
-        valid = statics.law.valid
-        return excitation if valid else replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
+        if statics.law.valid:
+            return replace(excitation, signal=replace(stairs, complete=True))
+        return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
     return replace(excitation, signal=stairs.after(outcome, rest.position_m, settings.staircase))

@@ -30,6 +30,9 @@ FEWEST_EACH = 4
 """Landings in each direction ..."""
 MANY_EACH = 8
 """... with which break-away need not be found in both."""
+WIDE = 0.5
+"""Of the window, over which the landings of each direction must lie: what changes over the travel shows there."""
+NOT_COMPLETE = 0.99
 MOST_TURNS = 6
 
 
@@ -62,7 +65,10 @@ class Staircase:
         slope_pa_per_m: rise over slide of the last slide that went on in its direction.
         slide_m: length of the last slide; 0: none in this direction.
         ups, downs: landings.
+        up_m, down_m: way over which they lie, the longest without turning round.
+        going_m: the same of the direction it goes in.
         turns: how often it turned round.
+        complete: whether it has given a static law.
     """
 
     level_pa: float
@@ -75,17 +81,24 @@ class Staircase:
     slide_m: float = 0.0
     ups: int = 0
     downs: int = 0
+    up_m: float = 0.0
+    down_m: float = 0.0
+    going_m: float = 0.0
     turns: int = 0
+    complete: bool = False
 
     @property
     def progress(self) -> float:
-        """Landings had of those wanted, 0 to 1."""
-        return (min(self.ups, FEWEST_EACH) + min(self.downs, FEWEST_EACH)) / (2 * FEWEST_EACH)
+        """Landings had of those wanted, 0 to 1; 1 when it is complete, not before."""
+        had = (min(self.ups, FEWEST_EACH) + min(self.downs, FEWEST_EACH)) / (2 * FEWEST_EACH)
+        return 1.0 if self.complete else min(had, NOT_COMPLETE)
 
     def over(self, law_valid: bool, limits: StaircaseLimits) -> bool:
         """Return whether the staircase has what it wants, or cannot have it."""
-        enough = self._least_known(limits) or min(self.ups, self.downs) >= MANY_EACH
-        return (law_valid and self.progress >= 1.0 and enough) or self.turns >= MOST_TURNS
+        wide = min(self.up_m, self.down_m) >= WIDE * limits.window_m
+        many = self._least_known(limits) or min(self.ups, self.downs) >= MANY_EACH
+        enough = law_valid and min(self.ups, self.downs) >= FEWEST_EACH and wide and many
+        return enough or self.turns >= MOST_TURNS
 
     def after(self, outcome: SlideOutcome | None, position_m: float, limits: StaircaseLimits) -> "Staircase":
         """Return the staircase with its next step, the stem resting at a position, m, after what the last step did."""
@@ -102,7 +115,14 @@ class Staircase:
     def _turned(self) -> "Staircase":
         """Return it in the other direction."""
         return replace(
-            self, direction=-self.direction, turns=self.turns + 1, step_pa=0.0, rise_pa=0.0, low_pa=0.0, slide_m=0.0
+            self,
+            direction=-self.direction,
+            turns=self.turns + 1,
+            step_pa=0.0,
+            rise_pa=0.0,
+            low_pa=0.0,
+            slide_m=0.0,
+            going_m=0.0,
         )
 
     def _counted(self, outcome: SlideOutcome) -> "Staircase":
@@ -111,8 +131,12 @@ class Staircase:
         if not outcome.moved:
             return self if first else replace(self, low_pa=max(self.low_pa, self.rise_pa))
         went_m = abs(outcome.position_m - outcome.from_m)
+        going_m = self.going_m + went_m if outcome.landing and not first else self.going_m
         counted = replace(
             self,
+            going_m=going_m,
+            up_m=max(self.up_m, going_m) if outcome.direction > 0 else self.up_m,
+            down_m=max(self.down_m, going_m) if outcome.direction < 0 else self.down_m,
             ups=self.ups + (outcome.landing and outcome.direction > 0),
             downs=self.downs + (outcome.landing and outcome.direction < 0),
             slide_m=went_m,
