@@ -77,6 +77,8 @@ class LandingDetector:
         self._window = RestWindow(stroke_m)
         self._level_pa = self._held_pa = nan
         self._sense = 0
+        self._running_on = False
+        """Whether the command changed while the stem moved: the slide starts from where it turns round."""
         self._position_m = self._from_m = nan
         self._away = 0
         self._known = True
@@ -99,7 +101,9 @@ class LandingDetector:
         """Take a sample and the command in force since; return what a change of the command did once it is known."""
         self._learn_quantum(position_m)
         if command_pa != self._level_pa:
-            self._change_level(time_s, position_m, command_pa)
+            self._change_level(time_s, command_pa)
+        if self._running_on:
+            self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
         self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
         self._window.add(time_s, position_m, pressure_pa)
         rest = self._window.rest
@@ -122,11 +126,12 @@ class LandingDetector:
         if step_m > SAME * self._stroke_m:
             self.quantum_m = self._window.quantum_m = min(step_m, self.quantum_m or step_m)
 
-    def _change_level(self, time_s: float, position_m: float, command_pa: float) -> None:
+    def _change_level(self, time_s: float, command_pa: float) -> None:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
         step_pa = abs(command_pa - self._level_pa)
         self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
-        self._from_m = nan if isnan(self._level_pa) else position_m if self.rest is None else self.rest.position_m
+        self._running_on = self.rest is None
+        self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m
         self._sense = 1 if command_pa > self._level_pa else -1
         self._held_pa, self._level_pa, self._level_s = self._level_pa, command_pa, time_s
         self.rest, self._known = None, isnan(self._from_m)

@@ -1,0 +1,76 @@
+"""Which rests are landings: on a stem made by hand that answers each command at once, or not."""
+
+from collections.abc import Callable
+
+import pytest
+
+from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
+
+STROKE_M = 0.1
+PERIOD_S = 0.02
+HOLD_S = 2.0
+
+
+def outcomes(
+    *moves: tuple[float, float], path: Callable[[float, float, float], float] | None = None, hold_s: float = HOLD_S
+) -> list[SlideOutcome]:
+    """Return what the detector says of commands, Pa, under each of which the stem goes to a position, m."""
+    detector = LandingDetector(STROKE_M)
+    found, time_s, before_m = [], 0.0, moves[0][1]
+    for command_pa, to_m in moves:
+        for sample in range(round(hold_s / PERIOD_S)):
+            elapsed_s = sample * PERIOD_S
+            position_m = before_m if not sample else path(elapsed_s, before_m, to_m) if path else to_m
+            outcome = detector.update(time_s, position_m, command_pa, float("nan"))
+            found += [] if outcome is None else [outcome]
+            time_s += PERIOD_S
+        before_m = to_m
+    return found
+
+
+def test_a_slide_that_ends_in_rest_is_a_landing() -> None:
+    up, down = outcomes((50e3, 0.05), (60e3, 0.06), (20e3, 0.04))
+    assert (up.direction, up.from_m, up.position_m, up.command_pa) == (
+        1,
+        pytest.approx(0.05),
+        pytest.approx(0.06),
+        60e3,
+    )
+    assert (down.direction, down.held_pa, down.landing) == (-1, 60e3, True)
+
+
+def test_a_stem_that_holds_has_not_moved() -> None:
+    (held,) = outcomes((50e3, 0.05), (52e3, 0.05))
+    assert (held.moved, held.landing) == (False, False)
+
+
+def test_a_stop_is_no_landing() -> None:
+    onto_the_stop, _ = outcomes((50e3, 0.05), (0.0, 0.0), (5e3, 0.0))
+    assert (onto_the_stop.moved, onto_the_stop.landing) == (True, False)
+
+
+def test_a_stem_that_moves_against_the_command_has_not_landed() -> None:
+    """A push that gave way to a braked hold: the stem ran on upward under a lower pressure."""
+    (braked,) = outcomes((50e3, 0.05), (45e3, 0.056))
+    assert not braked.landing
+
+
+def test_a_stem_that_answers_late_is_waited_for() -> None:
+    """Dead time of 2 s: longer than is waited for at first, so the first answer finds a stem called at rest."""
+
+    def late(elapsed_s: float, before_m: float, to_m: float) -> float:
+        return to_m if elapsed_s > 2.0 else before_m
+
+    held, *then = outcomes((50e3, 0.05), (60e3, 0.06), (70e3, 0.07), (80e3, 0.08), path=late, hold_s=6.0)
+    assert not held.moved
+    assert [(each.landing, each.command_pa) for each in then] == [(True, 60e3), (True, 70e3), (True, 80e3)]
+
+
+def test_what_something_else_has_moved_is_no_landing() -> None:
+    detector = LandingDetector(STROKE_M)
+    found = []
+    for sample in range(400):
+        found.append(detector.update(sample * PERIOD_S, 0.05 if sample < 200 else 0.06, 50e3, float("nan")))
+    assert not any(found)
+    assert detector.rest is not None
+    assert detector.rest.position_m == pytest.approx(0.06)

@@ -1,0 +1,135 @@
+"""The static law from landings: exact, under noise, and when it is refused."""
+
+import numpy as np
+import pytest
+
+from config.codes import Refusal
+from positioner.estimation.acceptance import Applied, Ratios
+from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.local_balance import landing_pa
+from positioner.estimation.landings.static_identification import StaticIdentification
+from positioner.estimation.landings.static_law import StaticLaw, static_law
+
+STROKE_M = 0.1016
+SLOPE, UP, DOWN = 814e3, 31e3, 13e3
+PLACES = (0.35, 0.45, 0.55, 0.65, 0.75)
+
+
+def landing(position_m: float, direction: int, command_pa: float, std_m: float = 1e-6) -> SlideOutcome:
+    return SlideOutcome(0.0, direction, position_m - direction * 0.01, 0.0, command_pa, position_m, std_m, True, True)
+
+
+def landings(
+    *,
+    slope: float = SLOPE,
+    up: float = UP,
+    down: float = DOWN,
+    noise_pa: float = 0.0,
+    seed: int = 0,
+    bow: float = 0.0,
+) -> list[SlideOutcome]:
+    """Return landings at the same places each way; `bow` bends the line, Pa in the middle of the stroke."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for direction, friction in ((1, up), (-1, -down)):
+        for place in PLACES:
+            x = (place + 0.02 * rng.uniform(-1, 1)) * STROKE_M
+            p = slope * x + friction + bow * 4 * (x / STROKE_M) * (1 - x / STROKE_M) + rng.normal(0.0, 1.0) * noise_pa
+            found.append(landing(x, direction, p))
+    return found
+
+
+def test_exact_landings_give_each_direction_its_friction() -> None:
+    law = static_law(landings(), STROKE_M)
+    assert law.valid
+    assert (law.slope.value, law.up.value, law.down.value) == pytest.approx((SLOPE, UP, DOWN))
+    assert law.ratios == Ratios(pytest.approx(-SLOPE), pytest.approx(-(UP + DOWN) / 2), pytest.approx((UP - DOWN) / 2))
+
+
+def test_three_deviations_hold_the_truth() -> None:
+    """99.7 % of normal residuals, and of so few landings."""
+    off = []
+    for seed in range(400):
+        law = static_law(landings(noise_pa=300.0, seed=seed), STROKE_M)
+        for each, true in ((law.slope, SLOPE), (law.up, UP), (law.down, DOWN)):
+            off.append(abs(each.value - true) / each.std)
+    assert np.mean(np.array(off) > 3.0) < 0.01
+    assert np.mean(np.array(off) > 1.0) > 0.1, "not so wide that they say nothing"
+
+
+def test_one_slide_that_went_wrong_does_not_bend_the_law() -> None:
+    bad = landing(0.5 * STROKE_M, 1, SLOPE * 0.5 * STROKE_M + UP + 8e3)
+    law = static_law([*landings(noise_pa=30.0), bad], STROKE_M)
+    assert law.slope.value == pytest.approx(SLOPE, rel=0.02)
+    assert abs(law.slope.value - SLOPE) < 3 * law.slope.std
+
+
+def test_a_packing_that_gave_way_is_no_slide() -> None:
+    """Stuck inside its band the stem moves a little with the pressure: far less than a slide would go."""
+    gave_way = [
+        SlideOutcome(0.0, -1, 0.07, 0.0, SLOPE * 0.0694 + each, 0.0694, 1e-6, True, True) for each in (20e3, 10e3, 0.0)
+    ]
+    law = static_law([*landings(), *gave_way], STROKE_M)
+    assert law.landings == len(landings())
+    assert law.down.value == pytest.approx(DOWN)
+
+
+@pytest.mark.parametrize(
+    ("found", "reason"),
+    [
+        (landings()[:5], Refusal.LANDINGS_TOO_FEW),
+        ([], Refusal.LANDINGS_TOO_FEW),
+        (landings(slope=-SLOPE, up=150e3, down=150e3), Refusal.B_OVER_C_NOT_NEGATIVE),
+        (landings(up=-9e3, down=-9e3), Refusal.K_OVER_C_NOT_NEGATIVE),
+        (landings(noise_pa=9e3, seed=3), Refusal.LANDINGS_NOT_STRAIGHT),
+        (landings(noise_pa=3e3), Refusal.TOO_UNCERTAIN),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_reason(found: list[SlideOutcome], reason: Refusal) -> None:
+    law = static_law(found, STROKE_M)
+    assert not law.valid
+    assert law.reason is reason
+
+
+def identified(found: list[SlideOutcome]) -> StaticIdentification:
+    statics = StaticIdentification(STROKE_M)
+    for each in found:
+        statics._take(each)
+    return statics
+
+
+def seeds_estimates(b_over_c: float, k_over_c: float) -> Estimates:
+    one = Estimate(-1.0, 0.01, Refusal.VALID)
+    return Estimates(
+        one, one, one, one, Estimate(b_over_c, 10.0, Refusal.VALID), Estimate(k_over_c, 10.0, Refusal.VALID), 1.0, 0.0
+    )
+
+
+def test_the_seeds_model_is_refused_where_landings_contradict_it() -> None:
+    """Identified upward only, preload and friction are one number: k/c is 41 % off, with a small deviation."""
+    statics = identified(landings())
+    tested = statics.tested(seeds_estimates(-SLOPE, -UP))
+    assert tested.k_over_c.reason is Refusal.CONTRADICTED_BY_LANDINGS
+    assert not tested.law_ready
+    corrected = statics.corrected(Applied(Ratios(-SLOPE, -UP), 1))
+    assert corrected.ratios == statics.law.ratios
+    assert corrected.last_refusal is Refusal.CONTRADICTED_BY_LANDINGS
+
+
+def test_the_seeds_model_stands_where_landings_agree() -> None:
+    statics = identified(landings(up=22e3, down=22e3, noise_pa=20.0))
+    estimates = seeds_estimates(-SLOPE, -22e3)
+    assert statics.tested(estimates) is estimates
+    applied = Applied(Ratios(-SLOPE, -22e3), 1)
+    assert statics.corrected(applied) is applied
+
+
+def test_a_local_landing_corrects_the_straight_law() -> None:
+    law: StaticLaw = static_law(landings(bow=2e3), STROKE_M)
+    place_m = 0.5 * STROKE_M
+    true_pa = SLOPE * place_m + UP + 2e3
+    near = landing(place_m, 1, true_pa)
+    assert abs(landing_pa(place_m, 1, law.ratios, (), STROKE_M) - true_pa) > 100
+    assert abs(landing_pa(place_m, 1, law.ratios, (near,), STROKE_M) - true_pa) < 30
+    assert landing_pa(place_m, -1, law.ratios, (near,), STROKE_M) == law.ratios.balance_pa(place_m, -1)
