@@ -151,7 +151,11 @@ def test_a_staircase_identifies_it_wherever_the_stem_is(initial: Initial) -> Non
 def test_steps_land(seed: int) -> None:
     loop = Loop(seed=seed)
     for reference_m in references_m(seed):
-        end = loop.step_to(reference_m)[-1]
+        move = loop.step_to(reference_m)
+        slides = np.count_nonzero(np.diff([each.decision.command_pa for each in move]))
+        assert slides <= 4, "no other whole mbar lands it better"
+        end = move[-1]
+        assert all(each.decision.command_pa == mbar(each.decision.command_pa) for each in move)
         assert loop.valve.position_m == pytest.approx(reference_m, abs=LANDED_M)
         assert end.decision.inhibit_reason is InhibitReason.NOTHING
 
