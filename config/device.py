@@ -51,6 +51,15 @@ class Device(Schema):
         """The longest that it may keep others from the line: until a reply that does not come is given up."""
         return 0.0
 
+    @property
+    def command_step_pa(self) -> float:
+        """The least difference of two commands that the device is told; 0 where it is told any."""
+        return 0.0
+
+    def delivered_pa(self, command_pa: float) -> float:
+        """Return the command nearest to one that the device can be told, Pa."""
+        return command_pa
+
     def read_only(self) -> Self:
         """Return the same device as one who only watches wants it: opening it sets nothing in it."""
         return self
@@ -67,6 +76,17 @@ class ModbusDevice(Device):
     communication_timeout_s: Annotated[float, Field(ge=0)] = 1.0
     communication_action: ActionName = "hold"
     map: ModbusMap = SIMULATED_MAP
+
+    @property
+    def command_step_pa(self) -> float:
+        """The scale of its register, if that holds whole numbers."""
+        place = self.map.command_pa
+        return 0.0 if place.format.is_float else abs(place.scale)
+
+    def delivered_pa(self, command_pa: float) -> float:
+        """Return what its register can say."""
+        place = self.map.command_pa
+        return place.value(place.raw(command_pa))
 
     def read_only(self) -> Self:
         """Return the device without the places of its communication time-out, which a watcher leaves alone."""

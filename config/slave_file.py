@@ -9,6 +9,7 @@ from pydantic import Field, Tag, model_validator
 from config.canopen_device import CanBus
 from config.errors import InputError
 from config.loading import NonNegative, Port, Positive, Schema, chosen_by, load
+from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
 from config.tls_table import Tls
@@ -24,6 +25,8 @@ class ModbusTcpBus(Schema):
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     tls: Tls | None = None
     """Modbus/TCP Security in place of Modbus TCP; an operator may write, an observer read."""
+    map: ModbusMap = SIMULATED_MAP
+    """Where it keeps its quantities, in the words of the daemon's `[device.map]`."""
 
 
 class ModbusRtuBus(Schema):
@@ -32,6 +35,7 @@ class ModbusRtuBus(Schema):
     kind: Literal["rtu"] = "rtu"
     serial: SerialPort
     unit: RtuUnit = 1
+    map: ModbusMap = SIMULATED_MAP
 
 
 class CanopenBus(CanBus):

@@ -16,6 +16,7 @@ from config.tls_table import Tls
 from fieldbus.modbus.client import ClientError, ModbusClient, NobodyThere, NotConnected, Refused
 
 POLL_S = 0.05
+CYCLE_WITHIN_S = 30.0
 CYCLES_WRAP = 1 << 32
 
 REFUSALS = (
@@ -24,6 +25,7 @@ REFUSALS = (
     InhibitReason.EXCITATION_BEYOND_LIMITS,
     InhibitReason.EXCITATION_TOO_LONG,
     InhibitReason.AMPLITUDE_ZERO,
+    InhibitReason.STAIRCASE_IN_VAIN,
 )
 """Why an excitation does not begin or has ended; the other reasons concern the law."""
 
@@ -127,10 +129,16 @@ class Dcs:
             problem = self._wait_for_estimates(timeout_s, show)
         finally:
             self.set_all({"eta_1": 1, "eta_2": 1, "eta_3": 1})
-        time.sleep(POLL_S)
+        self._wait_for_a_cycle()
         if self.get("identifications") != applied_before:
             return None
         return problem or Refusal(int(self.get("refusal"))).text
+
+    def _wait_for_a_cycle(self) -> None:
+        """Wait until the daemon has decided on what it was told, however slow its loop; not for one that stands."""
+        asked, due_s = self.get("cycles"), time.monotonic() + CYCLE_WITHIN_S
+        while (self.get("cycles") - asked) % CYCLES_WRAP < 2 and time.monotonic() < due_s:
+            time.sleep(POLL_S)
 
     def _wait_for_estimates(self, timeout_s: float, show: Callable[[float], None]) -> str | None:
         """Wait until the estimates the law needs are there; return what went wrong, or None."""
@@ -141,14 +149,17 @@ class Dcs:
             if (self.get("cycles") - asked) % CYCLES_WRAP < 2:  # what is served was decided before the asking
                 time.sleep(POLL_S)
                 continue
-            now = self.get_all("state", "fault", "why", "progress", "b_over_c_valid", "k_over_c_valid")
+            now = self.get_all(
+                "state", "fault", "why", "progress", "b_over_c_valid", "k_over_c_valid", "static_slope_valid"
+            )
             begun = begun or now["state"] == State.S3_IDENTIFY
             show(now["progress"])
             if now["fault"]:
                 return f"fault: {_plain(Fault(int(now['fault'])))}"
             if now["why"] in REFUSALS:
                 return _plain(InhibitReason(int(now["why"])))
-            if begun and now["progress"] >= 1 and now["b_over_c_valid"] and now["k_over_c_valid"]:
+            valid = (now["b_over_c_valid"] and now["k_over_c_valid"]) or now["static_slope_valid"]
+            if begun and now["progress"] >= 1 and valid:
                 return None
             time.sleep(POLL_S)
         return f"no valid estimates within {timeout_s:g} s"

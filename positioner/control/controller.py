@@ -163,12 +163,13 @@ def step(
         wanted_pa = requests.manual_pa
     else:
         wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, law_memory)
-    command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
+    limited_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
+    command_pa = settings.delivered_pa(limited_pa)
 
     inhibit_reason = (
         excitation_inhibit if excitation_inhibit is not InhibitReason.NOTHING else law_inhibit_reason(situation)
     )
-    if inhibit_reason is InhibitReason.NOTHING and command_pa != wanted_pa:
+    if inhibit_reason is InhibitReason.NOTHING and limited_pa != wanted_pa:
         inhibit_reason = InhibitReason.LAW_BEYOND_LIMITS
     if inhibit_reason is InhibitReason.NOTHING and law_memory is not None:
         inhibit_reason = law_memory.inhibit_reason

@@ -41,6 +41,8 @@ class Settings:
     """Of the conventional law; None: another commands."""
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
+    delivered_pa: Callable[[float], float]
+    """The command, Pa, that the device can be told in place of one."""
 
     @classmethod
     def of(cls, file: DaemonFile) -> "Settings":
@@ -77,6 +79,7 @@ class Settings:
             slides=_slides(file) if file.control.law == "slides" else None,
             conventional=_conventional(file) if file.control.law == "conventional" else None,
             staircase=_staircase(file) if _by_slides(file) else None,
+            delivered_pa=file.device.delivered_pa,
         )
 
     def safe_pa(self, action: ActionName, held_pa: float) -> float:
@@ -108,6 +111,7 @@ def _slides(file: DaemonFile) -> SlideSettings:
         breakaway_pa=file.valve.breakaway_pa,
         excursion_limit_m=file.control.excursion_limit * file.valve.stroke_m,
         excursion_interval_s=file.control.excursion_interval_s,
+        command_step_pa=file.device.command_step_pa,
     )
 
 

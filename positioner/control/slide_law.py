@@ -166,7 +166,9 @@ def _next_slide(
     assert target_m is not None
     error_m = target_m - rest.position_m
     widened = WIDENS ** (max(0, memory.slides - FREE_SLIDES) // 2)
-    known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m)
+    # Where the device is told whole numbers, a slide lands up to half a step beside, and no other command is better.
+    beside_m = 0.5 * settings.command_step_pa / -balance.ratios.b_over_c
+    known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m) + beside_m
     if abs(error_m) <= max(settings.dead_band_m, known_m) * widened:
         return replace(memory, inhibit_reason=InhibitReason.NOTHING)
     again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0

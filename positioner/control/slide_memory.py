@@ -28,6 +28,8 @@ class SlideSettings:
     excursion_limit_m: float
     excursion_interval_s: float
     """Least time between two excursions."""
+    command_step_pa: float = 0.0
+    """The least difference of two commands that the device is told."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,7 @@ class ModbusSlave:
         device = device_of(file, valve_path(file, path))
         self._clock = clock_of(file, device)
         assert isinstance(file.bus, ModbusTcpBus | ModbusRtuBus)
-        self._server = _server(DeviceRegisters(device, self._clock), file.bus, port)
+        self._server = _server(DeviceRegisters(device, self._clock, file.bus.map), file.bus, port)
         self._server.start()
         self.address = self._server.address
 

@@ -131,7 +131,7 @@ def test_no_daemon_to_talk_to_is_one_line_and_exit_status_1(free_port: int, caps
         (["set", "reference", "half"], "reference: 'half' is not a number"),
         (
             ["simulate", "none", "--input", "x.csv", "-o", "y.csv"],
-            "none: no shipped valve of that name; there are: seed",
+            "none: no shipped valve of that name; there are: ordinary, seed",
         ),
     ],
 )

@@ -89,3 +89,12 @@ def test_a_host_that_is_none_is_refused() -> None:
 def test_a_map_without_the_rest_is_enough() -> None:
     small = ModbusMap(position_m=Place(address=10, table="input"), command_pa=Place(address=10))
     assert list(small.sampled) == ["position_m"]
+
+
+def test_a_command_is_what_its_register_can_say() -> None:
+    whole_mbar = {"address": 2, "type": "uint16", "scale": 100.0, "offset": -20.0}
+    device = ModbusTcpDevice.model_validate({"map": {"position_m": FLOAT, "command_pa": whole_mbar}})
+    assert (device.delivered_pa(43_219.0), device.command_step_pa) == (43_180.0, 100.0)
+    assert device.delivered_pa(device.delivered_pa(43_219.0)) == 43_180.0
+    any_pressure = ModbusTcpDevice()
+    assert (any_pressure.delivered_pa(43_219.5), any_pressure.command_step_pa) == (43_219.5, 0.0)

@@ -3,8 +3,10 @@
 import tomllib
 
 from config.daemon_file import DaemonFile, load_daemon
+from config.device import ModbusTcpDevice
 from config.loading import SHIPPED
-from config.slave_file import load_slave
+from config.slave_file import ModbusTcpBus, load_slave
+from config.valve_file import load_valve, shipped_valve
 
 PROFILES = SHIPPED / "profiles"
 
@@ -33,3 +35,15 @@ def test_commented_lines_are_valid_too() -> None:
 
 def test_the_slave_profile_is_valid() -> None:
     assert load_slave(PROFILES / "slave.toml").valve == "seed"
+
+
+def test_the_profiles_of_an_ordinary_valve_are_those_of_one_device() -> None:
+    daemon, slave = load_daemon(PROFILES / "daemon_ordinary.toml"), load_slave(PROFILES / "slave_ordinary.toml")
+    assert isinstance(daemon.device, ModbusTcpDevice)
+    assert isinstance(slave.bus, ModbusTcpBus)
+    assert daemon.device.map == slave.bus.map
+    assert (daemon.device.port, daemon.pressure.maximum_pa) == (slave.bus.port, slave.supply.maximum_pa)
+    assert daemon.valve.stroke_m == load_valve(shipped_valve(slave.valve)).valve.stroke_m
+    assert slave.sensor.quantum_m == daemon.valve.stroke_m / 4096 == daemon.device.map.position_m.scale
+    assert daemon.device.reply_timeout_s < daemon.cycle.period_s < daemon.safety.stale_after_s
+    assert (daemon.control.law, daemon.law) == ("slides", None)

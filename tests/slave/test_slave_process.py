@@ -66,6 +66,17 @@ def test_it_serves_in_lockstep_until_told_to_end(tmp_path: Path, number: signal.
         assert end(process, number) == ENDED_WELL, "with a client connected"
 
 
+def test_its_file_says_where_it_keeps_its_quantities(tmp_path: Path) -> None:
+    text = (
+        "[clock]\nmode = 'lockstep'\n[initial]\nposition_m = 0.05\npressure_pa = 40000.0\n[bus.map]\n"
+        "position_m = { address = 0, type = 'int16', scale = 1e-5 }\n"
+        "command_pa = { address = 10, type = 'uint16', scale = 100.0 }\n"
+    )
+    with slave(tmp_path / "slave.toml", text) as (_, port), independent_client(port) as client:
+        client.write(10, [401])
+        assert (client.read_holding(0, 1), client.read_holding(10, 1)) == ([5000], [401])
+
+
 def test_real_time_runs_on_by_itself_and_acts_on_silence(tmp_path: Path) -> None:
     text = "[communication]\ntimeout_s = 0.02\naction = 'fill'\n[supply]\nmaximum_pa = 90e3\n"
     (tmp_path / "slave.toml").write_text(text)

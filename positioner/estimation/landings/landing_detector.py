@@ -31,6 +31,8 @@ FORGOTTEN = 0.9
 """Factor from answer to answer, so that one slow answer is not waited for ever."""
 SAME = 1e-9
 """Of the stroke: positions nearer than this are one."""
+FINEST_QUANTUM = 1e-6
+"""Of the stroke: a sensor that resolves more has none."""
 LARGE = 0.5
 """Of the largest step: from a smaller one nothing is learnt of a rate limit."""
 CREEP, INSTANTS = 1e-3, 2
@@ -67,7 +69,7 @@ class LandingDetector:
 
     Attributes:
         rest: of the stem under the command in force; None while it moves or may yet move.
-        quantum_m: of the position; 0 until a sample differed from the one before it.
+        quantum_m: of the position, whose steps are multiples of it; 0 until a sample differed from the one before it.
     """
 
     def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None) -> None:
@@ -124,7 +126,8 @@ class LandingDetector:
     def _learn_quantum(self, position_m: float) -> None:
         step_m = abs(position_m - self._position_m)
         if step_m > SAME * self._stroke_m:
-            self.quantum_m = self._window.quantum_m = min(step_m, self.quantum_m or step_m)
+            divisor_m = _common_divisor(step_m, self.quantum_m, FINEST_QUANTUM * self._stroke_m)
+            self.quantum_m = self._window.quantum_m = divisor_m
 
     def _change_level(self, time_s: float, command_pa: float) -> None:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
@@ -174,3 +177,11 @@ class LandingDetector:
             moved=moved,
             landing=moved and self._free_m[0] < rest.position_m < self._free_m[1],
         )
+
+
+def _common_divisor(larger: float, smaller: float, least: float) -> float:
+    """Return the greatest common divisor of two lengths, but for rounding (Euclid's), or the least that counts."""
+    while smaller >= least:
+        left = larger % smaller
+        larger, smaller = smaller, min(left, smaller - left)
+    return max(larger, least)

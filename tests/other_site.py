@@ -1,0 +1,75 @@
+"""A daemon process on the device that is not ours, and the DCS that commissions and steps it."""
+
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from config.codes import Mode
+from config.device import ModbusTcpDevice
+from positioner.cli.parts.children import port_in, running
+from positioner.dcs import Dcs
+from tests.other_device import OtherDevice
+
+LAW = ("static_slope", "static_up", "static_down")
+"""Registers of the static law, in the order of `Parameters.static_law`."""
+ENDED_CYCLES, ENDED_WITHIN_CYCLES = 60, 3000
+"""A move has ended when the command has stood for so many cycles; it is given up after so many."""
+ARRIVED = 1e-3
+"""Of the stroke: a stem as near to where it ends has arrived."""
+POLL_S = 0.02
+DCS_WITHIN_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One step: error of the true stem, of the stroke; slides; s until it had arrived."""
+
+    error: float
+    slides: int
+    duration_s: float
+
+
+def daemon_text(device: ModbusTcpDevice, stroke_m: float, period_s: float) -> str:
+    """Return the file of a daemon on a device: what the law needs to know of it, and nothing of the valve."""
+    registers = "\n".join(
+        f"{name} = {{ address = {place.address}, type = '{place.type}', scale = {place.scale!r} }}"
+        for name, place in device.map.places.items()
+    )
+    return (
+        f"[valve]\nname = 'other'\nstroke_m = {stroke_m!r}\n"
+        f"[device]\nport = {device.port}\nunit = {device.unit}\nreply_timeout_s = {device.reply_timeout_s!r}\n"
+        f"[device.map]\n{registers}\n[cycle]\nperiod_s = {period_s!r}\n[pressure]\nmaximum_pa = 140e3\n"
+        "[safety]\nstale_after_s = 5.0\n[control]\nlaw = 'slides'\n[supervisory]\nport = 0\n"
+    )
+
+
+@contextmanager
+def identified_at(device: OtherDevice, period_s: float, within_s: float) -> Iterator[Dcs]:
+    """Run a daemon on the device, have it identify the valve, and give the DCS."""
+    with tempfile.TemporaryDirectory() as folder:
+        config = Path(folder) / "daemon.toml"
+        stroke_m = device.stem.parameters.stroke_m
+        config.write_text(daemon_text(device.described(reply_timeout_s=2.0), stroke_m, period_s))
+        with running("run", config) as ready, Dcs("127.0.0.1", port_in(ready), timeout_s=DCS_WITHIN_S) as dcs:
+            dcs.set("mode", Mode.AUTOMATIC)
+            if problem := dcs.identify({}, within_s):
+                raise RuntimeError(f"not identified: {problem}")
+            yield dcs
+
+
+def moved(device: OtherDevice, dcs: Dcs, reference: float, period_s: float) -> Move:
+    """Write a reference, p.u., and wait for the end of the move."""
+    began_s = last_s = time.monotonic()
+    dcs.set("reference", reference)
+    command, slides = device.command_mbar, 0
+    path = []
+    while (now_s := time.monotonic()) < min(began_s + ENDED_WITHIN_CYCLES * period_s, last_s + ENDED_CYCLES * period_s):
+        if device.command_mbar != command:
+            command, slides, last_s = device.command_mbar, slides + 1, now_s
+        path.append((now_s - began_s, device.stem.position_m / device.stem.parameters.stroke_m))
+        time.sleep(POLL_S)
+    _, end = path[-1]
+    return Move(end - reference, slides, max((at_s for at_s, at in path if abs(at - end) > ARRIVED), default=0.0))
