@@ -113,7 +113,7 @@ def drawn(rng: np.random.Generator) -> Drawn:
         loss=rng.uniform(0.0, 0.01),
         maximum_pa=2.5 * bench_pa,
         present=frozenset(present),
-        lag_s=float(effects[3]["time_constant_s"]),
+        lag_s=float(str(effects[3]["time_constant_s"])),
     )
 
 
@@ -283,7 +283,9 @@ def outcome(seed: int, steps: int) -> tuple[Drawn, Outcome]:
     )
 
 
-HEAD = "seed     ms  lag s  effects                             S3 s  landing, deviations  residual %  landed  rms %  excursion"
+HEAD = (
+    "seed     ms  lag s  effects                            S3 s  off, deviations  residual %  landed  rms %  excursion"
+)
 GROUPS_S = ((0.0, 5e-3), (5e-3, 20e-3), (20e-3, 60e-3), (60e-3, 1.0))
 
 
@@ -295,7 +297,7 @@ def line(seed: int, each: Drawn, found: Outcome) -> str:
         return f"{head}  refused: {found.reason} {found.why}"
     rms = 100 * np.sqrt(np.mean(np.square(found.errors)))
     return (
-        f"{head} {found.worst:20.2f} {100 * found.residual:11.3f} {np.mean(found.landed):7.2f} {rms:6.3f}"
+        f"{head} {found.worst:16.2f} {100 * found.residual:11.3f} {np.mean(found.landed):7.2f} {rms:6.3f}"
         f" {np.quantile(found.excursions, 0.9):10.2f} {found.why}"
     )
 

@@ -116,6 +116,8 @@ class LawTable(Schema):
 
     b_over_c_pa_per_m: Annotated[float, Field(lt=0)]
     k_over_c_pa: Annotated[float, Field(lt=0)]
+    offset_pa: float = 0.0
+    """Of the balance, from a preload or from unlike friction up and down."""
 
 
 class ControlTable(Schema):

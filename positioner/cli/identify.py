@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--alpha-pa", type=float, help="constant part of the excitation, Pa; 0 keeps the stem")
     parser.add_argument("--beta-pa", type=float, help="amplitude of its sine, Pa")
     parser.add_argument("--omega-rad-per-s", type=float, help="angular frequency of its sine, rad/s")
-    parser.add_argument("--timeout-s", type=float, default=10.0, help="give up after this many seconds (10)")
+    parser.add_argument("--timeout-s", type=float, default=600.0, help="give up after this many seconds (600)")
     add_connection(parser)
 
 
@@ -44,18 +44,20 @@ def _report(dcs: "Dcs", problem: str | None) -> int:
     from config.codes import Refusal
     from config.registers import BY_NAME, ESTIMATED
 
-    print(f"{'':9} {'estimate':>14} {'std':>12} unit")
-    for name in ESTIMATED:
+    print(f"{'':12} {'estimate':>14} {'std':>12} unit")
+    for name in (*ESTIMATED, "static_slope", "static_up", "static_down"):
         now = dcs.get_all(f"{name}_e", f"{name}_std", f"{name}_reason")
         reason = Refusal(int(now[f"{name}_reason"]))
         note = "" if reason is Refusal.VALID else f"  refused: {reason.text}"
         unit = BY_NAME[f"{name}_e"].unit
-        print(f"{name:9} {now[f'{name}_e']:14.6g} {now[f'{name}_std']:12.3g} {unit}{note}")
+        print(f"{name:12} {now[f'{name}_e']:14.6g} {now[f'{name}_std']:12.3g} {unit}{note}")
     if problem is not None:
         print(f"\nnot applied: {problem}; the law keeps what it had")
         return 1
-    law = dcs.get_all("b_over_c_applied", "k_over_c_applied")
+    law = dcs.get_all("b_over_c_applied", "k_over_c_applied", "offset_applied")
     print("\napplied; to keep it over a restart, write into the daemon's file:")
     print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
     print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")
+    if law["offset_applied"]:
+        print(f"offset_pa = {law['offset_applied']:.7g}")
     return 0

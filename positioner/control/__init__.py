@@ -8,7 +8,7 @@ real time.
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
     balance_law                                 the seed's law: the pressure that balances spring and friction
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
-    slide_law, slide_memory, local_balance      the law of slides: how far a slide is sent, and what pressure lands it
+    slide_law, slide_memory                     the law of slides: nothing, one or two, and how far a slide is sent
     conventional_law                            PI on position, to compare the others with
     pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress
     rest_detector                               where the stem rests

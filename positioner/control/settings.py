@@ -129,4 +129,4 @@ def _staircase(file: DaemonFile) -> StaircaseLimits:
 
 
 def _ratios(law: LawTable) -> Ratios:
-    return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa)
+    return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa, law.offset_pa)

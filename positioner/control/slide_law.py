@@ -11,13 +11,14 @@ With the stem at rest at x, e = r - x and s = sign(e):
                                                   M = max(1.05 m_-s, m_s - abs(e))
 
 The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
-farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round,
-by r - s M with M = max(1.05 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits.
-Only resting times depend on the period of the loop, not where the stem lands.
+farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round, by r - s M with
+M = max(1.05 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. Only resting times
+depend on the period of the loop, not where the stem lands.
 
-While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. Why there is no limit cycle: what a slide missed corrects B for the next (each miss is
-a fraction of the one before), the dead band widens from slide to slide, and their number is limited. After the end of a
-move nothing happens until the reference changes, or something else has visibly moved the stem.
+While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest.
+Why there is no limit cycle: what a slide missed corrects B for the next (each miss is a fraction of the one before),
+the dead band widens from slide to slide, and their number is limited. After the end of a move nothing happens until the
+reference changes, or something else has visibly moved the stem.
 """
 
 from collections.abc import Sequence

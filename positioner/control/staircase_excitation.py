@@ -4,8 +4,8 @@ From the pressure in force, steps in one direction, each after the stem has come
 since the stem last moved:
 
     first slide        steps of 2 % of the pressure span, growing by 1.3 (5 % at the most), until the stem breaks loose
-    the next ones      break-away is halved: R = sqrt(low high) of the largest rise that held and the least that did not,
-                       till they are within 15 %, or the slides a fortieth of the window
+    the next ones      break-away is narrowed down: R = sqrt(low high) of the largest rise that held and the least that
+                       did not, till they are within 15 %, or the slides a fortieth of the window
     from then on       1.05 times the least, or an eighth of the window if that is more: each step is a slide
     at the bound       of the window, or where the next slide would leave it, the staircase turns round
 

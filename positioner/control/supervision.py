@@ -53,7 +53,6 @@ class SupervisionMemory:
     """Commands given since the last good measurement, which the device may hold or not."""
 
 
-MOST_UNANSWERED = 8
 UNFIT_STATUS = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST)
 
 
@@ -74,7 +73,9 @@ def supervise(
     good_s = sample.now_s if good or first else memory.good_s
     heartbeat_s = sample.now_s if alive else memory.heartbeat_s
 
-    given_pa = (*memory.unanswered_pa[-MOST_UNANSWERED:], command_pa)
+    # After a reply or two that were lost the device may hold what was given before them; after more it was away.
+    short = memory.bad_in_a_row < limits.lost_after_cycles
+    given_pa = (*memory.unanswered_pa, command_pa) if short else (command_pa,)
 
     cause = _cause(sample, given_pa, bad_in_a_row, sample.now_s - good_s, limits)
     silent = memory.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heartbeat_s

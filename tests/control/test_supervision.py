@@ -84,6 +84,25 @@ def test_a_device_that_comes_back_with_another_command_was_restarted(held_pa: fl
     assert faults(watched([replace(good(0.0), held_pa=held_pa)], AUTOMATIC)) == [fault]
 
 
+def after_a_new_command(lost: int) -> Fault:
+    """Return the fault after replies were lost from a new command on, and the device comes back with the one before."""
+    memory = supervise(SupervisionMemory(), good(0.0), 50e3, AUTOMATIC, LIMITS)
+    for n in range(1, lost + 1):
+        lost_reply = replace(good(0.0), now_s=PERIOD_S * n, quality=Quality.LOST)
+        memory = supervise(memory, lost_reply, 60e3, AUTOMATIC, LIMITS)
+    back = replace(good(PERIOD_S * (lost + 1)), held_pa=50e3)
+    return supervise(memory, back, 60e3, AUTOMATIC, LIMITS).fault
+
+
+def test_a_device_that_has_not_got_the_last_command_was_not_restarted() -> None:
+    assert after_a_new_command(lost=1) is Fault.NONE
+    assert after_a_new_command(lost=2) is Fault.NONE
+
+
+def test_a_device_that_was_away_for_longer_was() -> None:
+    assert after_a_new_command(lost=3) is Fault.RESTARTED
+
+
 def test_a_fault_stays_until_acknowledged_after_its_cause_is_gone() -> None:
     unfit = replace(good(0.0), status=DeviceStatus.NOT_READY)
     acknowledged = replace(AUTOMATIC, acknowledgements=1)

@@ -44,7 +44,9 @@ def test_exact_landings_give_each_direction_its_friction() -> None:
     law = static_law(landings(), STROKE_M)
     assert law.valid
     assert (law.slope.value, law.up.value, law.down.value) == pytest.approx((SLOPE, UP, DOWN))
-    assert law.ratios == Ratios(pytest.approx(-SLOPE), pytest.approx(-(UP + DOWN) / 2), pytest.approx((UP - DOWN) / 2))
+    ratios = law.ratios
+    found = (ratios.b_over_c, ratios.k_over_c, ratios.offset_pa)
+    assert found == pytest.approx((-SLOPE, -(UP + DOWN) / 2, (UP - DOWN) / 2))
 
 
 def test_three_deviations_hold_the_truth() -> None:

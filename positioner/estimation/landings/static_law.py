@@ -7,7 +7,8 @@ Three unknowns θ, least squares with Huber's weights, for a slide that ended un
 stuck stem that gave way in its packing is no slide: it did not go as far as the law says.
 The residuals say how well the law holds: with n landings,
 
-    s^2 = max(Σ e^2 / (n - 3), (κ σ_x)^2, (κ 2e-4 stroke)^2),    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
+    s^2 = max(Σ e^2 / (n - 3), (κ σ_x)^2, (κ 2e-4 stroke)^2)
+    cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
 
 which is the Cramér-Rao bound of white residuals, widened so that three deviations are 99.7 % for few landings, too.
 The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what that model calls impossible is the offset
