@@ -1,10 +1,11 @@
-"""Small moves: the seed's law and the law for small moves on the same random steps of the seed's valve, in one run.
+"""Small moves: the three laws on the same random steps of the seed's valve, in one run.
 
     python -m benchmarks.small_moves [--steps 400] [--rest-s 600] [--seed 0]
 
 Each row is a valve of its own: first the daemon's S3 identifies it under the row's noise, and nothing else is told to
 the controller; then come the steps, their sizes from 0.1 to 10 % of stroke, evenly in the logarithm (evenly in size
-for the second row), 0.5 s each, in a loop of 1 ms with one cycle of delay. All figures are of the true stem, in % of
+for the second row), 0.5 s each, in a loop of 1 ms with one cycle of delay; slower loops and pressures have more time, and
+slides alone from 20 ms on, where a sine identifies nothing. All figures are of the true stem, in % of
 stroke: what the error is at the end of the step, and how far the stem was beyond the reference on the way. The last
 table leaves each loop alone at a fixed reference. Takes some minutes. The last column of the first is the processor
 time of one step of the control core, on average.
@@ -43,6 +44,11 @@ LOWEST, HIGHEST = 0.4, 0.9
 SMALLEST, LARGEST = 1e-3, 0.1
 
 
+Law = Literal["seed", "breakaway", "slides"]
+LAWS: tuple[Law, ...] = ("seed", "breakaway", "slides")
+SLIDES: tuple[Law, ...] = ("slides",)
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """A row: noise, effects that the law does not know, period of the loop, how the sizes are drawn."""
@@ -52,6 +58,8 @@ class Case:
     effects: tuple[dict[str, object], ...] = ()
     period_s: float = 1e-3
     even_in_size: bool = False
+    step_s: float = STEP_S
+    laws: tuple[Law, ...] = LAWS
 
 
 CASES = (
@@ -62,9 +70,39 @@ CASES = (
     Case("1e-4, backlash 0.3 %", effects=({"name": "backlash", "width_m": 3e-3 * STROKE_M},)),
     Case("1e-4, packing asymmetry 15 %", effects=({"name": "asymmetric_friction", "asymmetry": 0.15},)),
     Case("1e-4, loop of 5 ms", period_s=5e-3),
+    Case("1e-4, loop of 20 ms", period_s=0.02, step_s=1.0, laws=SLIDES),
+    Case("1e-4, loop of 50 ms", period_s=0.05, step_s=2.0, laws=SLIDES),
+    Case("1e-4, loop of 100 ms", period_s=0.1, step_s=4.0, laws=SLIDES),
+    Case("1e-4, loop of 200 ms", period_s=0.2, step_s=8.0, laws=SLIDES),
+    Case(
+        "1e-4, 50 ms, I/P lag 200 ms",
+        effects=({"name": "ip_lag", "time_constant_s": 0.2},),
+        period_s=0.05,
+        step_s=10.0,
+        laws=SLIDES,
+    ),
+    Case(
+        "1e-4, 50 ms, I/P 40, 60 kPa/s",
+        effects=({"name": "rate_limit", "filling_pa_per_s": 4e4, "venting_pa_per_s": 6e4},),
+        period_s=0.05,
+        step_s=8.0,
+        laws=SLIDES,
+    ),
+    Case(
+        "1e-4, 50 ms, friction grows 30 %",
+        effects=({"name": "position_friction", "growth": 0.3, "travel_m": STROKE_M},),
+        period_s=0.05,
+        step_s=4.0,
+        laws=SLIDES,
+    ),
+    Case(
+        "1e-4, 50 ms, spring hardens",
+        effects=({"name": "spring_hardening", "cubic_n_per_m3": 1e6},),
+        period_s=0.05,
+        step_s=4.0,
+        laws=SLIDES,
+    ),
 )
-Law = Literal["seed", "breakaway"]
-LAWS: tuple[Law, ...] = ("seed", "breakaway")
 
 
 class Late:
@@ -116,7 +154,12 @@ class Loop:
 
     def __init__(self, law: Law, case: "Case", seed: int) -> None:
         self._period_s = case.period_s
-        daemon = {"valve": {"stroke_m": STROKE_M}, "cycle": {"pace": "device"}, "control": {"law": law}}
+        daemon = {
+            "valve": {"stroke_m": STROKE_M},
+            "cycle": {"pace": "device", "period_s": case.period_s},
+            "safety": {"stale_after_s": max(0.1, 3 * case.period_s)},
+            "control": {"law": law},
+        }
         slave = {
             "clock": {"mode": "lockstep", "period_s": case.period_s},
             "sensor": {"noise_std_m": case.noise_pu * STROKE_M, "seed": seed},
@@ -132,7 +175,11 @@ class Loop:
         self.controller = Timed(Settings.of(DaemonFile.model_validate(daemon)), held_pa)
         self.cycle = Cycle(link, self.controller, pace, first, recorder=None)
         self._ask(eta=(0, 0, 0))
-        self.path(S3_S)
+        if law == "slides":
+            while self.cycle.snapshot.decision.estimates.progress < 1:
+                self.cycle.once()
+        else:
+            self.path(S3_S)
         self._ask(eta=QUIET)
         self.path(case.period_s)
         self.controller.steps = self.controller.busy_ns = 0
@@ -186,14 +233,14 @@ def references(steps: int, seed: int, *, even_in_size: bool = False) -> Iterator
         yield at * STROKE_M, direction
 
 
-def stepped(loop: Loop, steps: Iterator[tuple[float, int]]) -> Outcome:
+def stepped(loop: Loop, steps: Iterator[tuple[float, int]], step_s: float) -> Outcome:
     """Let a loop make the steps."""
     loop.step_to(0.6 * STROKE_M)
-    loop.path(1.0)
+    loop.path(max(1.0, step_s))
     errors, overshoots = [], []
     for reference_m, direction in steps:
         loop.step_to(reference_m)
-        position_m, _ = loop.path(STEP_S)
+        position_m, _ = loop.path(step_s)
         errors.append((position_m[-1] - reference_m) / STROKE_M)
         overshoots.append(max(0.0, float((direction * (position_m - reference_m)).max())) / STROKE_M)
     return Outcome(np.array(errors), np.array(overshoots))
@@ -230,16 +277,17 @@ def report(steps: int = 400, rest_s: float = 600.0, seed: int = 0) -> Iterator[s
     yield f"{steps} steps, % of stroke; ov.: overshoot; then the share of steps that end so near, %"
     yield f"{'':34}{'law':>10}{HEAD}"
     for case in CASES:
-        for law in LAWS:
+        for law in case.laws:
             loop = Loop(law, case, seed)
-            outcome = stepped(loop, references(steps, seed + 1, even_in_size=case.even_in_size))
+            outcome = stepped(loop, references(steps, seed + 1, even_in_size=case.even_in_size), case.step_s)
             step_us = loop.controller.busy_ns / loop.controller.steps / 1e3
             yield f"{case.name:34}{law:>10}{outcome.said}{step_us:9.1f}"
     yield ""
     yield f"left alone for {rest_s:g} s: changes of the command, travel of the stem, error, % of stroke"
     for case in CASES:
-        if not case.even_in_size:
-            yield f"{case.name:34}{'breakaway':>10}{rested(Loop('breakaway', case, seed), rest_s)}"
+        for law in case.laws:
+            if not case.even_in_size and law != "seed":
+                yield f"{case.name:34}{law:>10}{rested(Loop(law, case, seed), rest_s)}"
 
 
 def main() -> None:
