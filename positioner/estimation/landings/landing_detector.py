@@ -21,6 +21,8 @@ VISIBLE = 5e-3
 VISIBLE_NOISES = 6.0
 PRECISE, LONG = 2e-4, 60
 """Of the stroke: a rest known no better is averaged on, up to so many samples."""
+ENOUGH = 400
+"""Samples of a rest, after which it is only watched."""
 STOP = 0.01
 """Of the stroke: as near as this to an end it may be a stop."""
 FIRST_ANSWER_S = 1.0
@@ -107,7 +109,8 @@ class LandingDetector:
         if self._running_on:
             self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
         self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
-        self._window.add(time_s, position_m, pressure_pa)
+        if self.rest is None or self.rest.count < ENOUGH:
+            self._window.add(time_s, position_m, pressure_pa)
         rest = self._window.rest
         if self.rest is not None:
             self._watch(time_s, position_m, self.rest)

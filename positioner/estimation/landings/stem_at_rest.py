@@ -76,20 +76,25 @@ class RestWindow:
     def restart(self, time_s: float) -> None:
         """Begin anew: the pressure is changed now."""
         self._count, self._each, self._in_row = 0, 1, 0
-        self._sum = np.zeros(3)
+        self._sums = (0.0, 0.0, 0.0)
         self._start_s = time_s
         self._look_s = time_s
         self.rest: Rest | None = None
 
     def add(self, time_s: float, position_m: float, pressure_pa: float) -> None:
         """Take a sample; a pressure that is not measured is NaN."""
-        self._sum += (time_s - self._start_s, position_m, pressure_pa)
+        times_s, positions_m, pressures_pa = self._sums
+        times_s, positions_m = times_s + time_s - self._start_s, positions_m + position_m
+        pressures_pa += pressure_pa
         self._in_row += 1
-        if self._in_row == self._each:
-            self._rows[self._count] = self._sum / self._each
+        if self._in_row < self._each:
+            self._sums = (times_s, positions_m, pressures_pa)
+        else:
+            each = self._each
+            self._rows[self._count] = (times_s / each, positions_m / each, pressures_pa / each)
             self._count += 1
             self._in_row = 0
-            self._sum[:] = 0.0
+            self._sums = (0.0, 0.0, 0.0)
         if self._count == MOST:
             self._rows[: MOST // 2] = 0.5 * (self._rows[::2] + self._rows[1::2])
             self._count //= 2
