@@ -7,8 +7,9 @@ import pytest
 
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
-from workbench.fit.descent import scanned, settled
+from workbench.fit.descent import NARROW, descended, scanned, settled
 from workbench.fit.objective import FINAL, SimulationError, soft
+from workbench.fit.strewing import proved
 
 BEST = np.array([0.3, -0.2, 0.1])
 
@@ -81,3 +82,27 @@ def test_a_search_goes_over_stairs_that_no_derivative_sees() -> None:
     found = settled(error, begin)
     np.testing.assert_allclose(found[:2], BEST[:2], atol=0.01)
     assert error.cost(found) < 1.01 * error.cost(BEST)
+
+
+class Rounded(MadeUp):
+    """The same, each residual rounded to 20: stairs run across all coordinates."""
+
+    def residuals(self, z: Vector) -> Vector:
+        return np.asarray(self._noise + 20.0 * np.round(self._slopes @ (z - BEST) / 20.0))
+
+
+def test_searches_on_one_stair_of_a_rounded_record_do_not_agree_once_a_lower_one_is_found() -> None:
+    error = cast(SimulationError, cast(Any, Rounded()))
+    stuck = BEST + np.array([0.05, -0.08, 0.0])
+    stuck = descended(error, stuck, NARROW)
+    ends = [Place(stuck, "even landings"), Place(stuck, "odd landings"), Place(stuck, "base fit 1")]
+    assert error.cost(stuck) > 1.01 * error.cost(BEST), "a descent ends there"
+    assert agreeing(error, ends) == 3
+    best, *others = proved(error, ends)
+    assert error.cost(best.z) < error.cost(stuck) / 1.01
+    assert agreeing(error, [best, *others]) == 1
+
+
+def test_at_the_least_of_a_rounded_record_searches_go_on_agreeing() -> None:
+    error = cast(SimulationError, cast(Any, Rounded()))
+    assert agreeing(error, proved(error, [Place(BEST, "even landings"), Place(BEST, "odd landings")])) == 2

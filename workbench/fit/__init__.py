@@ -7,6 +7,7 @@ Its files:
     landings           the balance of forces where slides end in rest, from which searches begin too
     objective          what they lower
     descent            how: trust region, and a scan of the stairs
+    strewing           what is left where a sensor rounds: places about the end
     agreement          which of them came to the same
     threads            searches side by side
     fitted_parameter   a parameter with its interval, and how it is shown

@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.karnopp import Vector
 from workbench.fit.objective import SimulationError
-from workbench.fit.uncertainty import NOTHING, information
+from workbench.fit.uncertainty import deviations
 
 WITHIN = 1.01
 DEVIATIONS, NEAR = 2.0, 0.01
@@ -43,18 +43,12 @@ def agreeing(error: SimulationError, ends: Sequence[Place]) -> int:
         ends: where searches ended.
     """
     best = min(ends, key=lambda end: error.cost(end.z))
-    deviations = _deviations(error, best.z)
-    compared = deviations <= DETERMINED
-    allowed = np.maximum(DEVIATIONS * deviations[compared], NEAR)
+    deviation = deviations(error, best.z)
+    compared = deviation <= DETERMINED
+    allowed = np.maximum(DEVIATIONS * deviation[compared], NEAR)
 
     def agrees(end: Place) -> bool:
         near = np.abs(end.z - best.z)[compared] <= allowed
         return error.cost(end.z) <= WITHIN * error.cost(best.z) and bool(near.all())
 
     return len({end.origin for end in ends if agrees(end)})
-
-
-def _deviations(error: SimulationError, z: Vector) -> Vector:
-    """Return s, (parameters,)."""
-    values, vectors, kappa = information(error, z)
-    return np.asarray(np.sqrt(vectors**2 @ (kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))))

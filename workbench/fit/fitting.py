@@ -31,8 +31,10 @@ from workbench.data.record import Record, ready, require_fittable, require_units
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
+from workbench.fit.guesses import FINEST
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed
+from workbench.fit.strewing import proved, strewn
 from workbench.fit.threads import on_threads
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
@@ -99,7 +101,7 @@ class Fit(Result):
     """The searches, best first."""
     agreement: int
     """From how many independent starts searches came to the best, in cost and in parameters (`agreement`); 1 where an
-    added effect makes nothing better."""
+    added effect makes nothing better, or rounds more finely than the noise shows."""
     condition: float
     undetermined: tuple[Combination, ...]
     notes: tuple[str, ...]
@@ -335,7 +337,8 @@ class BegunFit:
         """Bring at most so many more of the searches to where they stay."""
 
         def ended(start: Place) -> Place:
-            return replace(start, z=settled(self.error, start.z, self.effort.improves_below))
+            z = settled(self.error, start.z, self.effort.improves_below)
+            return replace(start, z=strewn(self.error, z) if self._rounds(z) else z)
 
         chosen = self.places[len(self.ends) : len(self.ends) + count]
         found = _each(ended, chosen, self.workers, lambda done: self.tell(0.5 + 0.4 * done))
@@ -344,6 +347,8 @@ class BegunFit:
     def finished(self, *, profile: bool) -> Fit:
         """Return the fit, searches brought to where they stay two at a time until they agree.
 
+        Where a sensor rounds, places about the best are tried before the agreement counts.
+
         Args:
             profile: follow the cost for the intervals.
         """
@@ -351,6 +356,8 @@ class BegunFit:
         while len(here.ends) < most and (not here.ends or agreeing(here.error, here.ends) < here.effort.agreeing):
             # One that was there already is the first of two: the fit is the same whether it was begun apart or not.
             here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
+        if here._rounds(here.ends[0].z):
+            here = replace(here, ends=proved(here.error, here.ends))
         return here.judged(profile=profile)
 
     def judged(self, *, profile: bool) -> Fit:
@@ -371,13 +378,23 @@ class BegunFit:
             error.cost(best),
             error.count,
             tuple(_search(error, z) for z in found),
-            agreeing(error, self.ends) if self.cost < self.effort.improves_below else 1,
+            agreeing(error, self.ends) if self._shows(best) else 1,
             determined.condition,
             determined.undetermined,
             error.run.record.notes,
             error.run.from_pressure,
             tuple(error.theta(z) for z in (best, *_elsewhere(found))),
         )
+
+    def _shows(self, z: Vector) -> bool:
+        """Whether what is added makes something better than the base, a quantum by more than the noise hides."""
+        theta, noise_m = self.error.theta(z), self.error.run.record.noise_m
+        quanta_m = [theta[each.index] for each in self.error.parameters if each.guess == "quantum"]
+        return self.cost < self.effort.improves_below and all(each >= FINEST * noise_m for each in quanta_m)
+
+    def _rounds(self, z: Vector) -> bool:
+        """Whether the sensor rounds at z, and that makes something better than the base."""
+        return smoothed(self.error, z) is not self.error and self.error.cost(z) < self.effort.improves_below
 
 
 def _by_origins(places: Sequence[Place]) -> list[Place]:

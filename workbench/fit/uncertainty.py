@@ -111,6 +111,12 @@ def information(error: SimulationError, z: Vector) -> tuple[Vector, NDArray[np.f
     return values, vectors, _kappa(residuals)
 
 
+def deviations(error: SimulationError, z: Vector) -> Vector:
+    """Return s at z, (parameters,): s_i^2 = sum_k kappa v_ki^2 / lambda_k."""
+    values, vectors, kappa = information(error, z)
+    return np.asarray(np.sqrt(vectors**2 @ (kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))))
+
+
 def _kappa(residuals: Vector) -> float:
     squares = (root_weights(residuals, FINAL) * residuals) ** 2
     return max(1.0, float(np.mean(squares))) * _correlation(residuals)

@@ -1,0 +1,42 @@
+"""A fit of a record that is rounded: right, or not trusted."""
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from workbench.blind.hiding import hide
+from workbench.data.record import ready
+from workbench.fit.agreement import WITHIN
+from workbench.fit.fitting import fit
+from workbench.fit.objective import SimulationError
+from workbench.model.free_run import FreeRun
+
+
+def true_cost(recording: Recording, truth: ValveFile) -> float:
+    composition = Composition.from_file(truth)
+    error = SimulationError(FreeRun(composition, ready(recording)), composition, (), composition.theta)
+    return error.cost(np.zeros(0))
+
+
+@pytest.mark.parametrize("seed", [52027, 52055, 52682])
+def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth(seed: int) -> None:
+    hidden = hide(seed)
+    assert [each.name for each in hidden.truth.effect] == ["quantisation"]
+    base = fit(hidden.fit, hidden.base, workers=1, profile=False)
+    found = fit(hidden.fit, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)
+    least = true_cost(hidden.fit, hidden.truth)
+    assert found.cost < WITHIN * least or not found.trusted
+    assert found.cost < 1.1 * least, "a stair off at most"
+
+
+def test_a_quantum_finer_than_the_noise_shows_is_not_trusted_however_many_searches_agree() -> None:
+    hidden = hide(52055)
+    columns = {name: each[:652] for name, each in hidden.fit.columns.items()}
+    recording = Recording(columns, hidden.fit.metadata)
+    base = fit(recording, hidden.base, workers=1, profile=False)
+    found = fit(recording, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)
+    assert found.parameters["quantisation.quantum_m"].value < ready(recording).noise_m
+    assert found.cost < base.cost / WITHIN, "though it does better than the base"
+    assert not found.trusted

@@ -1,0 +1,51 @@
+"""The last of a search where a sensor rounds: places strewn about its end, gone over to whichever is lower.
+
+    z' = z + 10^u s w      u uniform in -1.5 to 1.5, s deviations by `uncertainty.deviations`, w standard normal, each
+                           coordinate its own; in every other static friction moves by 10^t w more, t in -4 to -1.7
+
+Static friction shows in the instants of break-aways alone: its derivative says nothing.
+
+The stairs of a rounded record run across all coordinates at once: a scan of each alone ends on one, as does a descent.
+Searches of several origins may end on the same one. So before they are believed, more places are strewn about the best.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sim.composition import STATIC
+from sim.karnopp import Vector
+from workbench.fit.agreement import Place
+from workbench.fit.objective import SimulationError
+from workbench.fit.uncertainty import deviations
+
+STREWN, PROVING = 400, 1200
+"""Places about each end, and about the best of all."""
+NEAREST, FARTHEST = -1.5, 1.5
+"""Of the decimal logarithm of the distance, in deviations."""
+SURE, UNSURE = 1e-5, 3e-3
+"""Least and most of a deviation, of a log-parameter: on stairs the derivatives may say anything."""
+STATIC_NEAREST, STATIC_FARTHEST = -4.0, -1.7
+
+
+def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
+    """Return the lowest of so many places about z, which itself decides what is drawn: no two ends draw the same."""
+    generator = np.random.default_rng(z.view(np.uint32))
+    deviation = np.clip(deviations(error, z), SURE, UNSURE)
+    static = np.array([each.index == STATIC for each in error.parameters] or np.zeros(z.size), np.float64)
+    for i in range(count):
+        away = 10.0 ** generator.uniform(NEAREST, FARTHEST) * deviation
+        stair = 10.0 ** generator.uniform(STATIC_NEAREST, STATIC_FARTHEST) * static
+        way = (away + i % 2 * stair) * generator.standard_normal(z.size)
+        z = min(z, np.clip(z + way, error.lower, error.upper), key=error.cost)
+    return z
+
+
+def proved(error: SimulationError, ends: Sequence[Place]) -> tuple[Place, ...]:
+    """Return the ends, best first, with the first moved to the lowest place about it.
+
+    Where that is lower by more than searches may differ, the others do not agree with it any more.
+    """
+    best, *others = ends
+    return replace(best, z=strewn(error, best.z, PROVING)), *others
