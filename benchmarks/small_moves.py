@@ -4,10 +4,11 @@
 
 Each row is a valve of its own: first the daemon's S3 identifies it under the row's noise, and nothing else is told to
 the controller; then come the steps, their sizes from 0.1 to 10 % of stroke, evenly in the logarithm (evenly in size
-for the second row), 0.5 s each, in a loop of 1 ms with one cycle of delay; slower loops and pressures have more time,
-and only slides run from 20 ms on, where a sine identifies nothing. All figures are of the true stem, in % of stroke: what the error is at the end of the step, and how far the stem was beyond the reference on the way. The last
-table leaves each loop alone at a fixed reference. Takes some minutes. The last column of the first is the processor
-time of one step of the control core, on average.
+for the second row), 0.5 s each, in a loop of 1 ms with one cycle of delay. Slower loops and pressures have more time,
+and only slides run from 20 ms on, where a sine identifies nothing. All figures are of the true stem, in % of stroke:
+what the error is at the end of the step, and how far the stem was beyond the reference on the way. The last table
+leaves each loop alone at a fixed reference. Takes some minutes. The last column of the first is the processor time of
+one step of the control core, on average.
 """
 
 import argparse

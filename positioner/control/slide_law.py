@@ -35,6 +35,8 @@ RETURN = 1.05
 """Margins that the second slide is given, for a stem must not stay where the first took it."""
 NEARLY = 0.6
 """Of the shortest slide: a way that held the stem and is longer says that no much shorter one breaks loose."""
+UNLIKE = 2.0
+"""Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
 FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
 SLOW = 2e-3
@@ -117,12 +119,17 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
     guess_m = FIRST_MARGIN * balance.friction_m
     if settings.breakaway_pa is not None:
         guess_m = max(guess_m, (settings.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
+    slid_m = {
+        s: min(
+            (abs(each.position_m - each.from_m) for each in balance.landings if each.direction == s), default=guess_m
+        )
+        for s in (1, -1)
+    }
     for s in (1, -1):
-        slid_m = [abs(each.position_m - each.from_m) for each in balance.landings if each.direction == s]
-        held_m = [balance.way_m(each) for each in balance.held if each.direction == s]
-        shortest_m = min(slid_m, default=guess_m)
-        held = NEARLY * shortest_m < max(held_m, default=0.0) < shortest_m
-        memory = memory.with_margin(s, Margin(shortest_m, broke=bool(slid_m), held=held))
+        held_m = max((balance.way_m(each) for each in balance.held if each.direction == s), default=0.0)
+        shortest_m = min(slid_m[s], UNLIKE * slid_m[-s])
+        held = NEARLY * shortest_m < held_m < shortest_m
+        memory = memory.with_margin(s, Margin(shortest_m, broke=shortest_m == slid_m[s], held=held))
     return memory
 
 
