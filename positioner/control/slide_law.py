@@ -37,6 +37,8 @@ NEARLY = 0.6
 """Of the shortest slide: a way that held the stem and is longer says that no much shorter one breaks loose."""
 UNLIKE = 2.0
 """Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
+MISSED = 0.1
+"""Of its way: a slide that misses its aim by more."""
 FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
 SLOW = 2e-3
@@ -134,12 +136,23 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
 
 
 def _learnt(memory: SlideMemory, outcome: SlideOutcome, balance: Balance) -> SlideMemory:
-    """Return the memory after a slide: its margin. A slide onto a stop says nothing of it."""
+    """Return the memory after a slide: its margin. A slide onto a stop says nothing of it.
+
+    A short slide that lands far from its aim was none: the packing that holds the stem, soft, gave way before it broke
+    loose.
+    """
     if outcome.moved and not outcome.landing:
         return memory
     s = outcome.direction
-    way_m = s * (outcome.position_m - outcome.from_m) if outcome.moved else balance.way_m(outcome)
-    return memory.with_margin(s, memory.margin(s).after(way_m, outcome.moved))
+    margin = memory.margin(s)
+    if not outcome.moved:
+        return memory.with_margin(s, margin.after(balance.way_m(outcome), moved=False))
+    way_m = s * (outcome.position_m - outcome.from_m)
+    if memory.target_m is not None and not memory.excursion and s == memory.direction:
+        missed_m = abs(outcome.position_m - memory.target_m)
+        if missed_m > MISSED * way_m:
+            return memory.with_margin(s, margin.after_miss(way_m))
+    return memory.with_margin(s, margin.after(way_m, moved=True))
 
 
 def _redirected(

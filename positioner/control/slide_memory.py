@@ -11,6 +11,8 @@ MARGIN_RAISE, MARGIN_LOWER = 1.06, 0.999
 """Factors on a margin after a slide that did not break loose, and after one that did."""
 MARGIN_CLIMB, MARGIN_DESCEND = 1.3, 0.85
 """The same as long as no slide has done either."""
+MARGIN_LENGTHEN, SHORT = 1.2, 2.0
+"""Factor after a short slide that missed its aim; margins up to which a slide is short."""
 NEAR = 1.1
 """Margins: a slide longer than this says nothing of the margin."""
 
@@ -64,6 +66,12 @@ class Margin:
         if way_m < self.way_m / NEAR:
             return self
         return Margin((MARGIN_RAISE if self.broke else MARGIN_CLIMB) * max(way_m, self.way_m), self.broke, True)
+
+    def after_miss(self, way_m: float) -> "Margin":
+        """Return the margin after a slide of a way, m, that landed far from its aim: longer, if it was short."""
+        if way_m > SHORT * self.way_m:
+            return self
+        return Margin(MARGIN_LENGTHEN * max(way_m, self.way_m), self.broke, True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,12 @@ from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller import Decision
 from positioner.control.requests import QUIET, Requests
-from positioner.control.slide_memory import Margin
+from positioner.control.slide_law import Balance, step
+from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
+from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.stem_at_rest import Rest
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
@@ -202,10 +205,27 @@ def test_the_staircase_turns_round_before_it_leaves_the_window() -> None:
     assert stairs.after(outcome(1, 0.065, 0.075), 0.075, LIMITS).direction == 1
 
 
+@pytest.mark.parametrize(("landed_m", "longer"), [(0.06, False), (0.0585, True)])
+def test_a_short_slide_that_misses_its_aim_makes_the_margin_longer(landed_m: float, longer: bool) -> None:
+    """Held elastically, a stem gives way by some per cent before it breaks loose: that was no slide."""
+    margin = Margin(0.005, broke=True, held=True)
+    memory = SlideMemory(target_m=0.06, direction=-1, up=margin, down=margin)
+    rest = Rest(landed_m, 1e-6, 1e-6, 100, 0.1)
+    came = SlideOutcome(1.0, -1, 0.0655, 80e3, 27e3, landed_m, 1e-6, True, True)
+    observation = StemObservation(1.0, landed_m, True, rest, 0.0, came)
+    balance = Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M)
+    settings = SlideSettings(STROKE_M, 5e-5, 0.0, 420e3, None, 0.5 * STROKE_M, 0.0)
+    after = step(memory, observation, 0.06, balance, settings)
+    assert (after.down.way_m > 0.006) is longer
+    assert after.up == margin
+
+
 def test_a_margin_falls_while_slides_break_loose_and_rises_when_one_does_not() -> None:
     margin = Margin().after(0.06, moved=True)
     assert margin.way_m == pytest.approx(0.85 * 0.06)
     assert margin.after(0.2, moved=True).way_m == margin.way_m, "a long slide says nothing of it"
+    assert margin.after_miss(margin.way_m).way_m == pytest.approx(1.2 * margin.way_m)
+    assert margin.after_miss(0.2).way_m == margin.way_m, "a long slide that misses is the balance's error"
     raised = margin.after(margin.way_m, moved=False)
     assert raised.way_m == pytest.approx(1.06 * margin.way_m)
     assert raised.after(raised.way_m, moved=True).way_m == pytest.approx(0.999 * raised.way_m)
