@@ -202,6 +202,11 @@ class DaemonFile(Schema):
     health: HealthTable = HealthTable()
     log: LogTable = LogTable()
 
+    @property
+    def by_slides(self) -> bool:
+        """Whether S3 excites by a staircase of slides: where nobody says, the law of slides does."""
+        return (self.excitation.kind or ("staircase" if self.control.law == "slides" else "sine")) == "staircase"
+
 
 SHARED = frozenset({"supervisory", "log"})
 """Tables that the valves of a daemon have together."""

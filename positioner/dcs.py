@@ -137,8 +137,12 @@ class Dcs:
     def _wait_for_a_cycle(self) -> None:
         """Wait until the daemon has decided on what it was told, however slow its loop; not for one that stands."""
         asked, due_s = self.get("cycles"), time.monotonic() + CYCLE_WITHIN_S
-        while (self.get("cycles") - asked) % CYCLES_WRAP < 2 and time.monotonic() < due_s:
+        while not self._decided_since(asked) and time.monotonic() < due_s:
             time.sleep(POLL_S)
+
+    def _decided_since(self, asked: float) -> bool:
+        """Return whether what is served was decided after a count of cycles was read, as the one under way was not."""
+        return bool((self.get("cycles") - asked) % CYCLES_WRAP >= 2)
 
     def _wait_for_estimates(self, timeout_s: float, show: Callable[[float], None]) -> str | None:
         """Wait until the estimates the law needs are there; return what went wrong, or None."""
@@ -146,7 +150,7 @@ class Dcs:
         begun = False
         asked = self.get("cycles")
         while time.monotonic() < due_s:
-            if (self.get("cycles") - asked) % CYCLES_WRAP < 2:  # what is served was decided before the asking
+            if not self._decided_since(asked):
                 time.sleep(POLL_S)
                 continue
             now = self.get_all(

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.output_files import write_json
 
 HELP = "hold a model against a recording in free run and say where it fails; exit status 1 if it is not adequate"
 EXAMPLE = "positioner compare rec.csv --valve seed --report compared.html"
@@ -20,7 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
-    import json
 
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
         compared = compare(recording, valve)
     print(f"{arguments.valve} against {arguments.recording}: {compared.summary()}")
     if arguments.json is not None:
-        arguments.json.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
+        write_json(arguments.json, as_json(compared))
     if arguments.report is not None:
         from workbench.report import Subject, report_comparison
 

@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from positioner.cli.parts.output_files import make_folder, write_json
 from positioner.cli.parts.simulated_plant import AGEING, AGES_AT_S, BUSES, started
 
 if TYPE_CHECKING:
@@ -108,7 +109,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run_steps(arguments: argparse.Namespace) -> int:
-    import json
 
     from config.valve_file import load_valve, shipped_valve
     from positioner.cli.parts.children import port_in
@@ -125,7 +125,7 @@ def _run_steps(arguments: argparse.Namespace) -> int:
         if arguments.out:
             _print_line(f"picture {picture}, recording {_recording(folder)}")
         if arguments.json:
-            arguments.json.write_text(json.dumps(_jsonable(outcome, time.monotonic() - started_s), indent=1) + "\n")
+            write_json(arguments.json, _jsonable(outcome, time.monotonic() - started_s), indent=1)
         for problem in outcome.problems:
             print(f"DOES NOT HOLD: {problem}")
         print(f"{'all holds' if not outcome.problems else 'failed'}, {time.monotonic() - started_s:.0f} s")
@@ -137,18 +137,13 @@ def _folder(asked: Path | None) -> Iterator[Path]:
     """Give the folder to work in: the one asked for, or one that goes away."""
     import tempfile
 
-    from config.errors import InputError
-
     if asked is None:
         with tempfile.TemporaryDirectory() as name:
             yield Path(name)
         return
-    try:
-        asked.mkdir(parents=True, exist_ok=True)
-        for old in (asked / "recordings").glob("*.csv"):
-            old.unlink()
-    except OSError as error:
-        raise InputError(f"--out {asked}", f"cannot be written: {error.strerror}") from None
+    make_folder(asked)
+    for old in (asked / "recordings").glob("*.csv"):
+        old.unlink()
     yield asked
 
 

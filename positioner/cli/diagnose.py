@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.output_files import write_json
 
 if TYPE_CHECKING:
     from workbench.select.tangent_preview import TangentScore
@@ -41,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose and print; 0 if nothing is missing, else 1."""
-    import json
     import time
 
     from config.valve_file import find_valve, load_valve
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
-        arguments.json.write_text(json.dumps(whole, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(arguments.json, whole)
     if arguments.report is not None:
         files = tuple(str(path) for path in (*arguments.recordings, arguments.test) if path)
         subject = Subject(valve, files, recordings[0].metadata)

@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from positioner.cli.parts.output_files import write_json
+
 if TYPE_CHECKING:
     from positioner.estimation.recording_estimates import RecordingEstimates
 
@@ -25,9 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Estimate and print; 0 if the ratios that the law needs are valid, else 1."""
-    import json
-
-    from config.errors import InputError
     from config.recording import Recording
     from positioner.cli.parts.naming import naming
     from positioner.estimation.recording_estimates import estimate
@@ -38,12 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
         estimated = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held)
     print(f"{arguments.recording}: {estimated.summary()}")
     if arguments.json is not None:
-        try:
-            arguments.json.write_text(
-                json.dumps(as_json(estimated), indent=1, allow_nan=False) + "\n", encoding="utf-8"
-            )
-        except OSError as error:
-            raise InputError(f"--json {arguments.json}", f"cannot be written: {error.strerror}") from None
+        write_json(arguments.json, as_json(estimated), indent=1)
     return 0 if estimated.law_ready else 1
 
 

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.output_files import write_json
 
 HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -30,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Extend and write the new file with its journal; 0 if the held-out error falls, else 1."""
-    import json
     import time
 
     from config.valve_file import find_valve, load_valve
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{arguments.out}: {journal.steps[-1].why}")
     if arguments.json is not None:
         whole = as_json(extension) | {"valve": str(arguments.out), "seconds": time.monotonic() - began_s}
-        arguments.json.write_text(json.dumps(whole, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(arguments.json, whole)
     if arguments.report is not None:
         report_journal(journal, arguments.report, extension.valve.valve.name)
     return 0 if extension.falls else 1

@@ -50,10 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
     daemon, slave = _files(arguments, valve)
     cycle = virtual_cycle(daemon, device_of(slave, path), _first_requests(valve))
-    by_slides = arguments.law == "slides"
-    snapshots = list(
-        identified(cycle, daemon.excitation.staircase_limit_s if by_slides else IDENTIFY_S, wait=not by_slides)
-    )
+    within_s = daemon.excitation.staircase_limit_s if daemon.by_slides else IDENTIFY_S
+    snapshots = list(identified(cycle, within_s, wait=not daemon.by_slides))
     begin_s = snapshots[-1].sample.time_s
     snapshots += list(played(cycle, _script(time_s, reference_m, begin_s), begin_s + float(time_s[-1] - time_s[0])))[1:]
     write_recording(arguments.out, _recording(snapshots, float(time_s[0]) - begin_s, valve.name))

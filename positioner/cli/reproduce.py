@@ -11,6 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from positioner.cli.parts.output_files import make_folder, write_json
+
 if TYPE_CHECKING:
     from positioner.paper.findings import SeedFindings
     from positioner.paper.formulas import Erratum
@@ -43,7 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.seeds < 2:
         raise InputError("--seeds", f"must be at least 2, it is {arguments.seeds}")
     started_s = time.monotonic()
-    _make_folder(arguments.out)
+    if arguments.out:
+        make_folder(arguments.out)
     file = load_valve(shipped_valve("seed"))
     cases = [(noise, SEED_PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE, FIELDBUS_PERIOD_S)]
     courses = []
@@ -67,34 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
         for path in draw_all(arguments.out, courses[0], (courses[2], courses[3]), file):
             print(path)
     if arguments.json:
-        _write_json(arguments.json, _jsonable(wrong, refusal, found, cells, time.monotonic() - started_s))
+        write_json(arguments.json, _jsonable(wrong, refusal, found, cells, time.monotonic() - started_s), indent=1)
     problems = _problems(wrong, refusal, found)
     for problem in problems:
         print(f"DOES NOT HOLD: {problem}")
     print(f"{'failed' if problems else 'done'}, {time.monotonic() - started_s:.0f} s")
     return 1 if problems else 0
-
-
-def _make_folder(asked: Path | None) -> None:
-    from config.errors import InputError
-
-    if asked is None:
-        return
-    try:
-        asked.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {asked}", f"cannot be written: {error.strerror}") from None
-
-
-def _write_json(path: Path, values: dict[str, object]) -> None:
-    import json
-
-    from config.errors import InputError
-
-    try:
-        path.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
-    except OSError as error:
-        raise InputError(f"--json {path}", f"cannot be written: {error.strerror}") from None
 
 
 def _problems(wrong: list["Erratum"], refusal: str, found: list["SeedFindings"]) -> list[str]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.output_files import write_json
 
 if TYPE_CHECKING:
     from config.recording import Recording
@@ -24,13 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the figures; 0 if there is a step, else 1."""
-    import json
 
     from positioner.response import as_json, respond
 
     response = respond(_recording(arguments))
     if arguments.json is not None:
-        arguments.json.write_text(json.dumps(as_json(response), allow_nan=False) + "\n", encoding="utf-8")
+        write_json(arguments.json, as_json(response))
     print(f"{arguments.recording}: {response.summary()}")
     return 0 if response.steps else 1
 

@@ -7,24 +7,18 @@ the running integrals of the identification. It reads no clock.
 from dataclasses import dataclass, replace
 
 from config.codes import Fault, InhibitReason, Mode, State
-from positioner.control import breakaway_law as breakaway
-from positioner.control import conventional_law as conventional
-from positioner.control import slide_law as slides
-from positioner.control.balance_law import balance_pa
-from positioner.control.breakaway_memory import BreakawayMemory, Observation, initial_memory
-from positioner.control.conventional_law import ConventionalMemory
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
+from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
+from positioner.control.law_memory import held_pa as held_by_law_pa
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
-from positioner.control.slide_memory import SlideMemory, StemObservation
 from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import SupervisionMemory, supervise, usable
 from positioner.estimation.acceptance import Applied, accept
 from positioner.estimation.estimates import Estimates
-from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.static_law import StaticLaw
 from positioner.estimation.online import Identification
@@ -54,12 +48,8 @@ class ControllerMemory:
     state: State
     excitation: ActiveExcitation | None
     identifying: bool
-    breakaway: BreakawayMemory | None
-    """Of the law for small moves by pulses; None: another law."""
-    slides: SlideMemory | None
-    """Of the law of slides; None: another law."""
-    conventional: ConventionalMemory | None
-    """Of the conventional law; None: another law."""
+    law: LawMemory | None
+    """None: a law without a memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +86,7 @@ class Controller:
             state=State.S0_START,
             excitation=None,
             identifying=False,
-            breakaway=initial_memory(settings.breakaway) if settings.breakaway else None,
-            slides=SlideMemory(level_pa=held_pa) if settings.slides else None,
-            conventional=ConventionalMemory(level_pa=held_pa) if settings.conventional else None,
+            law=first_memory(settings.law_with_memory, held_pa),
         )
 
     @property
@@ -123,9 +111,10 @@ def step(
     statics: StaticIdentification,
 ) -> tuple[ControllerMemory, Decision]:
     """Return what is remembered and what is decided after one sample."""
+    fresh = usable(sample, settings.limits)
     supervision = supervise(memory.supervision, sample, memory.command_pa, requests, settings.limits)
     consumed = _consumed(memory, supervision.mode, requests)
-    reference = _reference(memory, supervision.mode, consumed, sample, requests, settings)
+    reference = _reference(memory, supervision.mode, consumed, requests, sample.position_m if fresh else None)
     excitation, excitation_inhibit = excitation_after(
         memory.excitation,
         supervision.mode,
@@ -133,15 +122,18 @@ def step(
         requests,
         settings,
         held_pa=memory.command_pa,
-        balanced_pa=_balanced_pa(memory, reference),
+        reference=reference,
+        ratios=memory.applied.ratios,
     )
     if excitation is not None and memory.excitation is None:
         statics.restart()
-    outcome = _slide_outcome(memory, sample, settings, statics)
-    if excitation is not None and usable(sample, settings.limits):
+    outcome = None
+    if fresh:
+        outcome = statics.update(sample.now_s, sample.position_m, memory.command_pa, sample.pressure_pa)
+    if excitation is not None and fresh:
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
-    identifying, applied = _identify(memory, excitation, sample, requests, settings, identification, statics)
+    identifying, applied = _identify(memory, excitation, sample, fresh, requests, identification, statics)
     if outcome is not None and outcome.landing:
         applied = statics.corrected(applied)
     situation = Situation(
@@ -152,10 +144,21 @@ def step(
     )
     state = state_in(situation)
     held_pa = _held_pa(memory, state, supervision, sample)
-    breakaway_memory = _breakaway_memory(memory, state, reference, sample, settings, applied, identification.estimates)
-    slide_memory = _slide_memory(memory, state, reference, sample, settings, applied, outcome, statics)
-    conventional_memory = _conventional_memory(memory, state, reference, sample, settings, applied)
-    law_memory = breakaway_memory or slide_memory or conventional_memory
+    law_memory = after_step(
+        memory.law,
+        settings.law_with_memory,
+        LawInput(
+            sample=sample,
+            usable=fresh,
+            command_pa=memory.command_pa,
+            reference_m=reference.value_m,
+            ratios=applied.ratios if state in (State.S1_UP, State.S2_DOWN) else None,
+            estimates=identification.estimates,
+            outcome=outcome,
+            statics=statics,
+            stroke_m=settings.limits.stroke_m,
+        ),
+    )
 
     if supervision.fault is not Fault.NONE:
         wanted_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
@@ -196,9 +199,7 @@ def step(
         state,
         excitation,
         identifying,
-        breakaway_memory,
-        slide_memory,
-        conventional_memory,
+        law_memory,
     ), decision
 
 
@@ -217,36 +218,24 @@ def _reference(
     memory: ControllerMemory,
     mode: Mode,
     consumed: ConsumedRequests,
-    sample: Sample,
     requests: Requests,
-    settings: Settings,
+    stem_m: float | None,
 ) -> Reference:
     """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
+    at_stem = Reference(memory.reference.value_m if stem_m is None else stem_m)
     if mode is Mode.AUTOMATIC:
         written = requests.reference_writes != consumed.reference_writes
-        start = memory.reference if memory.supervision.mode is mode else _reference_at_stem(memory, sample, settings)
+        start = memory.reference if memory.supervision.mode is mode else at_stem
         return start.follow(requests.reference_m) if written else start
-    return _reference_at_stem(memory, sample, settings)
-
-
-def _reference_at_stem(memory: ControllerMemory, sample: Sample, settings: Settings) -> Reference:
-    return Reference(sample.position_m if usable(sample, settings.limits) else memory.reference.value_m)
-
-
-def _balanced_pa(memory: ControllerMemory, reference: Reference) -> float:
-    """Return the constant pressure that keeps the stem near its reference (seed, 4.1)."""
-    ratios = memory.applied.ratios
-    if ratios is None:
-        return memory.command_pa
-    return balance_pa(reference.value_m, -1 if reference.delta_m < 0 else 1, ratios)
+    return at_stem
 
 
 def _identify(
     memory: ControllerMemory,
     excitation: ActiveExcitation | None,
     sample: Sample,
+    fresh: bool,
     requests: Requests,
-    settings: Settings,
     identification: Identification,
     statics: StaticIdentification,
 ) -> tuple[bool, Applied]:
@@ -262,7 +251,7 @@ def _identify(
     if not memory.identifying or (excitation is not None and memory.excitation is None):
         identification.restart()
     moves_before = identification.moves
-    if usable(sample, settings.limits):
+    if fresh:
         identification.update(
             sample.time_s,
             sample.position_m,
@@ -274,15 +263,6 @@ def _identify(
     # No excitation ends, so the estimates of ordinary moves are applied move by move.
     move_identified = identification.moves != moves_before
     return True, accept(memory.applied, statics.tested(identification.estimates)) if move_identified else memory.applied
-
-
-def _slide_outcome(
-    memory: ControllerMemory, sample: Sample, settings: Settings, statics: StaticIdentification
-) -> SlideOutcome | None:
-    """Return what the last change of the command did to the stem, in the step in which that is known."""
-    if not usable(sample, settings.limits):
-        return None
-    return statics.update(sample.now_s, sample.position_m, memory.command_pa, sample.pressure_pa)
 
 
 def _estimates(
@@ -304,73 +284,7 @@ def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMem
         return sample.held_pa
     if State.S3_IDENTIFY in (memory.state, state):
         return memory.held_pa
-    return memory.command_pa if memory.breakaway is None else memory.breakaway.held_pa(memory.command_pa)
-
-
-def _breakaway_memory(
-    memory: ControllerMemory,
-    state: State,
-    reference: Reference,
-    sample: Sample,
-    settings: Settings,
-    applied: Applied,
-    estimates: Estimates,
-) -> BreakawayMemory | None:
-    """Return what the law for small moves remembers after this step, if it is the law."""
-    if memory.breakaway is None or settings.breakaway is None:
-        return None
-    observation = Observation(sample.now_s, sample.position_m, sample.pressure_pa, usable(sample, settings.limits))
-    if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
-        return breakaway.step(
-            memory.breakaway, observation, reference.value_m, applied.ratios, estimates, settings.breakaway
-        )
-    return breakaway.while_not_commanding(memory.breakaway, observation, memory.command_pa)
-
-
-def _slide_memory(
-    memory: ControllerMemory,
-    state: State,
-    reference: Reference,
-    sample: Sample,
-    settings: Settings,
-    applied: Applied,
-    outcome: SlideOutcome | None,
-    statics: StaticIdentification,
-) -> SlideMemory | None:
-    """Return what the law of slides remembers after this step, if it is the law."""
-    if memory.slides is None or settings.slides is None:
-        return None
-    if state not in (State.S1_UP, State.S2_DOWN) or applied.ratios is None:
-        return slides.while_not_commanding(memory.slides, memory.command_pa)
-    observation = StemObservation(
-        now_s=sample.now_s,
-        position_m=sample.position_m,
-        usable=usable(sample, settings.limits),
-        rest=statics.detector.rest,
-        quantum_m=statics.detector.quantum_m,
-        outcome=outcome,
-    )
-    balance = slides.Balance(applied.ratios, statics.landings, statics.held, settings.limits.stroke_m)
-    return slides.step(memory.slides, observation, reference.value_m, balance, settings.slides)
-
-
-def _conventional_memory(
-    memory: ControllerMemory,
-    state: State,
-    reference: Reference,
-    sample: Sample,
-    settings: Settings,
-    applied: Applied,
-) -> ConventionalMemory | None:
-    """Return what the conventional law remembers after this step, if it is the law."""
-    if memory.conventional is None or settings.conventional is None:
-        return None
-    if state not in (State.S1_UP, State.S2_DOWN) or applied.ratios is None:
-        return conventional.while_not_commanding(memory.command_pa)
-    if not usable(sample, settings.limits):
-        return memory.conventional
-    error_m = reference.value_m - sample.position_m
-    return conventional.step(memory.conventional, sample.now_s, error_m, applied.ratios, settings.conventional)
+    return held_by_law_pa(memory.law, memory.command_pa)
 
 
 def _pressure_pa(
@@ -381,7 +295,7 @@ def _pressure_pa(
     reference: Reference,
     applied: Applied,
     settings: Settings,
-    law_memory: BreakawayMemory | SlideMemory | ConventionalMemory | None,
+    law_memory: LawMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
     if state is State.S3_IDENTIFY and excitation is not None:

@@ -7,11 +7,14 @@ ended: S3 is left, and only eta_1 = 1 makes room for another.
 from dataclasses import dataclass, replace
 
 from config.codes import InhibitReason, Mode
+from positioner.control.balance_law import balance_pa
+from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.sine_excitation import SineExcitation
 from positioner.control.staircase_excitation import Staircase
+from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 
@@ -48,7 +51,8 @@ def excitation_after(
     requests: Requests,
     settings: Settings,
     held_pa: float,
-    balanced_pa: float,
+    reference: Reference,
+    ratios: Ratios | None,
 ) -> tuple[ActiveExcitation | None, InhibitReason]:
     """Return the excitation under way, and what inhibits one that was asked for.
 
@@ -59,7 +63,8 @@ def excitation_after(
         requests: of the DCS.
         settings: limits, and which excitation.
         held_pa: the last command, from which a staircase begins.
-        balanced_pa: about which a sine swings where nobody says alpha.
+        reference: about whose balance a sine swings where nobody says alpha (seed, 4.1) ...
+        ratios: ... by these; about what is held where there are none.
     """
     if mode is not Mode.AUTOMATIC or requests.eta[0] != 0:
         return None, InhibitReason.NOTHING
@@ -69,7 +74,10 @@ def excitation_after(
         return excitation, excitation.inhibit_reason
     if settings.staircase is not None:
         return ActiveExcitation(Staircase(held_pa), sample.now_s), InhibitReason.NOTHING
-    alpha_pa = requests.alpha_pa if requests.alpha_pa > 0 else balanced_pa
+    alpha_pa = requests.alpha_pa
+    if alpha_pa <= 0:
+        direction = -1 if reference.delta_m < 0 else 1
+        alpha_pa = held_pa if ratios is None else balance_pa(reference.value_m, direction, ratios)
     sine = SineExcitation(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
     inhibit_reason = sine.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
     if inhibit_reason is not InhibitReason.NOTHING:

@@ -16,7 +16,7 @@ from positioner.estimation.online import IdentificationSettings
 
 LAWS: dict[str, Callable[[float, int, Ratios], float]] = {"seed": balance_pa}
 """The laws without a memory, by name: reference, m, direction, +1 up or -1 down, and ratios in; pressure, Pa, out.
-The law for small moves has a memory and is not among them."""
+Laws with a memory are in `WITH_MEMORY`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +32,8 @@ class Settings:
     applied: Applied
     """What the law may use before anything was identified."""
     law: Callable[[float, int, Ratios], float]
-    """Without a memory, see `LAWS`; what commands unless `breakaway` does."""
-    breakaway: BreakawaySettings | None
-    """Of the law for small moves by pulses; None: another commands."""
-    slides: SlideSettings | None
-    """Of the law of slides; None: another commands."""
-    conventional: ConventionalSettings | None
-    """Of the conventional law; None: another commands."""
+    """Without a memory, see `LAWS`; what commands unless `law_with_memory` does."""
+    law_with_memory: BreakawaySettings | SlideSettings | ConventionalSettings | None
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
     delivered_pa: Callable[[float], float]
@@ -62,7 +57,7 @@ class Settings:
             minimum_pa=file.pressure.minimum_pa,
             maximum_pa=file.pressure.maximum_pa,
             breakaway_pa=file.valve.breakaway_pa,
-            excitation_limit_s=file.excitation.staircase_limit_s if _by_slides(file) else file.excitation.limit_s,
+            excitation_limit_s=file.excitation.staircase_limit_s if file.by_slides else file.excitation.limit_s,
             identification=IdentificationSettings(
                 stroke_m=file.valve.stroke_m,
                 pressure_pa=file.pressure.maximum_pa - file.pressure.minimum_pa,
@@ -75,10 +70,8 @@ class Settings:
             ),
             applied=Applied(_ratios(file.law) if file.law else None),
             law=LAWS.get(file.control.law, balance_pa),
-            breakaway=_breakaway(file) if file.control.law == "breakaway" else None,
-            slides=_slides(file) if file.control.law == "slides" else None,
-            conventional=_conventional(file) if file.control.law == "conventional" else None,
-            staircase=_staircase(file) if _by_slides(file) else None,
+            law_with_memory=WITH_MEMORY[file.control.law](file) if file.control.law in WITH_MEMORY else None,
+            staircase=_staircase(file) if file.by_slides else None,
             delivered_pa=file.device.delivered_pa,
         )
 
@@ -96,10 +89,6 @@ def _breakaway(file: DaemonFile) -> BreakawaySettings:
         breakaway_pa=file.valve.breakaway_pa,
         push_limit_pa=file.control.push_limit_pa,
     )
-
-
-def _by_slides(file: DaemonFile) -> bool:
-    return (file.excitation.kind or ("staircase" if file.control.law == "slides" else "sine")) == "staircase"
 
 
 def _slides(file: DaemonFile) -> SlideSettings:
@@ -121,6 +110,14 @@ def _conventional(file: DaemonFile) -> ConventionalSettings:
         minimum_pa=file.pressure.minimum_pa,
         maximum_pa=file.pressure.maximum_pa,
     )
+
+
+WITH_MEMORY: dict[str, Callable[[DaemonFile], BreakawaySettings | SlideSettings | ConventionalSettings]] = {
+    "breakaway": _breakaway,
+    "slides": _slides,
+    "conventional": _conventional,
+}
+"""The laws with a memory, by name, and their settings of a file; `law_memory.py` runs them."""
 
 
 def _staircase(file: DaemonFile) -> StaircaseLimits:

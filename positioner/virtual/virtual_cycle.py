@@ -47,7 +47,7 @@ def lockstep_cycle(daemon: DaemonFile, driver: Driver, requests: Requests, setti
 
 
 def identified(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapshot]:
-    """Yield the snapshots of an identification: eta switches it on until it is complete.
+    """Yield the snapshots of an identification: eta switches it on until it is complete, or has come to nothing.
 
     Args:
         cycle: of a valve in automatic.
@@ -58,9 +58,11 @@ def identified(cycle: Cycle, within_s: float, *, wait: bool) -> Iterator[Snapsho
     def ask(snapshot: Snapshot, requests: Requests) -> Requests:
         return replace(requests, eta=QUIET if snapshot.decision.estimates.progress >= 1 else (0, 0, 0))
 
+    before = cycle.snapshot.decision.applied
     for snapshot in played(cycle, ask, cycle.snapshot.sample.time_s + within_s):
         yield snapshot
-        if snapshot.decision.applied.count and not wait:
+        applied = snapshot.decision.applied
+        if (applied.count, applied.refusals) != (before.count, before.refusals) and not wait:
             return
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,32 +48,14 @@ class WholeMillibars:
     """A device whose registers hold whole mbar: what is commanded and what is measured."""
 
     def __init__(self, device: Device) -> None:
-        self._device = device
-        self._note()
+        self.device = device
 
-    def _note(self) -> None:
-        device = self._device
-        self.position_m, self.pressure_pa, self.command_pa = (
-            device.position_m,
-            mbar(device.pressure_pa),
-            device.command_pa,
-        )
-
-    @property
-    def sample_counter(self) -> int:
-        return self._device.sample_counter
-
-    @property
-    def device_time_us(self) -> int:
-        return self._device.device_time_us
-
-    @property
-    def status(self) -> int:
-        return int(self._device.status)
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self.device, name)
+        return mbar(value) if name == "pressure_pa" else value
 
     def tick(self, command_pa: float) -> None:
-        self._device.tick(mbar(command_pa))
-        self._note()
+        self.device.tick(mbar(command_pa))
 
 
 def mbar(pressure_pa: float) -> float:

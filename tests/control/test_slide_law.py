@@ -11,14 +11,14 @@ from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller import Decision
-from positioner.control.requests import QUIET, Requests
+from positioner.control.requests import Requests
 from positioner.control.slide_law import Balance, step
 from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
-from positioner.virtual.virtual_cycle import virtual_cycle
+from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -62,15 +62,9 @@ class Loop:
     def ask(self, **values: Any) -> None:
         self.cycle.requests = replace(self.cycle.requests, **values)
 
-    def identify(self, cycles: int = 12_000) -> None:
-        self.ask(eta=(0, 0, 0))
-        for _ in range(cycles):
-            self.cycle.once()
-            if self.decision.estimates.progress >= 1 or self.decision.inhibit_reason is not InhibitReason.NOTHING:
-                break
-        self.ask(eta=QUIET)
-        self.cycle.once()
-        self.cycle.once()
+    def identify(self, within_s: float = 600.0) -> None:
+        for _ in identified(self.cycle, within_s, wait=False):
+            pass
 
     def step_to(self, reference_pu: float, cycles: int = 150) -> np.ndarray:
         """Return the true stem, p.u., at every cycle."""
@@ -176,7 +170,7 @@ def test_the_staircase_stays_in_its_window_and_leaves_what_it_found_when_it_fail
     """A stem that never moves: the pressure goes to its limits and back, and nothing is applied."""
     loop = Loop(0.05, identify=False)
     loop.valve.change(static_n=1e6, coulomb_n=1e6)
-    loop.identify(cycles=60_000)
+    loop.identify(within_s=3000.0)
     assert loop.decision.applied.ratios is None
     assert loop.decision.state is not State.S3_IDENTIFY
     assert loop.decision.fault is Fault.NONE
@@ -186,7 +180,7 @@ LIMITS = StaircaseLimits(low_m=0.1 * STROKE_M, high_m=0.9 * STROKE_M, minimum_pa
 
 
 def outcome(direction: int, from_m: float, to_m: float) -> SlideOutcome:
-    return SlideOutcome(0.0, direction, from_m, 0.0, 1.0, to_m, 1e-6, from_m != to_m, from_m != to_m)
+    return SlideOutcome(0.0, direction, from_m, 1.0, to_m, 1e-6, from_m != to_m, from_m != to_m)
 
 
 def test_steps_grow_until_the_stem_breaks_loose() -> None:
@@ -211,7 +205,7 @@ def test_a_short_slide_that_misses_its_aim_makes_the_margin_longer(landed_m: flo
     margin = Margin(0.005, broke=True, held=True)
     memory = SlideMemory(target_m=0.06, direction=-1, up=margin, down=margin)
     rest = Rest(landed_m, 1e-6, 1e-6, 100, 0.1)
-    came = SlideOutcome(1.0, -1, 0.0655, 80e3, 27e3, landed_m, 1e-6, True, True)
+    came = SlideOutcome(1.0, -1, 0.0655, 27e3, landed_m, 1e-6, True, True)
     observation = StemObservation(1.0, landed_m, True, rest, 0.0, came)
     balance = Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M)
     settings = SlideSettings(STROKE_M, 5e-5, 0.0, 420e3, None, 0.5 * STROKE_M, 0.0)

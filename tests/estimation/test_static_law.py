@@ -17,7 +17,7 @@ PLACES = (0.35, 0.45, 0.55, 0.65, 0.75)
 
 
 def landing(position_m: float, direction: int, command_pa: float, std_m: float = 1e-6) -> SlideOutcome:
-    return SlideOutcome(0.0, direction, position_m - direction * 0.01, 0.0, command_pa, position_m, std_m, True, True)
+    return SlideOutcome(0.0, direction, position_m - direction * 0.01, command_pa, position_m, std_m, True, True)
 
 
 def landings(
@@ -70,7 +70,7 @@ def test_one_slide_that_went_wrong_does_not_bend_the_law() -> None:
 def test_a_packing_that_gave_way_is_no_slide() -> None:
     """Stuck inside its band the stem moves a little with the pressure: far less than a slide would go."""
     gave_way = [
-        SlideOutcome(0.0, -1, 0.07, 0.0, SLOPE * 0.0694 + each, 0.0694, 1e-6, True, True) for each in (20e3, 10e3, 0.0)
+        SlideOutcome(0.0, -1, 0.07, SLOPE * 0.0694 + each, 0.0694, 1e-6, True, True) for each in (20e3, 10e3, 0.0)
     ]
     law = static_law([*landings(), *gave_way], STROKE_M)
     assert law.landings == len(landings())

@@ -7,5 +7,6 @@ A command imports from here what it needs when it runs.
     daemon_address                              where a daemon is
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
     diagnose_forces                             `diagnose` on a bench's recording
+    output_files                                what `--out` and `--json` ask for
     authority, progress                         a test certificate authority; progress on a terminal
 """

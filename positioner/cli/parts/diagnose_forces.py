@@ -5,12 +5,12 @@ import argparse
 
 def run_forces(arguments: argparse.Namespace) -> int:
     """Diagnose the balance of forces and print; 0 if nothing is missing, else 1."""
-    import json
     import time
 
     from config.errors import InputError
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.output_files import write_json
     from workbench.data.imposed_motion import read_imposed
     from workbench.forces.force_diagnosis import diagnose_forces
     from workbench.forces.force_diagnosis_json import as_json
@@ -30,7 +30,7 @@ def run_forces(arguments: argparse.Namespace) -> int:
     print(diagnosis.summary())
     if arguments.json is not None:
         whole = as_json(diagnosis) | {"seconds": time.monotonic() - began_s}
-        arguments.json.write_text(json.dumps(whole, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(arguments.json, whole)
     if arguments.report is not None:
         files = tuple(str(path) for path in (*arguments.recordings, arguments.test) if path)
         report_forces(diagnosis, arguments.report, Subject(valve, files, recordings[0].metadata))

@@ -3,7 +3,6 @@
 Three positioners at two periods of the cycle in virtual time; with `--bus modbus` ours alone, for a minute, on wires.
 """
 
-import json
 import time
 from argparse import Namespace
 from collections.abc import Iterable, Iterator
@@ -12,6 +11,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from positioner.cli.parts.flow_cases import CLOSED_S, DEAD_BAND, POSITIONERS, FlowCase, FlowOutcome, virtual_outcome
+from positioner.cli.parts.output_files import make_folder, write_json
 from positioner.virtual.flow_course import FlowFigures
 from positioner.virtual.flow_loop import FlowController, FlowProcess
 
@@ -28,7 +28,7 @@ def run_flow(arguments: Namespace) -> int:
         raise InputError(f"--bus {arguments.bus}", "with --loop flow allowed is modbus; without --bus, virtual time")
     folder: Path | None = arguments.out
     if folder:
-        _make(folder)
+        make_folder(folder)
     started_s = time.monotonic()
     _print_lines(_head(arguments.bus))
     outcomes = list(_printed(_outcomes(arguments.bus)))
@@ -37,7 +37,7 @@ def run_flow(arguments: Namespace) -> int:
         print(f"picture {_picture(folder, outcomes)}")
     problems = problems_of({each.case: each.figures for each in outcomes})
     if arguments.json:
-        _write_json(arguments.json, outcomes, problems, time.monotonic() - started_s)
+        write_json(arguments.json, _jsonable(outcomes, problems, time.monotonic() - started_s), indent=1)
     _print_lines(f"DOES NOT HOLD: {problem}" for problem in problems)
     print(f"{'failed' if problems else 'all holds'}, {time.monotonic() - started_s:.0f} s")
     return 1 if problems else 0
@@ -117,19 +117,9 @@ def _picture(folder: Path, outcomes: list[FlowOutcome]) -> Path:
     return path
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {folder}", f"cannot be written: {error.strerror}") from None
-
-
-def _write_json(path: Path, outcomes: list[FlowOutcome], problems: list[str], seconds: float) -> None:
+def _jsonable(outcomes: list[FlowOutcome], problems: list[str], seconds: float) -> dict[str, object]:
     cases = [{**asdict(each.case), **asdict(each.figures)} for each in outcomes]
-    try:
-        path.write_text(json.dumps({"cases": cases, "problems": problems, "seconds": seconds}, indent=1) + "\n")
-    except OSError as error:
-        raise InputError(f"--json {path}", f"cannot be written: {error.strerror}") from None
+    return {"cases": cases, "problems": problems, "seconds": seconds}
 
 
 def _print_lines(lines: Iterable[str]) -> None:

@@ -51,10 +51,8 @@ class SlideOutcome(NamedTuple):
     direction: int
     """Of the change: +1 up, -1 down."""
     from_m: float
-    held_pa: float
-    """Command under which it rested before ..."""
     command_pa: float
-    """... and under which it rests now."""
+    """Under which it rests now."""
     position_m: float
     std_m: float
     moved: bool
@@ -79,7 +77,7 @@ class LandingDetector:
         low_m, high_m = stops_m if stops_m is not None else (0.0, stroke_m)
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
-        self._level_pa = self._held_pa = nan
+        self._level_pa = nan
         self._sense = 0
         self._running_on = False
         """Whether the command changed while the stem moved: the slide starts from where it turns round."""
@@ -127,6 +125,8 @@ class LandingDetector:
         return outcome
 
     def _learn_quantum(self, position_m: float) -> None:
+        if self.quantum_m == FINEST_QUANTUM * self._stroke_m:  # it cannot become finer
+            return
         step_m = abs(position_m - self._position_m)
         if step_m > SAME * self._stroke_m:
             divisor_m = _common_divisor(step_m, self.quantum_m, FINEST_QUANTUM * self._stroke_m)
@@ -139,7 +139,7 @@ class LandingDetector:
         self._running_on = self.rest is None
         self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m
         self._sense = 1 if command_pa > self._level_pa else -1
-        self._held_pa, self._level_pa, self._level_s = self._level_pa, command_pa, time_s
+        self._level_pa, self._level_s = command_pa, time_s
         self.rest, self._known = None, isnan(self._from_m)
         self._window.restart(time_s)
 
@@ -173,7 +173,6 @@ class LandingDetector:
             time_s=time_s,
             direction=self._sense,
             from_m=self._from_m,
-            held_pa=self._held_pa,
             command_pa=self._level_pa,
             position_m=rest.position_m,
             std_m=sqrt(rest.std_m**2 + self.quantum_m**2 / 12 + (CREEP * self._stroke_m * creep_s) ** 2),

@@ -12,7 +12,7 @@ from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
 from positioner.estimation.landings.local_balance import ahead_m
-from positioner.estimation.landings.static_law import StaticLaw, no_static_law, slides_among, static_law
+from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
 
 LONGEST_WAY, OFF = 0.03, 3e-3
 """Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should."""
@@ -76,7 +76,7 @@ class StaticIdentification:
         both = (*self._in_direction[1], *self._in_direction[-1])
         landings = tuple(sorted(both, key=lambda each: -each.time_s))
         self.law = static_law(landings, self._stroke_m)
-        self.landings = slides_among(landings, self._stroke_m) if self.law.valid else landings
+        self.landings = self.law.slides if self.law.valid else landings
 
     def _gave_way(self, outcome: SlideOutcome) -> bool:
         """Whether the packing that holds the stem gave way, for a slide by the law would have gone elsewhere.

@@ -18,6 +18,7 @@ The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what tha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from math import inf, isfinite, nan, sqrt
 
 import numpy as np
@@ -54,7 +55,7 @@ class StaticLaw:
         slope: κ = k_s/A, Pa/m.
         up: φ_up, Pa.
         down: φ_down, Pa.
-        landings: that it was taken from.
+        slides: the landings that it was taken from.
         residual_m: standard deviation of where a slide lands about the law, m.
         covariance: of (κ, φ_up, φ_down); (3, 3).
     """
@@ -62,9 +63,14 @@ class StaticLaw:
     slope: Estimate
     up: Estimate
     down: Estimate
-    landings: int
+    slides: tuple[SlideOutcome, ...]
     residual_m: float
     covariance: Array
+
+    @property
+    def landings(self) -> int:
+        """Number of landings that it was taken from."""
+        return len(self.slides)
 
     @property
     def valid(self) -> bool:
@@ -106,23 +112,17 @@ class StaticLaw:
         return False
 
 
-def no_static_law(reason: Refusal, landings: int = 0) -> StaticLaw:
+def no_static_law(reason: Refusal, slides: tuple[SlideOutcome, ...] = ()) -> StaticLaw:
     """Return a law without values, for a reason."""
     nothing = no_estimate(reason)
-    return StaticLaw(nothing, nothing, nothing, landings, nan, np.full((3, 3), inf))
+    return StaticLaw(nothing, nothing, nothing, slides, nan, np.full((3, 3), inf))
 
 
-def columns(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[Array, Array]:
+def _columns(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[Array, Array]:
     """Return X, (n, 3), with positions in strokes so that its columns are of one size, and p, (n,), Pa."""
     x = np.array([each.position_m for each in landings])
     up = np.array([float(each.direction > 0) for each in landings])
     return np.column_stack((x / stroke_m, up, up - 1.0)), np.array([each.command_pa for each in landings])
-
-
-def slides_among(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[SlideOutcome, ...]:
-    """Return the landings that end a slide; see `_slides`."""
-    slides = _slides(landings, *columns(landings, stroke_m), stroke_m)
-    return tuple(each for each, slid in zip(landings, slides.tolist(), strict=True) if slid)
 
 
 def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
@@ -134,17 +134,16 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     """
     ups = sum(each.direction > 0 for each in landings)
     if len(landings) < FEWEST or min(ups, len(landings) - ups) < FEWEST_EACH:
-        return no_static_law(Refusal.LANDINGS_TOO_FEW, len(landings))
-    X, p = columns(landings, stroke_m)
-    up = X[:, 1]
-    slides = _slides(landings, X, p, stroke_m)
-    ups = int(np.count_nonzero(up[slides]))
-    kept = int(np.count_nonzero(slides))
+        return no_static_law(Refusal.LANDINGS_TOO_FEW, tuple(landings))
+    X, p = _columns(landings, stroke_m)
+    slid = _slides(landings, X, p, stroke_m)
+    slides = tuple(compress(landings, slid.tolist()))
+    ups, kept = sum(each.direction > 0 for each in slides), len(slides)
     if kept < FEWEST or min(ups, kept - ups) < FEWEST_EACH:
-        return no_static_law(Refusal.LANDINGS_TOO_FEW, kept)
-    X, p = X[slides], p[slides]
+        return no_static_law(Refusal.LANDINGS_TOO_FEW, slides)
+    X, p = X[slid], p[slid]
     if np.linalg.matrix_rank(X, tol=1e-3) < 3:
-        return no_static_law(Refusal.ILL_CONDITIONED, kept)
+        return no_static_law(Refusal.ILL_CONDITIONED, slides)
     theta, weights = _huber(X, p)
     residual_pa = p - X @ theta
     free = kept - 3
@@ -159,7 +158,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
         slope=Estimate(slope, float(std[0]), reason),
         up=Estimate(up_pa, float(std[1]), reason),
         down=Estimate(down_pa, float(std[2]), reason),
-        landings=kept,
+        slides=slides,
         residual_m=s / abs(slope) if slope else inf,
         covariance=covariance,
     )

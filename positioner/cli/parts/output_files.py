@@ -1,0 +1,39 @@
+"""What a command writes because an option asks for it: `--out` a folder, `--json` a file.
+
+A path that cannot be written is bad input: one line that names the option.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from config.errors import InputError
+
+
+def make_folder(folder: Path, option: str = "--out") -> None:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(option, folder, error) from None
+
+
+def write_json(path: Path, values: Mapping[str, object], indent: int | None = None) -> None:
+    """Write an object without NaN, on one line unless it is indented.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    text = json.dumps(values, indent=indent, allow_nan=False) + "\n"
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise _unwritable("--json", path, error) from None
+
+
+def _unwritable(option: str, path: Path, error: OSError) -> InputError:
+    return InputError(f"{option} {path}", f"cannot be written: {error.strerror}")

@@ -1,0 +1,106 @@
+"""The law with a memory that is in force, whichever it is: its settings, its memory, one step of it.
+
+A law without a memory is a function (`settings.LAWS`); these remember a move, and what moves have taught.
+"""
+
+from dataclasses import dataclass
+
+from positioner.control import breakaway_law as breakaway
+from positioner.control import conventional_law as conventional
+from positioner.control import slide_law as slides
+from positioner.control.breakaway_memory import BreakawayMemory, BreakawaySettings, Observation, initial_memory
+from positioner.control.conventional_law import ConventionalMemory, ConventionalSettings
+from positioner.control.sample import Sample
+from positioner.control.slide_memory import SlideMemory, SlideSettings, StemObservation
+from positioner.estimation.acceptance import Ratios
+from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_identification import StaticIdentification
+
+LawSettings = BreakawaySettings | SlideSettings | ConventionalSettings
+LawMemory = BreakawayMemory | SlideMemory | ConventionalMemory
+
+
+@dataclass(frozen=True, slots=True)
+class LawInput:
+    """What a law may use in one step, SI units."""
+
+    sample: Sample
+    usable: bool
+    """Whether the sample is new and could be true."""
+    command_pa: float
+    """The last command given."""
+    reference_m: float
+    ratios: Ratios | None
+    """None: another state commands, the law only watches."""
+    estimates: Estimates
+    outcome: SlideOutcome | None
+    """Of the last change of the command, in the step in which it is known."""
+    statics: StaticIdentification
+    stroke_m: float
+
+
+def first_memory(settings: LawSettings | None, held_pa: float) -> LawMemory | None:
+    """Return the memory of the law before its first step; None for a law without one."""
+    match settings:
+        case BreakawaySettings():
+            return initial_memory(settings)
+        case SlideSettings():
+            return SlideMemory(level_pa=held_pa)
+        case ConventionalSettings():
+            return ConventionalMemory(level_pa=held_pa)
+        case None:
+            return None
+
+
+def after_step(memory: LawMemory | None, settings: LawSettings | None, seen: LawInput) -> LawMemory | None:
+    """Return what the law remembers after one step; its `level_pa` is the pressure it asks for."""
+    match memory, settings:
+        case BreakawayMemory(), BreakawaySettings():
+            return _after_pulses(memory, settings, seen)
+        case SlideMemory(), SlideSettings():
+            return _after_slides(memory, settings, seen)
+        case ConventionalMemory(), ConventionalSettings():
+            return _after_conventional(memory, settings, seen)
+        case _:
+            return None
+
+
+def held_pa(memory: LawMemory | None, command_pa: float) -> float:
+    """Return what to hold when something interrupts the law after a command, Pa: for a push what follows it."""
+    return memory.held_pa(command_pa) if isinstance(memory, BreakawayMemory) else command_pa
+
+
+def _after_pulses(memory: BreakawayMemory, settings: BreakawaySettings, seen: LawInput) -> BreakawayMemory:
+    sample = seen.sample
+    observation = Observation(sample.now_s, sample.position_m, sample.pressure_pa, seen.usable)
+    if seen.ratios is None:
+        return breakaway.while_not_commanding(memory, observation, seen.command_pa)
+    return breakaway.step(memory, observation, seen.reference_m, seen.ratios, seen.estimates, settings)
+
+
+def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) -> SlideMemory:
+    if seen.ratios is None:
+        return slides.while_not_commanding(memory, seen.command_pa)
+    statics = seen.statics
+    observation = StemObservation(
+        now_s=seen.sample.now_s,
+        position_m=seen.sample.position_m,
+        usable=seen.usable,
+        rest=statics.detector.rest,
+        quantum_m=statics.detector.quantum_m,
+        outcome=seen.outcome,
+    )
+    balance = slides.Balance(seen.ratios, statics.landings, statics.held, seen.stroke_m)
+    return slides.step(memory, observation, seen.reference_m, balance, settings)
+
+
+def _after_conventional(
+    memory: ConventionalMemory, settings: ConventionalSettings, seen: LawInput
+) -> ConventionalMemory:
+    if seen.ratios is None:
+        return conventional.while_not_commanding(seen.command_pa)
+    if not seen.usable:
+        return memory
+    error_m = seen.reference_m - seen.sample.position_m
+    return conventional.step(memory, seen.sample.now_s, error_m, seen.ratios, settings)
