@@ -81,12 +81,12 @@ class ModbusDevice(Device):
     def command_step_pa(self) -> float:
         """The scale of its register, if that holds whole numbers."""
         place = self.map.command_pa
-        return 0.0 if place.format.is_float else abs(place.scale)
+        return 0.0 if place.is_float else abs(place.scale)
 
     def delivered_pa(self, command_pa: float) -> float:
         """Return what its register can say."""
         place = self.map.command_pa
-        return place.value(place.raw(command_pa))
+        return command_pa if place.is_float else place.value(place.raw(command_pa))
 
     def read_only(self) -> Self:
         """Return the device without the places of its communication time-out, which a watcher leaves alone."""

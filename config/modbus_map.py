@@ -46,6 +46,11 @@ class Place(Schema):
         return self.address + self.format.words
 
     @property
+    def is_float(self) -> bool:
+        """Whether it holds any number, not whole ones alone."""
+        return self.type in ("float32", "float64")
+
+    @property
     def is_plain(self) -> bool:
         """Whether the raw value is the value."""
         return self.scale == 1 and self.offset == 0
@@ -63,7 +68,7 @@ class Place(Schema):
         if not math.isfinite(value):
             raise ValueError(f"{value} is not a finite number")
         raw = value if self.is_plain else (value - self.offset) / self.scale
-        return raw if self.type in ("float32", "float64") else round(raw)
+        return raw if self.is_float else round(raw)
 
 
 class ModbusMap(Schema):

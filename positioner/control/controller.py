@@ -5,6 +5,7 @@ the running integrals of the identification. It reads no clock.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
@@ -33,9 +34,8 @@ class ConsumedRequests:
     manual_writes: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class ControllerMemory:
-    """What the controller remembers from one step to the next."""
+class ControllerMemory(NamedTuple):
+    """What the controller remembers from one step to the next; a tuple, for it is made anew in each."""
 
     command_pa: float
     """The last command given."""
@@ -52,8 +52,7 @@ class ControllerMemory:
     """None: a law without a memory."""
 
 
-@dataclass(frozen=True, slots=True)
-class Decision:
+class Decision(NamedTuple):
     """What one step decided, for the wire, the registers and the recorder."""
 
     command_pa: float
@@ -144,10 +143,9 @@ def step(
     )
     state = state_in(situation)
     held_pa = _held_pa(memory, state, supervision, sample)
-    law_memory = after_step(
-        memory.law,
-        settings.law_with_memory,
-        LawInput(
+    law_memory = None
+    if memory.law is not None:
+        seen = LawInput(
             sample=sample,
             usable=fresh,
             command_pa=memory.command_pa,
@@ -157,8 +155,8 @@ def step(
             outcome=outcome,
             statics=statics,
             stroke_m=settings.limits.stroke_m,
-        ),
-    )
+        )
+        law_memory = after_step(memory.law, settings.law_with_memory, seen)
 
     if supervision.fault is not Fault.NONE:
         wanted_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
@@ -222,12 +220,11 @@ def _reference(
     stem_m: float | None,
 ) -> Reference:
     """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
-    at_stem = Reference(memory.reference.value_m if stem_m is None else stem_m)
-    if mode is Mode.AUTOMATIC:
-        written = requests.reference_writes != consumed.reference_writes
-        start = memory.reference if memory.supervision.mode is mode else at_stem
-        return start.follow(requests.reference_m) if written else start
-    return at_stem
+    written = requests.reference_writes != consumed.reference_writes
+    start = memory.reference
+    if mode is not Mode.AUTOMATIC or memory.supervision.mode is not mode:
+        start = Reference(start.value_m if stem_m is None else stem_m)
+    return start.follow(requests.reference_m) if mode is Mode.AUTOMATIC and written else start
 
 
 def _identify(

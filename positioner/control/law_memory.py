@@ -53,7 +53,7 @@ def first_memory(settings: LawSettings | None, held_pa: float) -> LawMemory | No
             return None
 
 
-def after_step(memory: LawMemory | None, settings: LawSettings | None, seen: LawInput) -> LawMemory | None:
+def after_step(memory: LawMemory, settings: LawSettings | None, seen: LawInput) -> LawMemory | None:
     """Return what the law remembers after one step; its `level_pa` is the pressure it asks for."""
     match memory, settings:
         case BreakawayMemory(), BreakawaySettings():

@@ -9,13 +9,12 @@ What must be remembered lies in delta r, so the same situation always gives the 
 the law it interrupted by itself.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from config.codes import InhibitReason, State
 
 
-@dataclass(frozen=True, slots=True)
-class Situation:
+class Situation(NamedTuple):
     """Everything the choice of state depends on."""
 
     automatic: bool

@@ -6,6 +6,7 @@ acknowledgement after its cause is gone frees the way; then a person or the DCS 
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from config.codes import Fault, Mode, Quality
 from config.quantities import ActionName, DeviceStatus
@@ -37,9 +38,8 @@ class Limits:
         return self.heartbeat_action if fault is Fault.DCS_SILENT else self.action
 
 
-@dataclass(frozen=True, slots=True)
-class SupervisionMemory:
-    """What supervision remembers from cycle to cycle."""
+class SupervisionMemory(NamedTuple):
+    """What supervision remembers from cycle to cycle; a tuple, for it is made anew in each."""
 
     mode: Mode = Mode.HOLD
     fault: Fault = Fault.NONE

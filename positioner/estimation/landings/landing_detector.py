@@ -73,7 +73,7 @@ class LandingDetector:
     """
 
     def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None) -> None:
-        self._stroke_m = stroke_m
+        self._stroke_m, self._finest_m = stroke_m, FINEST_QUANTUM * stroke_m
         low_m, high_m = stops_m if stops_m is not None else (0.0, stroke_m)
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
@@ -112,7 +112,8 @@ class LandingDetector:
         rest = self._window.rest
         if self.rest is not None:
             self._watch(time_s, position_m, self.rest)
-            self.rest = rest if self.rest is not None and rest is not None else self.rest
+            if self.rest is not None and rest is not None:
+                self.rest = rest
             return None
         if rest is None or time_s - self._level_s < self._patience_s(rest):
             return None
@@ -125,11 +126,11 @@ class LandingDetector:
         return outcome
 
     def _learn_quantum(self, position_m: float) -> None:
-        if self.quantum_m == FINEST_QUANTUM * self._stroke_m:  # it cannot become finer
+        if 0.0 < self.quantum_m < 2 * self._finest_m:  # a divisor of it would be finer than the finest
             return
         step_m = abs(position_m - self._position_m)
         if step_m > SAME * self._stroke_m:
-            divisor_m = _common_divisor(step_m, self.quantum_m, FINEST_QUANTUM * self._stroke_m)
+            divisor_m = _common_divisor(step_m, self.quantum_m, self._finest_m)
             self.quantum_m = self._window.quantum_m = divisor_m
 
     def _change_level(self, time_s: float, command_pa: float) -> None:

@@ -119,10 +119,9 @@ class RestWindow:
         return near_s * (1.0 + min(hidden, LONGEST_HIDDEN))
 
     def _rest(self) -> Rest | None:
-        rows = self._rows[: self._count]
         if self._count < 2 * FEWEST:
             return None
-        time_s, position_m, pressure_pa = rows.T
+        time_s, position_m, pressure_pa = self._rows[: self._count].T
         half = int(np.searchsorted(time_s, 0.5 * time_s[-1]))
         late_m = position_m[half:]
         if late_m.size < FEWEST:

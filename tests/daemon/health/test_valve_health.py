@@ -164,7 +164,7 @@ def with_friction(panel: Panel, ratio: float) -> Health:
     decision = panel.cycle.snapshot.decision
     for count, factor in enumerate((1.0, ratio), start=1):
         applied = Applied(Ratios(-814e3, -22e3 * factor), count)
-        panel.health.enter(panel.cycle.snapshot.sample, replace(decision, applied=applied), panel.cycle.requests)
+        panel.health.enter(panel.cycle.snapshot.sample, decision._replace(applied=applied), panel.cycle.requests)
     return panel.health
 
 
@@ -181,15 +181,15 @@ def test_friction_far_from_its_baseline_asks_for_maintenance(ratio: float, cause
     panel = Panel(LAW)
     panel.set("mode", Mode.AUTOMATIC)
     panel.run(0.01)
-    decision = replace(panel.cycle.snapshot.decision, inhibit_reason=InhibitReason.NO_MOVE_ASKED)
+    decision = panel.cycle.snapshot.decision._replace(inhibit_reason=InhibitReason.NO_MOVE_ASKED)
     assert ne107_condition(decision, with_friction(panel, ratio)).causes == causes
 
 
 def test_the_worst_class_decides_and_every_cause_is_told() -> None:
     panel = Panel(LAW)
     health = with_friction(panel, 2.0)
-    decision = replace(
-        panel.cycle.snapshot.decision, mode=Mode.HOLD, fault=Fault.NO_REPLY, inhibit_reason=InhibitReason.NOT_AUTOMATIC
+    decision = panel.cycle.snapshot.decision._replace(
+        mode=Mode.HOLD, fault=Fault.NO_REPLY, inhibit_reason=InhibitReason.NOT_AUTOMATIC
     )
     now = ne107_condition(decision, health)
     assert (now.status, now.cause) == (Ne107Status.FAILURE, Ne107Cause.FAULT)
@@ -211,7 +211,7 @@ def test_the_class_of_each_fault(
 ) -> None:
     panel = Panel(LAW)
     mode = Mode.HOLD if fault else Mode.AUTOMATIC
-    decision = replace(panel.cycle.snapshot.decision, mode=mode, fault=fault, inhibit_reason=inhibit_reason)
+    decision = panel.cycle.snapshot.decision._replace(mode=mode, fault=fault, inhibit_reason=inhibit_reason)
     now = ne107_condition(decision, Health.idle(STROKE_M))
     assert (now.status, now.cause) == (status, cause)
 
