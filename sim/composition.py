@@ -59,16 +59,7 @@ class Composition:
         Raises:
             InputError: an effect that stands twice or does not compile, a parameter unknown, missing or out of range.
         """
-        names = [each.name for each in effects]
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(source, f"effect {name} stands {names.count(name)} times; once is allowed")
-        theta = [float(getattr(file.valve, name)) for name in BASE]
-        for effect, table in zip(effects, file.effect, strict=True):
-            theta += effect.values(table.parameters, f"{source}: effect {table.name}")
-        vector = np.array(theta)
-        vector.flags.writeable = False
-        return cls(file.valve, tuple(effects), vector, kernel(effects), source)
+        return cls(file.valve, tuple(effects), parameter_vector(file, effects, source), kernel(effects), source)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,3 +87,21 @@ class Composition:
             written = {key: values[f"{effect.name}.{key}"] for key in effect.parameters}
             effect.values(written, f"{self.source}: effect {effect.name}")
         return np.array([float(values[name]) for name in self.names])
+
+
+def parameter_vector(file: ValveFile, effects: Sequence[Effect], source: str) -> Vector:
+    """Return theta of a valve file, `effects` being what its `[[effect]]` tables name, in their order.
+
+    Raises:
+        InputError: an effect that stands twice, a parameter unknown, missing or out of its range.
+    """
+    names = [each.name for each in effects]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(source, f"effect {name} stands {names.count(name)} times; once is allowed")
+    theta = [float(getattr(file.valve, name)) for name in BASE]
+    for effect, table in zip(effects, file.effect, strict=True):
+        theta += effect.values(table.parameters, f"{source}: effect {table.name}")
+    vector = np.array(theta)
+    vector.flags.writeable = False
+    return vector

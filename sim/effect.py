@@ -27,6 +27,12 @@ With a memory it also defines
     start      sets the memory for a valve long at rest, signal being what enters it (at the stem: x, and F_e, N, too)
     advance    carries the memory over a step h, s, during which the signal goes from before to after
 
+What undoes it stands beside its equation, for a daemon that is given the extended valve (`sim.static_inverse`); an
+effect without it is refused there. It is one of
+
+    INVERSE = "balance"        its functions at a long rest are all of it: the balance is solved for the pressure
+    inverse(q) -> Inverse      it acts in time, or no pressure solves for it: what must be known of it instead
+
 A function names among its arguments only what it needs of: t (s), x (m), v (m/s), p (actuator pressure, Pa), q (the
 parameters), z (the memory, an array), and what its place adds. The pressure path sees the stem of the start of the
 step, all others that of its end; t is the time of the call, and middle, in the pressure path, that of the middle of the
@@ -36,7 +42,7 @@ own file and of `sim.first_order_lag`.
 
 import inspect
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product, zip_longest
@@ -49,6 +55,7 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
+from config.extended_valve import Inverse as Inverse  # effects take it from here, beside Parameter
 from config.valve_file import ValveParameters
 
 Memory = npt.NDArray[np.float64]
@@ -72,6 +79,7 @@ AT_STEM = ("force", "friction", "motion")
 FINE_STEP_S = 2.5e-4
 """For a memory of which nothing is known."""
 SHIPPED = Path(__file__).parent / "effects"
+BALANCE = "balance"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +139,10 @@ class Effect:
     """The first indented lines of its docstring."""
     looks: str
     confounded: Mapping[str, str]
+    in_balance: bool
+    """Whether solving the balance at rest undoes it ..."""
+    inverse: Callable[[Sequence[float]], Inverse] | None
+    """... or else this does, of its parameters in their order; None: nothing is declared."""
     path: Path
     source: str
 
@@ -258,6 +270,8 @@ def _declared(path: Path, source: str) -> Effect:
         equation=_equation(said),
         looks=namespace.get("LOOKS", ""),
         confounded=namespace.get("CONFOUNDED", {}),
+        in_balance="INVERSE" in namespace,
+        inverse=_inverse(path, namespace),
         path=path,
         source=source,
     )
@@ -304,6 +318,18 @@ def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:
             raise InputError(str(path), f"Parameters.{name}: guess must be one of {allowed}, got {parameter.guess!r}")
         declared[name] = parameter
     return declared
+
+
+def _inverse(path: Path, namespace: dict[str, Any]) -> Callable[[Sequence[float]], Inverse] | None:
+    """Return what undoes an effect that the balance does not, as a function of its parameters in their order."""
+    if namespace.get("INVERSE", BALANCE) != BALANCE:
+        raise InputError(str(path), f'INVERSE: allowed is "{BALANCE}", got {namespace["INVERSE"]!r}')
+    if "inverse" not in namespace:
+        return None
+    if "INVERSE" in namespace:
+        raise InputError(str(path), f'either INVERSE = "{BALANCE}" or the function inverse undoes it, not both')
+    inverse, parameters = namespace["inverse"], namespace["Parameters"]
+    return lambda values: inverse(parameters(*values))
 
 
 def _check_places(effect: Effect) -> None:

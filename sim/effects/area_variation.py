@@ -15,6 +15,7 @@ CONFOUNDED = {
     "spring_hardening": "fast moves, in which the pressure parts from the static curve",
     "sensor_nonlinearity": "fast moves, in which the pressure parts from the static curve",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -19,6 +19,7 @@ CONFOUNDED = {
     "sensor_offset": "break-away and sliding levels in both directions: an offset shifts both by the same force, an "
     "asymmetry in proportion to each",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -8,7 +8,7 @@ w width of the play, m; x position that enters, y position that leaves.
 from math import inf
 from typing import Annotated, NamedTuple
 
-from sim.effect import Memory, Parameter
+from sim.effect import Inverse, Memory, Parameter
 
 MEMORY = 1
 STEP_S = inf
@@ -45,3 +45,8 @@ def sensor(z: Memory) -> float:
 def advance(after: float, q: Parameters, z: Memory) -> None:
     """Take the linkage along."""
     z[0] = min(max(z[0], after - 0.5 * q.width_m), after + 0.5 * q.width_m)
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Know on which side of the play the stem is."""
+    return Inverse(play_m=q.width_m)

@@ -10,7 +10,7 @@ out exact. In a step during which one stretch follows another, p is held at its 
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Memory, Parameter
+from sim.effect import Inverse, Memory, Parameter
 
 STRETCHES = 4096
 MEMORY = 2 + 3 * STRETCHES
@@ -100,3 +100,8 @@ def advance(t: float, before: float, after: float, h: float, q: Parameters, z: M
     z[TIME + k] = t
     z[VALUE + k] = before
     z[SLOPE + k] = slope
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Wait it out."""
+    return Inverse(dead_time_s=q.dead_time_s)

@@ -20,6 +20,7 @@ CONFOUNDED = {
     "stribeck": "holds of different lengths: the Stribeck excess breaks away at the same force after each",
     "friction_drift": "holds of different lengths in mixed order: a drift goes with time, not with the hold",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -14,6 +14,7 @@ CONFOUNDED = {
     "supply_limit": "measured actuator pressure: the limit cuts it, a stop does not; without it, a load that moves the "
     "place where the stem halts moves only the limit's",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -17,6 +17,7 @@ CONFOUNDED = {
     "area_variation": "fast moves, in which the pressure parts from the static curve",
     "sensor_nonlinearity": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -8,7 +8,7 @@ would pass every bound, where the slave file's changes are the means.
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Parameter
+from sim.effect import Inverse, Parameter
 
 LOOKS = "The same command is answered with a wider (or narrower) dead band later in the record than at its start."
 CONFOUNDED = {
@@ -37,3 +37,8 @@ def friction(F_c: float, F_s: float, t: float, q: Parameters) -> tuple[float, fl
     """Scale both levels."""
     scale = max(0.0, 1.0 + q.rate_per_s * t)
     return F_c * scale, F_s * scale
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Follow it from landing to landing."""
+    return Inverse(drift_per_s=q.rate_per_s)

@@ -15,6 +15,7 @@ CONFOUNDED = {
     "asymmetric_friction": "break-away and sliding levels in both directions: a preload shifts both by the same force, "
     "an asymmetry in proportion to each",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -11,7 +11,7 @@ last one.
 from math import inf
 from typing import Annotated, NamedTuple
 
-from sim.effect import Memory, Parameter
+from sim.effect import Inverse, Memory, Parameter
 
 MEMORY = 2
 STEP_S = inf
@@ -67,3 +67,8 @@ def motion(F_e: float, stiffness: float, x: float, v: float, q: Parameters, z: M
 
 def advance() -> None:
     """Do nothing: `motion` keeps the memory."""
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Send a stem farther that yields before it breaks loose."""
+    return Inverse(yielding_n_per_m=q.stiffness_n_per_m)

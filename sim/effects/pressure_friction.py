@@ -14,6 +14,7 @@ CONFOUNDED = {
     "position_friction": "the same position at different pressures: just before and just after a reversal",
     "friction_drift": "the same stretch of travel early and late in the record",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

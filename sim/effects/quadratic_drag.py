@@ -14,6 +14,7 @@ CONFOUNDED = {
     "viscous_ns_per_m": "moves at several speeds, from steps of different heights",
     "rate_limit": "measured actuator pressure: the limit lies before it, drag after",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

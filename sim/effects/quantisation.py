@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from sim.effect import Parameter
+from sim.effect import Inverse, Parameter
 
 LOOKS = "The indication takes few values, all a multiple of q: a slow ramp looks like a staircase of equal stairs."
 CONFOUNDED = {
@@ -31,3 +31,8 @@ class Parameters(NamedTuple):
 def sensor(y: float, q: Parameters) -> float:
     """Round it."""
     return float(q.quantum_m * np.floor(y / q.quantum_m + 0.5)) if q.quantum_m > 0.0 else y
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Undo nothing: the law of slides finds a quantum by itself, and what it has rounded off is lost."""
+    return Inverse()

@@ -8,7 +8,7 @@ is shown as the straight line with the same end and the same mean.
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Memory, Parameter
+from sim.effect import Inverse, Memory, Parameter
 
 MEMORY = 1
 STEP_S = 5e-4
@@ -70,3 +70,8 @@ def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> flo
 def advance(after: float, h: float, q: Parameters, z: Memory) -> None:
     """Follow u as fast as the air does."""
     z[0] = min(max(after, z[0] - q.venting_pa_per_s * h), z[0] + q.filling_pa_per_s * h)
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Wait until p can have arrived."""
+    return Inverse(filling_pa_per_s=q.filling_pa_per_s, venting_pa_per_s=q.venting_pa_per_s)

@@ -11,6 +11,7 @@ from sim.effect import Parameter
 
 LOOKS = "Every move is indicated too long or too short by the same share."
 CONFOUNDED = {"spring_n_per_m": ""}
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

@@ -8,7 +8,7 @@ T time constant, s; x position that enters, y position that leaves, m. Over a st
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Memory, Parameter
+from sim.effect import Inverse, Memory, Parameter
 from sim.first_order_lag import lagged
 
 MEMORY = 1
@@ -45,3 +45,8 @@ def sensor(y: float, q: Parameters, z: Memory) -> float:
 def advance(before: float, after: float, h: float, q: Parameters, z: Memory) -> None:
     """Carry it over the step."""
     z[0] = lagged(z[0], before, after, h, q.time_constant_s)
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Wait until the indication can have come to rest."""
+    return Inverse(sensor_lag_s=q.time_constant_s)

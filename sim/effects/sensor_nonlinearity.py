@@ -15,6 +15,7 @@ CONFOUNDED = {
     "flow_force": "the width of the dead band over the travel, which a bent sensor stretches and squeezes",
     "area_variation": "fast moves, in which the pressure parts from the static curve",
 }
+INVERSE = "balance"
 
 
 class Parameters(NamedTuple):

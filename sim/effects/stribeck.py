@@ -22,6 +22,7 @@ CONFOUNDED = {
     "dwell_stiction": "holds of different lengths: this effect breaks away at the same force after each",
     "presliding": "small steps against a stuck stem: only presliding moves it",
 }
+INVERSE = "balance"
 LOST = 40.0
 """|v| / v_x beyond which, for any n >= 1, less than 5e-18 of the excess is left; a power is dear."""
 

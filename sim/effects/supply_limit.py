@@ -7,7 +7,7 @@ p_s supply pressure, p_e pressure left in the vented actuator, Pa; u entering pr
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Parameter
+from sim.effect import Inverse, Parameter
 
 LOOKS = "Beyond a command, always the same one, the stem answers no further, at the upper end, at the lower or both."
 CONFOUNDED = {
@@ -46,3 +46,8 @@ class Parameters(NamedTuple):
 def pressure(u: float, q: Parameters) -> float:
     """Cut u at both ends."""
     return min(max(u, q.exhaust_pa), q.supply_pa)
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Ask for nothing beyond."""
+    return Inverse(least_pa=q.exhaust_pa, most_pa=q.supply_pa)

@@ -1,0 +1,105 @@
+"""An extended valve as the controller can use it: plain numbers, worked out of a valve file by `sim.static_inverse`.
+
+    p_s(x)      pressure under which a slide in direction s lands with the stem at x, Pa
+    p'_s(x)     pressure at which a stem that rests at x breaks loose in direction s, Pa
+    m_s(x)      shortest slide that breaks loose there, m:     p_s(x + s m_s) = p'_s(x)
+    y(x)        what is indicated of a stem at x, m
+
+each on an even grid of stem positions from 0 to the stroke, straight in between and beyond. What acts in time is in
+`Inverse`: it is not solved for, but led against, waited out or followed.
+"""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import NamedTuple
+
+Table = tuple[float, ...]
+
+
+class Inverse(NamedTuple):
+    """What undoes effects that act in time, or that no pressure solves for; as given, nothing."""
+
+    lag_s: float = 0.0
+    """The pressure follows the command with this time constant, ..."""
+    dead_time_s: float = 0.0
+    """... after this, ..."""
+    filling_pa_per_s: float = inf
+    venting_pa_per_s: float = inf
+    """... no faster than this, ..."""
+    least_pa: float = -inf
+    most_pa: float = inf
+    """... and stays between these."""
+    play_m: float = 0.0
+    """The indication stays behind the stem by half of this, whichever way it went last."""
+    sensor_lag_s: float = 0.0
+    """The indication follows the stem with this time constant."""
+    drift_per_s: float = 0.0
+    """Friction changes by this share each second."""
+    yielding_n_per_m: float = inf
+    """The stuck stem yields with this stiffness."""
+
+    def joined(self, other: "Inverse") -> "Inverse":
+        """Return what undoes both."""
+        return Inverse(
+            lag_s=self.lag_s + other.lag_s,
+            dead_time_s=self.dead_time_s + other.dead_time_s,
+            filling_pa_per_s=min(self.filling_pa_per_s, other.filling_pa_per_s),
+            venting_pa_per_s=min(self.venting_pa_per_s, other.venting_pa_per_s),
+            least_pa=max(self.least_pa, other.least_pa),
+            most_pa=min(self.most_pa, other.most_pa),
+            play_m=self.play_m + other.play_m,
+            sensor_lag_s=self.sensor_lag_s + other.sensor_lag_s,
+            drift_per_s=self.drift_per_s + other.drift_per_s,
+            yielding_n_per_m=min(self.yielding_n_per_m, other.yielding_n_per_m),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ExtendedValve:
+    """The tables of a valve, n values each over the stroke, and what acts in time."""
+
+    name: str
+    stroke_m: float
+    up_pa: Table = field(repr=False)
+    down_pa: Table = field(repr=False)
+    breakaway_up_pa: Table = field(repr=False)
+    breakaway_down_pa: Table = field(repr=False)
+    indicated_m: Table = field(repr=False)
+    inverse: Inverse
+
+    def landing_pa(self, stem_m: float, direction: int) -> float:
+        """Return p_s(x), Pa."""
+        return _value(self._landing(direction), stem_m / self.stroke_m)
+
+    def breakaway_pa(self, stem_m: float, direction: int) -> float:
+        """Return p'_s(x), Pa."""
+        table = self.breakaway_up_pa if direction > 0 else self.breakaway_down_pa
+        return _value(table, stem_m / self.stroke_m)
+
+    def margin_m(self, stem_m: float, direction: int) -> float:
+        """Return m_s(x), m."""
+        lands_m = _share(self._landing(direction), self.breakaway_pa(stem_m, direction)) * self.stroke_m
+        return max(0.0, direction * (lands_m - stem_m))
+
+    def stem_m(self, indicated_m: float, direction: int) -> float:
+        """Return where the stem is, m, that is indicated at a position after moving in a direction (0: unknown)."""
+        return _share(self.indicated_m, indicated_m + 0.5 * direction * self.inverse.play_m) * self.stroke_m
+
+    def _landing(self, direction: int) -> Table:
+        return self.up_pa if direction > 0 else self.down_pa
+
+
+def _value(table: Table, share: float) -> float:
+    """Return a table's value at a share of the stroke."""
+    cells = len(table) - 1
+    cell = min(max(int(share * cells), 0), cells - 1)
+    return table[cell] + (share * cells - cell) * (table[cell + 1] - table[cell])
+
+
+def _share(table: Sequence[float], value: float) -> float:
+    """Return the share of the stroke at which a rising table has a value."""
+    cells = len(table) - 1
+    cell = min(max(bisect_left(table, value) - 1, 0), cells - 1)
+    return (cell + (value - table[cell]) / (table[cell + 1] - table[cell])) / cells
