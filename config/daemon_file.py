@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from config.bus_plugins import AnyDevice
 from config.device import ModbusTcpDevice
 from config.errors import InputError
-from config.loading import Fraction, NonNegative, Positive, Schema, read_toml, validated
+from config.loading import Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
 from config.quantities import ActionName
 from config.tls_table import Tls
 
@@ -112,12 +112,28 @@ class ExcitationTable(Schema):
 
 
 class LawTable(Schema):
-    """Table `[law]`: an earlier identification's ratios, so that a restart need not excite the valve again."""
+    """Table `[law]`: what the law knows before anything is identified: an extended valve, or an earlier identification.
 
-    b_over_c_pa_per_m: Annotated[float, Field(lt=0)]
-    k_over_c_pa: Annotated[float, Field(lt=0)]
+    Either spares the valve an excitation at a restart. They exclude each other.
+    """
+
+    valve: NearFile | None = None
+    """A valve file, effects and all, as `positioner extend` writes it: the law works with its static inverse."""
+    b_over_c_pa_per_m: Annotated[float, Field(lt=0)] | None = None
+    k_over_c_pa: Annotated[float, Field(lt=0)] | None = None
     offset_pa: float = 0.0
     """Of the balance, from a preload or from unlike friction up and down."""
+
+    @model_validator(mode="after")
+    def _one_or_the_other(self) -> Self:
+        typed = self.model_fields_set - {"valve"}
+        if self.valve is not None and typed:
+            raise ValueError(f"valve is given, so {min(typed)} must not be: the pressures come from one of them")
+        if self.valve is None:
+            for key in ("b_over_c_pa_per_m", "k_over_c_pa"):
+                if getattr(self, key) is None:
+                    raise ValueError(f"{key} is required and missing, unless valve is given")
+        return self
 
 
 class ControlTable(Schema):

@@ -16,6 +16,8 @@ from math import inf
 from typing import NamedTuple
 
 Table = tuple[float, ...]
+SAME_STROKE, SAME_BREAKAWAY = 1e-3, 1.5
+"""Share of the stroke, and factor on F_s/A, by which two descriptions of one valve may differ."""
 
 
 class Inverse(NamedTuple):
@@ -68,6 +70,22 @@ class ExtendedValve:
     breakaway_down_pa: Table = field(repr=False)
     indicated_m: Table = field(repr=False)
     inverse: Inverse
+
+    def unlike(
+        self, stroke_m: float, minimum_pa: float, maximum_pa: float, breakaway_pa: float | None = None
+    ) -> str | None:
+        """Say why this cannot be the valve of a controller with that stroke, m, those limits and F_s/A, Pa."""
+        if abs(self.stroke_m - stroke_m) > SAME_STROKE * stroke_m:
+            return f"stroke_m is {self.stroke_m:g} m, the daemon's [valve] has {stroke_m:g} m"
+        middle_m = 0.5 * stroke_m
+        up_pa, down_pa = (self.breakaway_pa(middle_m, s) for s in (1, -1))
+        own_pa, mean_pa = 0.5 * (up_pa - down_pa), 0.5 * (up_pa + down_pa)
+        if breakaway_pa is not None and not 1 / SAME_BREAKAWAY < own_pa / breakaway_pa < SAME_BREAKAWAY:
+            return f"F_s/A is {own_pa:.0f} Pa, the daemon's [valve] has breakaway_pa = {breakaway_pa:g}: another area?"
+        if not minimum_pa <= mean_pa <= maximum_pa:
+            allowed = f"{minimum_pa:g} to {maximum_pa:g} Pa"
+            return f"it takes {mean_pa:.0f} Pa to the middle of its travel, [pressure] allows {allowed}: another area?"
+        return None
 
     def landing_pa(self, stem_m: float, direction: int) -> float:
         """Return p_s(x), Pa."""

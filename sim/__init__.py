@@ -6,6 +6,7 @@ Its files:
     effect, effects                      how an effect is written; those that come along
     kernel, kernel_source                the equations with effects in their places, compiled; the text of that
     interpreted                          the same uncompiled, for what asks a single place
+    static_inverse                       what a controller must know of a valve file, worked out of its equations
     composition                          a valve file made ready: effects, parameters, kernel
     valve, open_loop, simulation         in virtual time; in one call, for fitting; as a recording
     parameter_changes, transmitter       friction that ages meanwhile; the position's noise and rounding

@@ -55,7 +55,7 @@ import numpy as np
 import numpy.typing as npt
 
 from config.errors import InputError
-from config.extended_valve import Inverse as Inverse  # effects take it from here, beside Parameter
+from config.extended_valve import Inverse
 from config.valve_file import ValveParameters
 
 Memory = npt.NDArray[np.float64]
@@ -329,7 +329,9 @@ def _inverse(path: Path, namespace: dict[str, Any]) -> Callable[[Sequence[float]
     if "INVERSE" in namespace:
         raise InputError(str(path), f'either INVERSE = "{BALANCE}" or the function inverse undoes it, not both')
     inverse, parameters = namespace["inverse"], namespace["Parameters"]
-    return lambda values: inverse(parameters(*values))
+    if "q" not in inspect.signature(inverse).parameters:
+        return lambda _: inverse()
+    return lambda values: inverse(q=parameters(*values))
 
 
 def _check_places(effect: Effect) -> None:

@@ -3,7 +3,7 @@
 With the force F_e, the levels F_c and F_s and the sensor of the composition (`sim.karnopp`, the effects in their
 places), for a stem at rest at x, the pressure path settled, memories as after a long rest:
 
-    s F_e(x, p) = F_c(x, p, s)       p lands a slide in direction s at x: F_c as of fast sliding, beyond any Stribeck drop
+    s F_e(x, p) = F_c(x, p, s)       p lands a slide in direction s at x: F_c beyond any Stribeck drop
     s F_e(x, p) = F_s(x, p, s)       p breaks it loose;  where the stuck stem yields, x is where it has yielded to
     y(x)                             the sensor's
 
@@ -24,7 +24,7 @@ from config.valve_file import ValveFile
 from sim.composition import SPRING, parameter_vector
 from sim.effect import BALANCE, Effect, find_effect
 from sim.interpreted import interpreted
-from sim.karnopp import MEMORY, Karnopp, Stem, Vector, karnopp
+from sim.karnopp import MEMORY, Karnopp, Stem, karnopp
 
 POINTS = 201
 """Of the grid."""
@@ -113,7 +113,13 @@ class _Rest:
         """Return the laws of a valve with these of its effects."""
         kept = file.model_copy(update={"effect": tuple(each for each in file.effect if _named(each.name, effects))})
         theta = parameter_vector(kept, effects, source)
-        return cls(interpreted(effects), Karnopp(*map(float, karnopp(theta))), theta.tolist(), MEMORY + sum(each.memory for each in effects), source)
+        return cls(
+            interpreted(effects),
+            Karnopp(*map(float, karnopp(theta))),
+            theta.tolist(),
+            MEMORY + sum(each.memory for each in effects),
+            source,
+        )
 
     def pressure_pa(self, x: float, s: int, level: Callable[[Stem, int], float]) -> float:
         """Return the command, Pa, at which the force on a stem at x in direction s is a level of friction, N."""

@@ -15,6 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run until SIGTERM or Ctrl-C, which leave each valve in its configured safe state."""
     from config.daemon_file import load_valves
+    from positioner.cli.parts.extended_valves import extended_valve_of
     from positioner.daemon.service import serve
 
-    return serve(load_valves(arguments.config), arguments.config)
+    files = load_valves(arguments.config)
+    source = str(arguments.config)
+    return serve(files, arguments.config, [extended_valve_of(file, source) for file in files])

@@ -9,6 +9,7 @@ real time.
     balance_law                                 the seed's law: the pressure that balances spring and friction
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
     slide_law, slide_memory                     the law of slides: nothing, one or two, and how far a slide is sent
+    slide_inverse                               what the law of slides takes from an extended valve
     conventional_law                            PI on position, to compare the others with
     law_memory                                  the law with a memory that is in force, whichever it is
     pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress

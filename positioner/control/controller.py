@@ -74,7 +74,7 @@ class Controller:
     def __init__(self, settings: Settings, held_pa: float, refiner: Refiner | None = None) -> None:
         self._settings = settings
         self._identification = Identification(settings.identification, refiner)
-        self._statics = StaticIdentification(settings.limits.stroke_m)
+        self._statics = StaticIdentification(settings.limits.stroke_m, valve=settings.valve)
         self._memory = ControllerMemory(
             command_pa=held_pa,
             held_pa=held_pa,
@@ -155,6 +155,7 @@ def step(
             outcome=outcome,
             statics=statics,
             stroke_m=settings.limits.stroke_m,
+            valve=settings.valve,
         )
         law_memory = after_step(memory.law, settings.law_with_memory, seen)
 

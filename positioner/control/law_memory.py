@@ -5,12 +5,14 @@ A law without a memory is a function (`settings.LAWS`); these remember a move, a
 
 from dataclasses import dataclass
 
+from config.extended_valve import ExtendedValve
 from positioner.control import breakaway_law as breakaway
 from positioner.control import conventional_law as conventional
 from positioner.control import slide_law as slides
 from positioner.control.breakaway_memory import BreakawayMemory, BreakawaySettings, Observation, initial_memory
 from positioner.control.conventional_law import ConventionalMemory, ConventionalSettings
 from positioner.control.sample import Sample
+from positioner.control.slide_inverse import stem_observed, with_margins_at
 from positioner.control.slide_memory import SlideMemory, SlideSettings, StemObservation
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimates
@@ -38,6 +40,8 @@ class LawInput:
     """Of the last change of the command, in the step in which it is known."""
     statics: StaticIdentification
     stroke_m: float
+    valve: ExtendedValve | None
+    """Whose effects are known."""
 
 
 def first_memory(settings: LawSettings | None, held_pa: float) -> LawMemory | None:
@@ -91,7 +95,10 @@ def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) 
         quantum_m=statics.detector.quantum_m,
         outcome=seen.outcome,
     )
-    balance = slides.Balance(seen.ratios, statics.landings, statics.held, seen.stroke_m)
+    if seen.valve is not None:
+        observation = stem_observed(observation, seen.valve, statics.way)
+        memory = with_margins_at(memory, seen.reference_m, seen.valve)
+    balance = slides.Balance(seen.ratios, statics.landings, statics.held, seen.stroke_m, seen.valve)
     return slides.step(memory, observation, seen.reference_m, balance, settings)
 
 

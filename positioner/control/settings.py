@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from config.daemon_file import DaemonFile, LawTable
+from config.extended_valve import ExtendedValve
 from config.quantities import ActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
@@ -12,6 +13,7 @@ from positioner.control.slide_memory import SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
+from positioner.estimation.landings.extended_balance import straight_law
 from positioner.estimation.online import IdentificationSettings
 
 LAWS: dict[str, Callable[[float, int, Ratios], float]] = {"seed": balance_pa}
@@ -38,10 +40,17 @@ class Settings:
     """Of the excitation by slides; None: it is a sine."""
     delivered_pa: Callable[[float], float]
     """The command, Pa, that the device can be told in place of one."""
+    valve: ExtendedValve | None
+    """Whose static inverse the laws work with, in place of a straight law."""
 
     @classmethod
-    def of(cls, file: DaemonFile) -> "Settings":
-        """Return the settings a daemon file asks for."""
+    def of(cls, file: DaemonFile, valve: ExtendedValve | None = None) -> "Settings":
+        """Return the settings a daemon file asks for.
+
+        Args:
+            file: the daemon's.
+            valve: what `[law] valve` names, worked out: only the roof, which knows the model, can do that.
+        """
         safety, identification = file.safety, file.identification
         return cls(
             limits=Limits(
@@ -68,11 +77,12 @@ class Settings:
                 minimum_window_s=identification.minimum_window_s,
                 derivative_window_s=identification.derivative_window_s,
             ),
-            applied=Applied(_ratios(file.law) if file.law else None),
-            law=LAWS.get(file.control.law, balance_pa),
+            applied=Applied(_ratios(file.law) if valve is None else straight_law(valve)),
+            law=LAWS.get(file.control.law, balance_pa) if valve is None else _inverse(valve),
             law_with_memory=WITH_MEMORY[file.control.law](file) if file.control.law in WITH_MEMORY else None,
             staircase=_staircase(file) if file.by_slides else None,
             delivered_pa=file.device.delivered_pa,
+            valve=valve,
         )
 
     def safe_pa(self, action: ActionName, held_pa: float) -> float:
@@ -125,5 +135,12 @@ def _staircase(file: DaemonFile) -> StaircaseLimits:
     return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa)
 
 
-def _ratios(law: LawTable) -> Ratios:
+def _ratios(law: LawTable | None) -> Ratios | None:
+    if law is None or law.b_over_c_pa_per_m is None or law.k_over_c_pa is None:
+        return None
     return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa, law.offset_pa)
+
+
+def _inverse(valve: ExtendedValve) -> Callable[[float, int, Ratios], float]:
+    """Return the law without a memory that gives the pressure of the extended valve."""
+    return lambda reference_m, direction, _: valve.landing_pa(reference_m, direction)

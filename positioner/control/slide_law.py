@@ -1,7 +1,9 @@
 """The law of slides: a stem that slides into rest lands where spring and friction balance, however slow the loop.
 
-    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py)
-    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_memory.py)
+    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
+                                        of an extended valve, [law] valve:        extended_balance.py)
+    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_memory.py; of an
+                                                                extended valve:   slide_inverse.py)
 
 With the stem at rest at x, e = r - x and s = sign(e):
 
@@ -26,10 +28,12 @@ from dataclasses import dataclass, replace
 from math import isnan
 
 from config.codes import InhibitReason
+from config.extended_valve import ExtendedValve
 from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import ahead_m, landing_pa
+from positioner.estimation.landings.local_balance import landing_pa
 
 RETURN = 1.05
 """Margins that the second slide is given, for a stem must not stay where the first took it."""
@@ -65,14 +69,19 @@ class Balance:
     landings: Sequence[SlideOutcome]
     held: Sequence[SlideOutcome]
     stroke_m: float
+    valve: ExtendedValve | None = None
+    """In place of the straight law, where its effects are known."""
 
     def pressure_pa(self, position_m: float, direction: int) -> float:
         """Return B(x, s), Pa."""
+        if self.valve is not None:
+            return extended_landing_pa(position_m, direction, self.valve, self.landings)
         return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
 
     def way_m(self, each: SlideOutcome) -> float:
         """Return how far a slide would have gone, m, by the balance at the place it starts from."""
-        return ahead_m(each, self.ratios, self.landings, self.stroke_m)
+        ahead_pa = each.command_pa - self.pressure_pa(each.from_m, each.direction)
+        return each.direction * ahead_pa / -self.ratios.b_over_c
 
     @property
     def friction_m(self) -> float:

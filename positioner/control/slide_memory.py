@@ -93,6 +93,8 @@ class SlideMemory:
     """The sample before."""
     up: Margin = Margin()
     down: Margin = Margin()
+    margins_at_m: float = nan
+    """Where the margins are those of the extended valve; nan: none is known."""
     excursion_s: float = -inf
     """When the last excursion began."""
     inhibit_reason: InhibitReason = InhibitReason.NOTHING

@@ -14,6 +14,7 @@ from threading import Event, Thread
 
 from config.daemon_file import DaemonFile
 from config.errors import InputError
+from config.extended_valve import ExtendedValve
 from config.registers import WRITER_AT
 from config.roles import Role
 from drivers import driver_for
@@ -70,10 +71,15 @@ class ServedValve:
             self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.command_pa))
 
 
-def serve(files: Sequence[DaemonFile], source: Path) -> int:
+def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[ExtendedValve | None]) -> int:
     """Run the daemon of these valves until a signal stops it; return the exit status.
 
     The only valve's device must be there. Of several, one that is not there is a fault of that valve alone.
+
+    Args:
+        files: of each valve.
+        source: what errors call them.
+        extended: what `[law] valve` of each names.
 
     Raises:
         InputError: a device is not there or not as described, a port is taken, recordings cannot be written.
@@ -84,8 +90,10 @@ def serve(files: Sequence[DaemonFile], source: Path) -> int:
     with ExitStack() as on_exit:
         refinement = RefinementProcess()
         on_exit.callback(refinement.stop)
-        paced = zip(files, _paces(files), strict=True)
-        valves = [_assembled(file, pace, source, len(files) == 1, on_exit, refinement) for file, pace in paced]
+        paced = zip(files, extended, _paces(files), strict=True)
+        valves = [
+            _assembled(file, valve, pace, source, len(files) == 1, on_exit, refinement) for file, valve, pace in paced
+        ]
         server = _server(valves)
         server.start()
         on_exit.callback(server.stop)
@@ -106,9 +114,15 @@ def serve(files: Sequence[DaemonFile], source: Path) -> int:
 
 
 def _assembled(
-    file: DaemonFile, pace: Pace, source: Path, is_alone: bool, on_exit: ExitStack, refinement: RefinementProcess
+    file: DaemonFile,
+    extended: ExtendedValve | None,
+    pace: Pace,
+    source: Path,
+    is_alone: bool,
+    on_exit: ExitStack,
+    refinement: RefinementProcess,
 ) -> ServedValve:
-    settings = Settings.of(file)
+    settings = Settings.of(file, extended)
     link = Link(driver_for(file.device), pace)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"

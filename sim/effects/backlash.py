@@ -8,7 +8,8 @@ w width of the play, m; x position that enters, y position that leaves.
 from math import inf
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Memory, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Memory, Parameter
 
 MEMORY = 1
 STEP_S = inf

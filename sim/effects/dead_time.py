@@ -10,7 +10,8 @@ out exact. In a step during which one stretch follows another, p is held at its 
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Memory, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Memory, Parameter
 
 STRETCHES = 4096
 MEMORY = 2 + 3 * STRETCHES

@@ -8,7 +8,8 @@ would pass every bound, where the slave file's changes are the means.
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Parameter
 
 LOOKS = "The same command is answered with a wider (or narrower) dead band later in the record than at its start."
 CONFOUNDED = {

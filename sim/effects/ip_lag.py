@@ -8,7 +8,8 @@ T time constant, s; u entering pressure, p leaving pressure, Pa. Over a step in 
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Memory, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Memory, Parameter
 from sim.first_order_lag import lagged
 
 MEMORY = 1

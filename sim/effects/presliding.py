@@ -11,7 +11,8 @@ last one.
 from math import inf
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Memory, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Memory, Parameter
 
 MEMORY = 2
 STEP_S = inf

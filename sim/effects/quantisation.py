@@ -9,7 +9,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from sim.effect import Inverse, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Parameter
 
 LOOKS = "The indication takes few values, all a multiple of q: a slow ramp looks like a staircase of equal stairs."
 CONFOUNDED = {
@@ -33,6 +34,6 @@ def sensor(y: float, q: Parameters) -> float:
     return float(q.quantum_m * np.floor(y / q.quantum_m + 0.5)) if q.quantum_m > 0.0 else y
 
 
-def inverse(q: Parameters) -> Inverse:
+def inverse() -> Inverse:
     """Undo nothing: the law of slides finds a quantum by itself, and what it has rounded off is lost."""
     return Inverse()

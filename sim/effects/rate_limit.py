@@ -8,7 +8,8 @@ is shown as the straight line with the same end and the same mean.
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Memory, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Memory, Parameter
 
 MEMORY = 1
 STEP_S = 5e-4

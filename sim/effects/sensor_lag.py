@@ -8,7 +8,8 @@ T time constant, s; x position that enters, y position that leaves, m. Over a st
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Memory, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Memory, Parameter
 from sim.first_order_lag import lagged
 
 MEMORY = 1

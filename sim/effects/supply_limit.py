@@ -7,7 +7,8 @@ p_s supply pressure, p_e pressure left in the vented actuator, Pa; u entering pr
 
 from typing import Annotated, NamedTuple
 
-from sim.effect import Inverse, Parameter
+from config.extended_valve import Inverse
+from sim.effect import Parameter
 
 LOOKS = "Beyond a command, always the same one, the stem answers no further, at the upper end, at the lower or both."
 CONFOUNDED = {

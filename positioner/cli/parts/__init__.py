@@ -7,6 +7,7 @@ A command imports from here what it needs when it runs.
     daemon_address                              where a daemon is
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
     diagnose_forces                             `diagnose` on a bench's recording
+    extended_valves                             `[law] valve` of a daemon's file, worked out
     output_files                                what `--out` and `--json` ask for
     authority, progress                         a test certificate authority; progress on a terminal
 """

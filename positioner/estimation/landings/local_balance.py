@@ -7,7 +7,7 @@ Where spring or friction change over the travel no straight law holds, but a sli
 missing there: the next one lands. w_0 holds the correction back where there is little to go by.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import exp
 
 from positioner.estimation.acceptance import Ratios
@@ -44,12 +44,26 @@ def landing_pa(
         landings: the latest first.
         stroke_m: full travel.
     """
+    landed = (each for each in landings if each.direction == direction)
+    missed = missed_pa(position_m, landed, ratios.balance_pa, WIDTH * stroke_m)
+    return ratios.balance_pa(position_m, direction) + missed
+
+
+def missed_pa(
+    position_m: float, landed: Iterable[SlideOutcome], law: Callable[[float, int], float], width_m: float
+) -> float:
+    """Return by what a law misses landings near a position, Pa: the mean of e_j, weighted.
+
+    Args:
+        position_m: where.
+        landed: all in one direction, the latest first.
+        law: the pressure, Pa, at a position, m, in a direction.
+        width_m: h.
+    """
     weighted_pa, weights, age = 0.0, HELD_BACK, 1.0
-    for each in landings:
-        if each.direction != direction:
-            continue
-        weight = age * exp(-(((each.position_m - position_m) / (WIDTH * stroke_m)) ** 2) / 2)
-        weighted_pa += weight * (each.command_pa - ratios.balance_pa(each.position_m, direction))
+    for each in landed:
+        weight = age * exp(-(((each.position_m - position_m) / width_m) ** 2) / 2)
+        weighted_pa += weight * (each.command_pa - law(each.position_m, each.direction))
         weights += weight
         age *= FADING
-    return ratios.balance_pa(position_m, direction) + weighted_pa / weights
+    return weighted_pa / weights

@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import replace
 
 from config.codes import Refusal
+from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
@@ -28,16 +29,26 @@ class StaticIdentification:
         stroke_m: full travel, m.
         stops_m: positions of the stops, m; by default 0 and the stroke.
         each: landings remembered in a direction.
+        valve: whose sensor and play are known; then all positions are of the stem, else as indicated.
 
     Attributes:
         detector: of the rests.
         landings: the latest first.
         held: changes of the command that did not move the stem, the latest first.
         law: from the landings.
+        way: direction in which the stem moved last, 0 if it has not.
     """
 
-    def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None, each: int = EACH) -> None:
+    def __init__(
+        self,
+        stroke_m: float,
+        stops_m: tuple[float, float] | None = None,
+        each: int = EACH,
+        valve: ExtendedValve | None = None,
+    ) -> None:
         self._stroke_m = stroke_m
+        self._valve = valve
+        self.way = 0
         self._each = each
         self.detector = LandingDetector(stroke_m, stops_m)
         self._tested: tuple[Estimates, StaticLaw, Estimates] | None = None
@@ -63,6 +74,8 @@ class StaticIdentification:
         outcome = self.detector.update(time_s, position_m, command_pa, pressure_pa)
         if outcome is None:
             return None
+        if self._valve is not None:
+            outcome = self._of_stem(outcome, self._valve)
         if outcome.landing and self._gave_way(outcome):
             outcome = outcome._replace(moved=False, landing=False)
         if not outcome.moved:
@@ -70,6 +83,12 @@ class StaticIdentification:
         if outcome.landing:
             self._take(outcome)
         return outcome
+
+    def _of_stem(self, outcome: SlideOutcome, valve: ExtendedValve) -> SlideOutcome:
+        """Return an outcome with the positions of the stem in place of those indicated."""
+        from_m = valve.stem_m(outcome.from_m, self.way)
+        self.way = outcome.direction if outcome.moved else self.way
+        return outcome._replace(from_m=from_m, position_m=valve.stem_m(outcome.position_m, self.way))
 
     def _take(self, outcome: SlideOutcome) -> None:
         self._in_direction[outcome.direction].appendleft(outcome)

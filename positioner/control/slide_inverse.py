@@ -1,0 +1,44 @@
+"""What the law of slides takes from an extended valve besides its pressures: where the stem is, and its margins.
+
+    x = y^-1(indicated + s play/2)            s the direction in which the stem moved last
+    m_s(r) = learnt factor * (m_s(r) of the extended valve)
+
+The law works with positions of the stem, not with what is indicated of it.
+"""
+
+from dataclasses import replace
+from math import isnan
+
+from config.extended_valve import ExtendedValve
+from positioner.control.slide_memory import Margin, SlideMemory, StemObservation
+
+SURE = 1.02
+"""Factor on a margin that is known: a slide of just that length may hold."""
+LEAST = 5e-3
+"""Of the stroke: a slide shorter than this would not be seen for one."""
+
+
+def stem_observed(observation: StemObservation, valve: ExtendedValve, direction: int) -> StemObservation:
+    """Return an observation of the indicated position as one of the stem, which moved in a direction last."""
+    rest = observation.rest
+    return replace(
+        observation,
+        position_m=valve.stem_m(observation.position_m, direction),
+        rest=None if rest is None else replace(rest, position_m=valve.stem_m(rest.position_m, direction)),
+    )
+
+
+def with_margins_at(memory: SlideMemory, reference_m: float, valve: ExtendedValve) -> SlideMemory:
+    """Return the memory with the margins of the valve at a reference; what slides have taught of them stays."""
+    if memory.margins_at_m == reference_m:
+        return memory
+    for s in (1, -1):
+        factor = 1.0
+        if not isnan(memory.margins_at_m):
+            factor = memory.margin(s).way_m / _margin_m(memory.margins_at_m, s, valve)
+        memory = memory.with_margin(s, Margin(factor * _margin_m(reference_m, s, valve), broke=True, held=True))
+    return replace(memory, margins_at_m=reference_m)
+
+
+def _margin_m(stem_m: float, direction: int, valve: ExtendedValve) -> float:
+    return max(SURE * valve.margin_m(stem_m, direction), LEAST * valve.stroke_m)
