@@ -2,10 +2,10 @@
 
     python -m benchmarks.extended_valve [--steps 100] [--period-s 0.02] [--step-s 1.0] [--seed 0] [--effects NAME...]
 
-The seed's valve with one effect more, at the strength in the middle of those that it declares (the weakest, where its
-middle would not let the stem make the steps). Its position comes with noise of 1e-4 of the stroke; commands come into
-force one period late. Without: S3's staircase identifies a straight law, as the daemon does on a valve of which only the
-stroke is known. With: `[law] valve` names the valve file with the effect, and nothing is identified. Then come random
+The seed's valve with one effect more, at the strength in the middle of those that it declares (a weaker one, where
+that would not let the stem make the steps). Its position comes with noise of 1e-4 of the stroke; commands come into
+force one period late. Without: S3's staircase identifies a straight law, as the daemon does where it knows the stroke
+only. With: `[law] valve` names the valve file with the effect, and nothing is identified. Then come random
 steps of 0.1 to 10 % of stroke, evenly in the logarithm. Errors are of the true stem at the end of each step, % of
 stroke; the first row is the valve without any effect. All run one compiled composition, the others' parameters off.
 """
@@ -42,11 +42,8 @@ NOISE = 1e-4
 VALVE_STEP_S = 1e-4
 LOWEST, HIGHEST, FIRST = 0.4, 0.62, 0.5
 SMALLEST, LARGEST = 1e-3, 0.1
-WEAKEST = ("supply_limit",)
-"""Effects whose middle strength would not let the stem make the steps."""
-DYNAMIC = (
-    "ip_lag dead_time rate_limit sensor_lag backlash presliding dwell_stiction friction_drift quadratic_drag stribeck"
-).split()
+WEAK = {"supply_limit": 0, "friction_drift": 1}
+"""Which of the declared strengths, where the middle one would not let the stem make the steps."""
 
 
 def typical(effect: Effect) -> EffectTable:
@@ -54,7 +51,7 @@ def typical(effect: Effect) -> EffectTable:
     values = []
     for parameter in effect.parameters.values():
         starts = parameter.starts_for(SEED)
-        values.append(starts[0 if effect.name in WEAKEST else len(starts) // 2])
+        values.append(starts[WEAK.get(effect.name, len(starts) // 2)])
     return EffectTable.model_validate({"name": effect.name, **dict(zip(effect.parameters, values, strict=True))})
 
 

@@ -7,8 +7,8 @@ places), for a stem at rest at x, the pressure path settled, memories as after a
     s F_e(x, p) = F_s(x, p, s)       p breaks it loose;  where the stuck stem yields, x is where it has yielded to
     y(x)                             the sensor's
 
-are solved for p by bisection, on an even grid over the stroke. An effect that declares `inverse(q)` is left out of the
-balance: it says itself what must be known of it. Nothing is compiled.
+are solved for p by false position, on an even grid over the stroke. An effect that declares `inverse(q)` is left out of
+the balance: it says itself what must be known of it. Nothing is compiled.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,8 +30,10 @@ POINTS = 201
 """Of the grid."""
 FAST_M_PER_S = 1e4
 """A velocity beyond any Stribeck range."""
-FIRST_PA, DOUBLINGS, BISECTIONS = 1e4, 20, 50
-"""Width of the first bracket about the bare valve's pressure, and how often it is doubled and then halved."""
+FIRST_PA, DOUBLINGS = 1e4, 20
+"""Half-width of the first bracket about the bare valve's pressure, and how often it is doubled."""
+BALANCED_N, ROUNDS = 1e-6, 60
+"""A force that is none, and how often the bracket is narrowed at the most: a kink may lie in it."""
 
 
 def extended_valve(file: ValveFile, source: str) -> ExtendedValve:
@@ -128,22 +130,13 @@ class _Rest:
             stem = self._stem(x, command_pa)
             return s * self._force_n(stem) - level(stem, s)
 
-        middle = (self.valve.k_s * x + s * self.valve.F_c) / self.valve.A
-        width, rises = FIRST_PA, float(s)
+        middle, width = (self.valve.k_s * x + s * self.valve.F_c) / self.valve.A, FIRST_PA
         for _ in range(DOUBLINGS):
-            low, high = middle - width, middle + width
-            if rises * excess_n(low) < 0.0 < rises * excess_n(high):
-                break
+            ends = ((middle - width, s * excess_n(middle - width)), (middle + width, s * excess_n(middle + width)))
+            if ends[0][1] < 0.0 < ends[1][1]:
+                return _root(lambda command_pa: s * excess_n(command_pa), *ends)
             width *= 2.0
-        else:
-            raise InputError(self.source, f"no pressure balances the stem at {x:.4g} m: it has no inverse")
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            if rises * excess_n(middle) < 0.0:
-                low = middle
-            else:
-                high = middle
-        return 0.5 * (low + high)
+        raise InputError(self.source, f"no pressure balances the stem at {x:.4g} m: it has no inverse")
 
     def sliding_n(self, stem: Stem, s: int) -> float:
         """Return F_c."""
@@ -176,6 +169,23 @@ class _Rest:
     def _parts(self) -> tuple[Any, Any]:
         """Return the parameters and fresh memories of the effects."""
         return self.laws.parameters(self.theta), self.laws.memories(np.zeros(self.state_size))
+
+
+def _root(f: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]) -> float:
+    """Return where f vanishes between two points (x, f), by false position as in the Illinois method."""
+    moved = 0
+    for _ in range(ROUNDS):
+        x = low[0] - low[1] * (high[0] - low[0]) / (high[1] - low[1])
+        y = f(x)
+        if abs(y) <= BALANCED_N:
+            break
+        if y < 0.0:
+            low, high = (x, y), (high[0], high[1] * (0.5 if moved < 0 else 1.0))
+            moved = -1
+        else:
+            low, high = (low[0], low[1] * (0.5 if moved > 0 else 1.0)), (x, y)
+            moved = 1
+    return x
 
 
 def _named(name: str, effects: Sequence[Effect]) -> bool:

@@ -1,12 +1,15 @@
 """`positioner play`: the closed loop in virtual time, as fast as it computes."""
 
 import argparse
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice
+from math import nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
+    from config.extended_valve import ExtendedValve
     from config.recording import Column, Recording
     from config.slave_file import SlaveFile
     from config.valve_file import ValveParameters
@@ -29,10 +32,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
     laws = ("seed", "breakaway", "slides", "conventional")
     parser.add_argument("--law", choices=laws, default="seed", help="the control law (seed)")
+    parser.add_argument(
+        "--extended",
+        type=Path,
+        metavar="VALVE.toml",
+        help="play twice, without and with the law knowing this valve file, and print what error either leaves",
+    )
     parser.add_argument("--period-s", type=float, default=1e-3, help="period of the loop (1e-3)")
     parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
     parser.add_argument("--seed", type=int, default=0, help="of the noise (0)")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run: what the daemon saw and decided, when the reference began, s, and where the stem really was, m."""
+
+    snapshots: list["Snapshot"]
+    begin_s: float
+    stem_m: list[float]
+    """From the beginning of the reference on."""
+
+    @property
+    def error_m(self) -> float:
+        """Root mean square of the stem's error when the reference is about to change, m."""
+        references_m = [each.decision.reference_m for each in self.snapshots[-len(self.stem_m) :]]
+        following_m = [*references_m[1:], nan]
+        errors_m = [
+            stem - here
+            for stem, here, after in zip(self.stem_m, references_m, following_m, strict=True)
+            if here != after
+        ]
+        return sqrt(sum(each**2 for each in errors_m) / len(errors_m))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -41,27 +72,60 @@ def run(arguments: argparse.Namespace) -> int:
     from config.recording import write_recording
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
-    from positioner.virtual.virtual_cycle import identified, played, virtual_cycle
-    from sim.slave.modbus_slave import device_of
+    from positioner.cli.parts.extended_valves import extended_valve_of
 
     path = find_valve(arguments.valve)
     valve = load_valve(path).valve
     time_s, reference_m = read_series(arguments.reference, "reference_m")
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
-    daemon, slave = _files(arguments, valve)
-    cycle = virtual_cycle(daemon, device_of(slave, path), _first_requests(valve))
-    within_s = daemon.excitation.staircase_limit_s if daemon.by_slides else IDENTIFY_S
-    snapshots = list(identified(cycle, within_s, wait=not daemon.by_slides))
-    begin_s = snapshots[-1].sample.time_s
-    snapshots += list(played(cycle, _script(time_s, reference_m, begin_s), begin_s + float(time_s[-1] - time_s[0])))[1:]
-    write_recording(arguments.out, _recording(snapshots, float(time_s[0]) - begin_s, valve.name))
-    last = snapshots[-1].decision
-    ratios = last.applied.ratios
+    extended = None if arguments.extended is None else extended_valve_of(_files(arguments, valve)[0], "--extended")
+    runs = [_played(arguments, path, valve, time_s, reference_m, None)]
+    applied = runs[0].snapshots[-1].decision.applied
+    ratios = applied.ratios
     if ratios is None:
-        raise CommandFailed(f"{arguments.valve}: not identified, so not controlled: {last.applied.last_refusal.text}")
+        raise CommandFailed(f"{arguments.valve}: not identified, so not controlled: {applied.last_refusal.text}")
     print(f"identified b/c = {ratios.b_over_c:.6g} Pa/m, k/c = {ratios.k_over_c:.6g} Pa")
-    print(f"{arguments.out}: {len(snapshots)} samples")
+    print(_left(runs[0], valve.stroke_m, f"law {arguments.law}, identified"))
+    if extended is not None:
+        runs.append(_played(arguments, path, valve, time_s, reference_m, extended))
+        print(_left(runs[1], valve.stroke_m, f"law {arguments.law}, given {arguments.extended}"))
+    last = runs[-1]
+    write_recording(arguments.out, _recording(last.snapshots, float(time_s[0]) - last.begin_s, valve.name))
+    print(f"{arguments.out}: {len(last.snapshots)} samples")
     return 0
+
+
+def _left(played: Run, stroke_m: float, name: str) -> str:
+    return f"error of the stem ({name}): {100 * played.error_m / stroke_m:.3f} % of stroke rms"
+
+
+def _played(
+    arguments: argparse.Namespace,
+    path: Path,
+    valve: "ValveParameters",
+    time_s: "Column",
+    reference_m: "Column",
+    extended: "ExtendedValve | None",
+) -> Run:
+    """Let the daemon identify the valve, or give it the extended one, and follow the reference."""
+    from positioner.control.settings import Settings
+    from positioner.virtual.virtual_cycle import identified, played, virtual_cycle
+    from sim.slave.modbus_slave import device_of
+
+    daemon, slave = _files(arguments, valve)
+    device = device_of(slave, path)
+    cycle = virtual_cycle(daemon, device, _first_requests(valve), Settings.of(daemon, extended))
+    snapshots = [cycle.snapshot]
+    if extended is None:
+        within_s = daemon.excitation.staircase_limit_s if daemon.by_slides else IDENTIFY_S
+        snapshots = list(identified(cycle, within_s, wait=not daemon.by_slides))
+    begin_s = snapshots[-1].sample.time_s
+    ask = _script(time_s, reference_m, begin_s)
+    stem_m = []
+    for snapshot in islice(played(cycle, ask, begin_s + float(time_s[-1] - time_s[0])), 1, None):
+        snapshots.append(snapshot)
+        stem_m.append(device.stem_m)
+    return Run(snapshots, begin_s, stem_m)
 
 
 def _require_travel(path: Path, reference_m: "Column", stroke_m: float) -> None:
@@ -85,6 +149,7 @@ def _files(arguments: argparse.Namespace, valve: "ValveParameters") -> tuple["Da
         "cycle": {"pace": "device", "period_s": arguments.period_s},
         "pressure": {"maximum_pa": most_pa},
         "control": {"law": arguments.law},
+        **({} if arguments.extended is None else {"law": {"valve": arguments.extended}}),
     }
     slave = {
         "clock": {"mode": "lockstep", "period_s": arguments.period_s},

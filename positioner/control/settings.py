@@ -79,7 +79,9 @@ class Settings:
             ),
             applied=Applied(_ratios(file.law) if valve is None else straight_law(valve)),
             law=LAWS.get(file.control.law, balance_pa) if valve is None else _inverse(valve),
-            law_with_memory=WITH_MEMORY[file.control.law](file) if file.control.law in WITH_MEMORY else None,
+            law_with_memory=WITH_MEMORY[file.control.law](_within_supply(file, valve))
+            if file.control.law in WITH_MEMORY
+            else None,
             staircase=_staircase(file) if file.by_slides else None,
             delivered_pa=file.device.delivered_pa,
             valve=valve,
@@ -88,6 +90,17 @@ class Settings:
     def safe_pa(self, action: ActionName, held_pa: float) -> float:
         """Return the pressure of a safe action: hold what is held, vent to the minimum, or fill to the maximum."""
         return {"hold": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa}[action]
+
+
+def _within_supply(file: DaemonFile, valve: ExtendedValve | None) -> DaemonFile:
+    """Return the file with its pressures narrowed to those that the extended valve's supply gives."""
+    if valve is None:
+        return file
+    pressure = {
+        "minimum_pa": max(file.pressure.minimum_pa, valve.inverse.least_pa),
+        "maximum_pa": min(file.pressure.maximum_pa, valve.inverse.most_pa),
+    }
+    return file.model_copy(update={"pressure": file.pressure.model_copy(update=pressure)})
 
 
 def _breakaway(file: DaemonFile) -> BreakawaySettings:

@@ -37,6 +37,11 @@ class Plant(Protocol):
         ...
 
     @property
+    def position_m(self) -> float:
+        """The true stem position."""
+        ...
+
+    @property
     def indicated_m(self) -> float:
         """The stem position as the linkage shows it, without noise."""
         ...
@@ -79,6 +84,11 @@ class Device:
         self.drops = False
         self._boot()
         self._measure()
+
+    @property
+    def stem_m(self) -> float:
+        """The true stem position, which no bus serves: for judging what a positioner leaves."""
+        return self._valve.position_m
 
     @property
     def samples(self) -> int:

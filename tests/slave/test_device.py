@@ -17,7 +17,7 @@ class Witness:
 
     def __init__(self) -> None:
         self.pressure_pa = 0.0
-        self.indicated_m = 0.0
+        self.position_m = self.indicated_m = 0.0
         self.told: list[tuple[float, float]] = []
         self.changes: list[tuple[int, dict[str, float]]] = []
 

@@ -1,0 +1,51 @@
+"""The law of slides with an extended valve: small steps on valves that no straight law describes land at once."""
+
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
+from config.extended_valve import ExtendedValve
+from config.valve_file import ValveFile
+from positioner.control.slide_inverse import with_margins_at
+from positioner.control.slide_memory import SlideMemory
+from sim.composition import Composition
+from sim.static_inverse import extended_valve
+from tests.sim.library import EFFECTS, SEED, library, theta_with
+
+COURSE = Course(steps=15, period_s=0.02, step_s=1.0, seed=0)
+
+
+def switched_on(name: str) -> tuple[Composition, ExtendedValve]:
+    """Return the seed's valve with an effect, and what is known of it."""
+    table = typical(EFFECTS[name])
+    values = [float(each) for each in table.parameters.values()]
+    composition = replace(library(), theta=theta_with(EFFECTS[name], values))
+    return composition, extended_valve(ValveFile(valve=SEED.valve, effect=(table,)), name)
+
+
+@pytest.mark.parametrize("name", ["spring_hardening", "pressure_friction", "sensor_nonlinearity", "backlash"])
+def test_the_stem_lands_where_the_reference_is_without_an_identification(name: str) -> None:
+    composition, extended = switched_on(name)
+    assert COURSE.outcome(composition, extended).rms < 1e-4
+
+
+def test_the_first_slide_to_a_place_lands_there() -> None:
+    composition, extended = switched_on("flow_force")
+    loop = Loop(composition, extended, COURSE.period_s, seed=0)
+    for share in (0.45, 0.62, 0.5):
+        before = loop.cycle.snapshot.decision.command_pa
+        loop.step_to(share * STROKE_M)
+        assert loop.stand(1.5) == pytest.approx(share * STROKE_M, abs=1e-4 * STROKE_M)
+        assert loop.cycle.snapshot.decision.command_pa != before
+
+
+def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:
+    _, extended = switched_on("position_friction")
+    first = with_margins_at(SlideMemory(), 0.2 * STROKE_M, extended)
+    assert first.up.way_m == pytest.approx(1.02 * extended.margin_m(0.2 * STROKE_M, 1))
+    learnt = first.with_margin(1, replace(first.up, way_m=1.06 * first.up.way_m))
+    there = with_margins_at(learnt, 0.8 * STROKE_M, extended)
+    assert there.up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1))
+    assert there.down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
+    assert with_margins_at(there, 0.8 * STROKE_M, extended) is there

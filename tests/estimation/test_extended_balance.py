@@ -1,0 +1,63 @@
+"""The pressures of an extended valve, and what landings say on top of them."""
+
+from collections.abc import Callable
+
+import pytest
+
+from config.extended_valve import ExtendedValve, Inverse
+from positioner.estimation.landings.extended_balance import extended_landing_pa, straight_law
+from positioner.estimation.landings.landing_detector import SlideOutcome
+
+L, SLOPE, BEND, F_C, OFFSET = 0.1, 8e5, 3e6, 2e4, 5e3
+GRID = tuple(L * i / 200 for i in range(201))
+
+
+def table(pressure_pa: Callable[[float], float]) -> tuple[float, ...]:
+    return tuple(pressure_pa(x) for x in GRID)
+
+
+def bent_pa(x: float) -> float:
+    return SLOPE * x + BEND * x * x + OFFSET
+
+
+VALVE = ExtendedValve(
+    name="bent",
+    stroke_m=L,
+    up_pa=table(lambda x: bent_pa(x) + F_C),
+    down_pa=table(lambda x: bent_pa(x) - F_C),
+    breakaway_up_pa=table(lambda x: bent_pa(x) + 1.2 * F_C),
+    breakaway_down_pa=table(lambda x: bent_pa(x) - 1.2 * F_C),
+    indicated_m=GRID,
+    inverse=Inverse(),
+)
+
+
+def landing(x: float, s: int, beyond_pa: float) -> SlideOutcome:
+    command_pa = bent_pa(x) + s * F_C + beyond_pa
+    return SlideOutcome(0.0, s, x - s * 0.02, command_pa, x, 1e-6, moved=True, landing=True)
+
+
+@pytest.mark.parametrize("s", [1, -1])
+def test_without_landings_it_is_the_table(s: int) -> None:
+    assert extended_landing_pa(0.04, s, VALVE, []) == pytest.approx(bent_pa(0.04) + s * F_C, rel=1e-4)
+
+
+def test_friction_that_has_grown_is_followed_over_the_whole_travel_in_its_direction() -> None:
+    landings = [landing(x, 1, 3e3) for x in (0.02, 0.05, 0.03)]
+    for x in (0.01, 0.05, 0.09):
+        assert extended_landing_pa(x, 1, VALVE, landings) - VALVE.landing_pa(x, 1) == pytest.approx(3e3, rel=0.05)
+        assert extended_landing_pa(x, -1, VALVE, landings) == VALVE.landing_pa(x, -1)
+
+
+def test_what_one_place_alone_says_stays_there() -> None:
+    landings = [landing(0.05, 1, 2e3), *(landing(x, 1, 0.0) for x in (0.02, 0.08, 0.02, 0.08))]
+    near, far = (extended_landing_pa(x, 1, VALVE, landings) - VALVE.landing_pa(x, 1) for x in (0.05, 0.08))
+    assert near == pytest.approx(2e3, rel=0.1)
+    assert abs(far) < 0.5e3
+
+
+def test_the_straight_law_is_the_secant() -> None:
+    ratios = straight_law(VALVE)
+    assert ratios.b_over_c == pytest.approx(-(bent_pa(0.075) - bent_pa(0.025)) / 0.05, rel=1e-4)
+    assert ratios.k_over_c == pytest.approx(-F_C, rel=1e-6)
+    assert ratios.balance_pa(0.025, 1) == pytest.approx(bent_pa(0.025) + F_C, rel=1e-4)
