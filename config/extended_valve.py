@@ -16,6 +16,8 @@ from math import inf
 from typing import NamedTuple
 
 Table = tuple[float, ...]
+INSTANT = 1e9
+"""Pa/s: a pressure that changes so fast is there at once."""
 SAME_STROKE, SAME_BREAKAWAY = 1e-3, 1.5
 """Share of the stroke, and factor on F_s/A, by which two descriptions of one valve may differ."""
 
@@ -41,6 +43,11 @@ class Inverse(NamedTuple):
     """Friction changes by this share each second."""
     yielding_n_per_m: float = inf
     """The stuck stem yields with this stiffness."""
+
+    @property
+    def delays(self) -> bool:
+        """Whether the pressure arrives later than its command."""
+        return self.lag_s > 0.0 or self.dead_time_s > 0.0 or min(self.filling_pa_per_s, self.venting_pa_per_s) < INSTANT
 
     def joined(self, other: "Inverse") -> "Inverse":
         """Return what undoes both."""

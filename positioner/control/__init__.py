@@ -10,6 +10,7 @@ real time.
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
     slide_law, slide_memory                     the law of slides: nothing, one or two, and how far a slide is sent
     slide_inverse                               what the law of slides takes from an extended valve
+    pressure_path                               lead against a slow pressure of an extended valve, and its arrival
     conventional_law                            PI on position, to compare the others with
     law_memory                                  the law with a memory that is in force, whichever it is
     pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, State
+from positioner.control import pressure_path
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
 from positioner.control.law_memory import held_pa as held_by_law_pa
+from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -38,7 +40,9 @@ class ControllerMemory(NamedTuple):
     """What the controller remembers from one step to the next; a tuple, for it is made anew in each."""
 
     command_pa: float
-    """The last command given."""
+    """The last command given, ..."""
+    wanted_pa: float
+    """... and the pressure that it shall bring about: another, where it leads against a lag."""
     held_pa: float
     """What S0 holds, and what it gets back after S3."""
     supervision: SupervisionMemory
@@ -50,6 +54,8 @@ class ControllerMemory(NamedTuple):
     identifying: bool
     law: LawMemory | None
     """None: a law without a memory."""
+    path: PathMemory | None
+    """None: nothing is known of a pressure that arrives late."""
 
 
 class Decision(NamedTuple):
@@ -77,6 +83,7 @@ class Controller:
         self._statics = StaticIdentification(settings.limits.stroke_m, valve=settings.valve)
         self._memory = ControllerMemory(
             command_pa=held_pa,
+            wanted_pa=held_pa,
             held_pa=held_pa,
             supervision=SupervisionMemory(),
             reference=Reference(0.0),
@@ -86,12 +93,18 @@ class Controller:
             excitation=None,
             identifying=False,
             law=first_memory(settings.law_with_memory, held_pa),
+            path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
         )
 
     @property
     def command_pa(self) -> float:
         """The last command given."""
         return self._memory.command_pa
+
+    @property
+    def left_pa(self) -> float:
+        """What it holds from now on if it is left: no push, and no lead."""
+        return held_by_law_pa(self._memory.law, self._memory.wanted_pa)
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
@@ -120,7 +133,7 @@ def step(
         sample,
         requests,
         settings,
-        held_pa=memory.command_pa,
+        held_pa=memory.wanted_pa,
         reference=reference,
         ratios=memory.applied.ratios,
     )
@@ -128,7 +141,12 @@ def step(
         statics.restart()
     outcome = None
     if fresh:
-        outcome = statics.update(sample.now_s, sample.position_m, memory.command_pa, sample.pressure_pa)
+        arrived = (
+            memory.path is None
+            or settings.valve is None
+            or memory.path.has_arrived(sample.now_s, settings.valve.inverse)
+        )
+        outcome = statics.update(sample.now_s, sample.position_m, memory.wanted_pa, sample.pressure_pa, arrived=arrived)
     if excitation is not None and fresh:
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
@@ -148,7 +166,7 @@ def step(
         seen = LawInput(
             sample=sample,
             usable=fresh,
-            command_pa=memory.command_pa,
+            command_pa=memory.wanted_pa,
             reference_m=reference.value_m,
             ratios=applied.ratios if state in (State.S1_UP, State.S2_DOWN) else None,
             estimates=identification.estimates,
@@ -160,18 +178,21 @@ def step(
         law_memory = after_step(memory.law, settings.law_with_memory, seen)
 
     if supervision.fault is not Fault.NONE:
-        wanted_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
+        asked_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
-        wanted_pa = requests.manual_pa
+        asked_pa = requests.manual_pa
     else:
-        wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, law_memory)
-    limited_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
-    command_pa = settings.delivered_pa(limited_pa)
+        asked_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, law_memory)
+    limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
+    wanted_pa = settings.delivered_pa(limited_pa)
+    follows = supervision.fault is Fault.NONE and state in (State.S1_UP, State.S2_DOWN)
+    path = _path(memory.path, sample.now_s, wanted_pa, settings, lead=follows)
+    command_pa = wanted_pa if path is None else path.command_pa
 
     inhibit_reason = (
         excitation_inhibit if excitation_inhibit is not InhibitReason.NOTHING else law_inhibit_reason(situation)
     )
-    if inhibit_reason is InhibitReason.NOTHING and limited_pa != wanted_pa:
+    if inhibit_reason is InhibitReason.NOTHING and limited_pa != asked_pa:
         inhibit_reason = InhibitReason.LAW_BEYOND_LIMITS
     if inhibit_reason is InhibitReason.NOTHING and law_memory is not None:
         inhibit_reason = law_memory.inhibit_reason
@@ -190,6 +211,7 @@ def step(
     )
     return ControllerMemory(
         command_pa,
+        wanted_pa,
         held_pa,
         supervision,
         reference,
@@ -199,7 +221,19 @@ def step(
         excitation,
         identifying,
         law_memory,
+        path,
     ), decision
+
+
+def _path(
+    memory: PathMemory | None, now_s: float, wanted_pa: float, settings: Settings, *, lead: bool
+) -> PathMemory | None:
+    """Return what is remembered of the pressure on its way, and with it the command; None where nothing is known."""
+    if memory is None or settings.valve is None:
+        return None
+    limits_pa = (settings.minimum_pa, settings.maximum_pa)
+    path = pressure_path.after_step(memory, now_s, wanted_pa, settings.valve.inverse, limits_pa, lead=lead)
+    return path._replace(command_pa=settings.delivered_pa(path.command_pa))
 
 
 def _consumed(memory: ControllerMemory, mode: Mode, requests: Requests) -> ConsumedRequests:
@@ -282,7 +316,7 @@ def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMem
         return sample.held_pa
     if State.S3_IDENTIFY in (memory.state, state):
         return memory.held_pa
-    return held_by_law_pa(memory.law, memory.command_pa)
+    return held_by_law_pa(memory.law, memory.wanted_pa)
 
 
 def _pressure_pa(

@@ -68,7 +68,7 @@ class ServedValve:
     def leave(self) -> None:
         """Give the device the command of the safe action."""
         with logging_valve(self.name):
-            self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.command_pa))
+            self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.left_pa))
 
 
 def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[ExtendedValve | None]) -> int:

@@ -99,14 +99,22 @@ class LandingDetector:
     def _visible_m(self, rest: Rest) -> float:
         return max(VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m)
 
-    def update(self, time_s: float, position_m: float, command_pa: float, pressure_pa: float) -> SlideOutcome | None:
-        """Take a sample and the command in force since; return what a change of the command did once it is known."""
+    def update(
+        self, time_s: float, position_m: float, command_pa: float, pressure_pa: float, *, arrived: bool = True
+    ) -> SlideOutcome | None:
+        """Take a sample and the command in force since; return what a change of the command did once it is known.
+
+        A change counts from when its pressure has arrived, where somebody knows that.
+        """
         self._learn_quantum(position_m)
         if command_pa != self._level_pa:
             self._change_level(time_s, command_pa)
         if self._running_on:
             self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
         self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
+        if not arrived:
+            self._level_s = time_s
+            self._window.restart(time_s)
         if self.rest is None or self.rest.count < ENOUGH:
             self._window.add(time_s, position_m, pressure_pa)
         rest = self._window.rest

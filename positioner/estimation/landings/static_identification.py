@@ -65,13 +65,19 @@ class StaticIdentification:
         self._elsewhere = 0
         self.law: StaticLaw = no_static_law(Refusal.LANDINGS_TOO_FEW)
 
-    def update(self, time_s: float, position_m: float, command_pa: float, pressure_pa: float) -> SlideOutcome | None:
+    def update(
+        self, time_s: float, position_m: float, command_pa: float, pressure_pa: float, *, arrived: bool = True
+    ) -> SlideOutcome | None:
         """Take a sample, the command in force and the measured pressure (NaN: none): s, m, Pa.
+
+        Args:
+            time_s, position_m, command_pa, pressure_pa: as said.
+            arrived: False where it is known that the pressure has not arrived yet.
 
         Returns:
             What a change of the command did, once that is known.
         """
-        outcome = self.detector.update(time_s, position_m, command_pa, pressure_pa)
+        outcome = self.detector.update(time_s, position_m, command_pa, pressure_pa, arrived=arrived)
         if outcome is None:
             return None
         if self._valve is not None:
