@@ -23,7 +23,7 @@ from math import exp, inf, log, sqrt
 
 import numpy as np
 
-from config.codes import Mode, Refusal
+from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
