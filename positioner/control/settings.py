@@ -39,6 +39,11 @@ class Settings:
     delivered_pa: Callable[[float], float]
     """The command, Pa, that the device can be told in place of one."""
 
+    @property
+    def moves_by_single_steps(self) -> bool:
+        """Whether the law commands a pressure and waits for what it does."""
+        return self.law_with_memory is None or isinstance(self.law_with_memory, SlideSettings)
+
     @classmethod
     def of(cls, file: DaemonFile) -> "Settings":
         """Return the settings a daemon file asks for."""
