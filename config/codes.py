@@ -80,6 +80,18 @@ class InhibitReason(Code):
     EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond the limit set"
     EXCURSION_WAITS = 12, "a small move waits, for the last excursion was too recent"
     STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"
+    RESTORED_WAITS = 17, "a reference waits until the stem rests, for what was restored is provisional"
+    RESTORED_CONTRADICTED = 18, "the first landings contradict what was restored: identify the valve"
+
+
+class Restored(Code):
+    """What has become of what the daemon knew of the valve before it was started anew."""
+
+    NOTHING = 0, "nothing was"
+    PROVISIONAL = 1, "provisional: the first landings must agree"
+    CONFIRMED = 2, "confirmed by the first landings"
+    DROPPED = 3, "dropped: a landing contradicts it"
+    REPLACED = 4, "replaced by an identification"
 
 
 class Refusal(Code):

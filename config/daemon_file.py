@@ -195,6 +195,13 @@ class HealthTable(Schema):
         return self
 
 
+class MemoryTable(Schema):
+    """Table `[memory]`: where what is known of a valve is kept over restarts."""
+
+    folder: str | None = None
+    """One small file for each valve there; without it each start knows nothing of the last."""
+
+
 class LogTable(Schema):
     """Table `[log]`: JSON lines on standard error."""
 
@@ -216,6 +223,7 @@ class DaemonFile(Schema):
     supervisory: SupervisoryTable = SupervisoryTable()
     recorder: RecorderTable | None = None
     health: HealthTable = HealthTable()
+    memory: MemoryTable = MemoryTable()
     log: LogTable = LogTable()
 
     @property

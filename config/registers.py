@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Literal
 
-from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, State, listed
+from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, Restored, State, listed
 from config.errors import InputError
 from config.quantities import DeviceStatus, listed_bits
 from config.register_format import Format, WireType
@@ -107,6 +107,8 @@ STATUS = (
     Register("delta_r", 114, "float32", "p.u.", "last change of the reference, kept until the next"),
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
+    Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {listed(Restored)}"),
+    Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
 
 ESTIMATED = ("a", "b", "c", "k", "b_over_c", "k_over_c")

@@ -14,6 +14,7 @@ real time.
     conventional_law                            PI on position, to compare the others with
     law_memory                                  the law with a memory that is in force, whichever it is
     pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress
+    valve_knowledge, restoration                what is known of a valve, as data; is it still true after a restart
     rest_detector                               where the stem rests
     excitation                                  S3: which excitation is under way, and when it ends
     sine_excitation, staircase_excitation       a sine, or a staircase of slides

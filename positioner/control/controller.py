@@ -7,7 +7,7 @@ the running integrals of the identification. It reads no clock.
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from config.codes import Fault, InhibitReason, Mode, State
+from config.codes import Fault, InhibitReason, Mode, Refusal, Restored, State
 from positioner.control import pressure_path
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
@@ -15,13 +15,16 @@ from positioner.control.law_memory import held_pa as held_by_law_pa
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
+from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import SupervisionMemory, supervise, usable
+from positioner.control.valve_knowledge import ValveKnowledge, known, with_learnt
 from positioner.estimation.acceptance import Applied, accept
 from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.static_law import StaticLaw
 from positioner.estimation.online import Identification
@@ -56,6 +59,7 @@ class ControllerMemory(NamedTuple):
     """None: a law without a memory."""
     path: PathMemory | None
     """None: nothing is known of a pressure that arrives late."""
+    restoration: Restoration
 
 
 class Decision(NamedTuple):
@@ -72,28 +76,45 @@ class Decision(NamedTuple):
     estimates: Estimates
     applied: Applied
     static_law: StaticLaw
+    restoration: Restoration
 
 
 class Controller:
-    """The control core with its memory. `held_pa` is the command the device has at the start: it is held."""
+    """The control core with its memory.
 
-    def __init__(self, settings: Settings, held_pa: float, refiner: Refiner | None = None) -> None:
+    Args:
+        settings: of the valve.
+        held_pa: the command the device has at the start: it is held.
+        refiner: of identifications.
+        restored: what was known of the valve before a restart.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        held_pa: float,
+        refiner: Refiner | None = None,
+        restored: ValveKnowledge | None = None,
+    ) -> None:
         self._settings = settings
         self._identification = Identification(settings.identification, refiner)
         self._statics = StaticIdentification(settings.limits.stroke_m, valve=settings.valve)
+        if restored is not None:
+            self._statics.restore(restored.landings, restored.held, restored.answers)
         self._memory = ControllerMemory(
             command_pa=held_pa,
             wanted_pa=held_pa,
             held_pa=held_pa,
             supervision=SupervisionMemory(),
             reference=Reference(0.0),
-            applied=settings.applied,
+            applied=settings.applied if restored is None else Applied(restored.ratios),
             consumed=ConsumedRequests(),
             state=State.S0_START,
             excitation=None,
             identifying=False,
-            law=first_memory(settings.law_with_memory, held_pa),
+            law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored),
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
+            restoration=Restoration.of(restored),
         )
 
     @property
@@ -105,6 +126,20 @@ class Controller:
     def left_pa(self) -> float:
         """What it holds from now on if it is left: no push, and no lead."""
         return held_by_law_pa(self._memory.law, self._memory.wanted_pa)
+
+    @property
+    def knowledge(self) -> ValveKnowledge | None:
+        """What is to be kept over a restart; None while nothing was identified, or what was restored is not confirmed.
+
+        May be asked by another thread: all it is made of is replaced whole.
+        """
+        memory = self._memory
+        trust, exciting = memory.restoration.trust, memory.excitation is not None and not memory.excitation.ended
+        found = trust is Restored.CONFIRMED or (memory.applied.count > 0 and trust is not Restored.PROVISIONAL)
+        if memory.applied.ratios is None or not found or exciting:
+            return None
+        stroke_m = self._settings.limits.stroke_m
+        return known(memory.applied.ratios, self._identification.estimates, self._statics, memory.law, stroke_m)
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
@@ -126,7 +161,8 @@ def step(
     fresh = usable(sample, settings.limits)
     supervision = supervise(memory.supervision, sample, memory.command_pa, requests, settings.limits)
     consumed = _consumed(memory, supervision.mode, requests)
-    reference = _reference(memory, supervision.mode, consumed, requests, sample.position_m if fresh else None)
+    waits = _waits(memory, supervision.mode, requests, settings, statics)
+    reference = _reference(memory, supervision.mode, consumed, requests, sample.position_m if fresh else None, waits)
     excitation, excitation_inhibit = excitation_after(
         memory.excitation,
         supervision.mode,
@@ -151,13 +187,18 @@ def step(
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
     identifying, applied = _identify(memory, excitation, sample, fresh, requests, identification, statics)
-    if outcome is not None and outcome.landing:
+    restoration = _restoration(memory, applied, outcome if excitation is None else None, settings)
+    dropped = restoration.trust is Restored.DROPPED
+    if dropped and memory.restoration.provisional:
+        memory, applied = _nothing_known(memory, applied, settings, statics)
+    elif outcome is not None and outcome.landing:
         applied = statics.corrected(applied)
     situation = Situation(
         automatic=supervision.mode is Mode.AUTOMATIC,
         exciting=excitation is not None and not excitation.ended,
         law_ready=applied.ratios is not None,
         delta_r_m=reference.delta_m,
+        dropped=dropped,
     )
     state = state_in(situation)
     held_pa = _held_pa(memory, state, supervision, sample)
@@ -190,12 +231,12 @@ def step(
     command_pa = wanted_pa if path is None else path.command_pa
 
     inhibit_reason = (
-        excitation_inhibit if excitation_inhibit is not InhibitReason.NOTHING else law_inhibit_reason(situation)
+        excitation_inhibit
+        or (InhibitReason.RESTORED_WAITS if waits else InhibitReason.NOTHING)
+        or law_inhibit_reason(situation)
+        or (InhibitReason.LAW_BEYOND_LIMITS if limited_pa != asked_pa else InhibitReason.NOTHING)
+        or (law_memory.inhibit_reason if law_memory is not None else InhibitReason.NOTHING)
     )
-    if inhibit_reason is InhibitReason.NOTHING and limited_pa != asked_pa:
-        inhibit_reason = InhibitReason.LAW_BEYOND_LIMITS
-    if inhibit_reason is InhibitReason.NOTHING and law_memory is not None:
-        inhibit_reason = law_memory.inhibit_reason
     decision = Decision(
         command_pa=command_pa,
         state=state,
@@ -208,6 +249,7 @@ def step(
         estimates=_estimates(excitation, identification, statics),
         applied=applied,
         static_law=statics.law,
+        restoration=restoration,
     )
     return ControllerMemory(
         command_pa,
@@ -222,6 +264,7 @@ def step(
         identifying,
         law_memory,
         path,
+        restoration,
     ), decision
 
 
@@ -234,6 +277,37 @@ def _path(
     limits_pa = (settings.minimum_pa, settings.maximum_pa)
     path = pressure_path.after_step(memory, now_s, wanted_pa, settings.valve.inverse, limits_pa, lead=lead)
     return path._replace(command_pa=settings.delivered_pa(path.command_pa))
+
+
+def _nothing_known(
+    memory: ControllerMemory, applied: Applied, settings: Settings, statics: StaticIdentification
+) -> tuple[ControllerMemory, Applied]:
+    """Forget what was restored, with all that a law has learnt by it: nothing is left to command by."""
+    statics.restart()
+    law = first_memory(settings.law_with_memory, memory.wanted_pa)
+    return memory._replace(law=law), replace(applied, ratios=None, last_refusal=Refusal.CONTRADICTED_BY_LANDINGS)
+
+
+def _waits(
+    memory: ControllerMemory, mode: Mode, requests: Requests, settings: Settings, statics: StaticIdentification
+) -> bool:
+    """Whether a reference must wait for the landing of the move before it, which says whether what was restored holds.
+
+    A law that commands all the while has no such moves.
+    """
+    if not memory.restoration.provisional or mode is not Mode.AUTOMATIC or not settings.moves_by_single_steps:
+        return False
+    asked = requests.reference_writes != memory.consumed.reference_writes
+    return asked and requests.reference_m != memory.reference.value_m and statics.detector.rest is None
+
+
+def _restoration(
+    memory: ControllerMemory, applied: Applied, outcome: SlideOutcome | None, settings: Settings
+) -> Restoration:
+    """Return what has become of what was restored; an identification that is applied takes its place."""
+    if applied.count != memory.applied.count:
+        return memory.restoration.replaced()
+    return memory.restoration.after(outcome, settings.limits.stroke_m)
 
 
 def _consumed(memory: ControllerMemory, mode: Mode, requests: Requests) -> ConsumedRequests:
@@ -253,13 +327,15 @@ def _reference(
     consumed: ConsumedRequests,
     requests: Requests,
     stem_m: float | None,
+    waits: bool,
 ) -> Reference:
     """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
     if mode is not Mode.AUTOMATIC or memory.supervision.mode is not mode:
         start = Reference(start.value_m if stem_m is None else stem_m)
-    return start.follow(requests.reference_m) if mode is Mode.AUTOMATIC and written else start
+    follows = mode is Mode.AUTOMATIC and written and not waits
+    return start.follow(requests.reference_m) if follows else start
 
 
 def _identify(

@@ -43,6 +43,11 @@ class Settings:
     valve: ExtendedValve | None
     """Whose static inverse the laws work with, in place of a straight law."""
 
+    @property
+    def moves_by_single_steps(self) -> bool:
+        """Whether the law commands a pressure and waits for what it does."""
+        return self.law_with_memory is None or isinstance(self.law_with_memory, SlideSettings)
+
     @classmethod
     def of(cls, file: DaemonFile, valve: ExtendedValve | None = None) -> "Settings":
         """Return the settings a daemon file asks for.

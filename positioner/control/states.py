@@ -21,6 +21,8 @@ class Situation(NamedTuple):
     exciting: bool
     law_ready: bool
     delta_r_m: float
+    dropped: bool = False
+    """Whether what was restored was dropped, and nothing has taken its place."""
 
 
 def state_in(situation: Situation) -> State:
@@ -41,5 +43,5 @@ def law_inhibit_reason(situation: Situation) -> InhibitReason:
     if situation.exciting:
         return InhibitReason.NOTHING
     if not situation.law_ready:
-        return InhibitReason.NO_ESTIMATES
+        return InhibitReason.RESTORED_CONTRADICTED if situation.dropped else InhibitReason.NO_ESTIMATES
     return InhibitReason.NO_MOVE_ASKED if situation.delta_r_m == 0.0 else InhibitReason.NOTHING

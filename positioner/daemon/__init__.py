@@ -9,5 +9,6 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     supervisory_registers         what the DCS reads and writes
     refinement_process            fits in a process of its own
     recorder, logs                recordings and log lines, written beside the cycle
+    memory                        what is known of a valve, kept over restarts
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
 """

@@ -95,7 +95,8 @@ def run_in_turn(cycles: Sequence[Cycle], stop: Event) -> None:
 
 
 def _logged_fields(decision: Decision) -> tuple[object, ...]:
-    return decision.state, decision.mode, decision.fault, decision.inhibit_reason, decision.applied
+    trust = decision.restoration.trust
+    return decision.state, decision.mode, decision.fault, decision.inhibit_reason, decision.applied, trust
 
 
 def _log_decision(decision: Decision) -> None:
@@ -111,6 +112,7 @@ def _log_decision(decision: Decision) -> None:
         identifications=decision.applied.count,
         refusal=decision.applied.last_refusal.name,
         singly=decision.estimates.b.reason.name,
+        restored=decision.restoration.trust.name,
     )
 
 

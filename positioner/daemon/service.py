@@ -28,6 +28,8 @@ from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth
 from positioner.daemon.link import Link
 from positioner.daemon.logs import log_event, logging_valve, start_logging
+from positioner.daemon.memory import MemoryKeeper, StoredMemory
+from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
@@ -49,7 +51,8 @@ class ServedValve:
     controller: Controller
     cycle: Cycle
     recorder: Recorder | None
-    keeper: HealthKeeper
+    keepers: tuple[HealthKeeper | MemoryKeeper, ...]
+    """Of its health, and of what is known of it."""
     unreachable_reason: str | None
     """Why its device could not be reached at the start; the cycle goes on asking."""
 
@@ -103,8 +106,9 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
         on_exit.callback(start_logging(files[0].log.level).stop)
         for valve in valves:
             _announce(valve, server.port)
-            valve.keeper.start()
-            on_exit.callback(valve.keeper.stop)
+            for keeper in valve.keepers:
+                keeper.start()
+                on_exit.callback(keeper.stop)
         print(f"serving {', '.join(valve.name for valve in valves)} on {server.address}", flush=True)
         status = _run(valves, ended)
         for valve in valves:
@@ -136,7 +140,13 @@ def _assembled(
     else:
         _require_plausible(reading, held_pa, settings, where)
     recorder = _recorder(file, source)
-    controller = Controller(settings, held_pa, refinement.refiner(blocking=file.cycle.pace == "device"))
+    memory = _memory(file, source)
+    controller = Controller(
+        settings,
+        held_pa,
+        refinement.refiner(blocking=file.cycle.pace == "device"),
+        memory.kept.knowledge if memory else None,
+    )
     stored = (
         None
         if file.health.folder is None
@@ -145,8 +155,28 @@ def _assembled(
     health = Health(HealthSettings.of(file.health, file.valve.stroke_m), stored.record if stored else None)
     with logging_valve(file.valve.name):
         cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health)
-    keeper = HealthKeeper(health, lambda: cycle.snapshot.decision, file.valve.name, stored)
-    return ServedValve(file, settings, link, controller, cycle, recorder, keeper, unreachable_reason)
+    keepers: list[HealthKeeper | MemoryKeeper] = [
+        HealthKeeper(health, lambda: cycle.snapshot.decision, file.valve.name, stored)
+    ]
+    if memory is not None:
+        keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
+    return ServedValve(file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason)
+
+
+def _memory(file: DaemonFile, source: Path) -> StoredMemory | None:
+    if file.memory.folder is None:
+        return None
+    return StoredMemory.in_folder(source.parent / file.memory.folder, file.valve.name, conditions_of(file))
+
+
+def _memory_keeper(memory: StoredMemory, valve: str, controller: Controller, cycle: Cycle) -> MemoryKeeper:
+    return MemoryKeeper(
+        memory,
+        valve,
+        decided=lambda: cycle.snapshot.decision,
+        knowledge=lambda: controller.knowledge,
+        now_s=lambda: cycle.snapshot.sample.now_s,
+    )
 
 
 def _announce(valve: ServedValve, port: int) -> None:

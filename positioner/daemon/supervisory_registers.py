@@ -244,6 +244,8 @@ def _status_getters(stroke_m: float) -> dict[str, Getter]:
         "delta_r": lambda s, _: s.decision.delta_r_m / stroke_m,
         "sample_age": lambda s, _: s.decision.sample_age_s,
         "reference_in_force": lambda s, _: s.decision.reference_m / stroke_m,
+        "restored": lambda s, _: s.decision.restoration.trust,
+        "restored_agreed": lambda s, _: s.decision.restoration.ups + s.decision.restoration.downs,
     }
 
 

@@ -230,7 +230,9 @@ class Identification:
             self.estimates = replace(refined, breakaway=with_validity(broke_away, self._settings.largest_relative_std))
             self.moves += self._passive
         elif not self._passive:
-            self.estimates = replace(self.estimates, progress=1.0)
+            # What the model cannot say of these samples, the integrals of the same samples do not know either.
+            refused = result.fit is not None and not fits
+            self.estimates = refined if refused else replace(self.estimates, progress=1.0)
 
     def _request(self, parameters: bool, friction: bool) -> None:
         self._requested = (parameters, friction)
@@ -343,7 +345,8 @@ class Identification:
 
     def _validity_check(self) -> ValidityCheck:
         settings = self._settings
-        return ValidityCheck(settings.largest_relative_std, self._noise_std_m, settings.pressure_noise_std_pa)
+        noise_m, noise_pa = self._noise_std_m, settings.pressure_noise_std_pa
+        return ValidityCheck(settings.largest_relative_std, noise_m, noise_pa, settings.stroke_m)
 
     def _publish(self, fresh: Estimates) -> None:
         """Take fresh estimates, unless an earlier motion gave estimates with a smaller variance."""

@@ -20,6 +20,10 @@ from positioner.estimation.estimates import Estimate
 from positioner.estimation.friction_estimator import Means, friction
 from positioner.estimation.weighted import Solution
 
+LARGEST_MISFIT = 5.0
+"""Beyond this the samples of the window are not those of the model: a sensor that jumped leaves far more ..."""
+LEAST_MISFIT = 2e-4
+"""... and no less, of the stroke: a smaller misfit moves no estimate that counts."""
 LARGEST_NOISE_SHARE = 0.05
 """Beyond this share of noise in P, a, b and c are biased by more than their standard deviation says."""
 
@@ -32,23 +36,28 @@ class ValidityCheck:
         largest_relative_std: standard deviation allowed, as a share of the value.
         position_noise_m: standard deviation of the white noise of the position.
         pressure_noise_pa: the same of the pressure.
+        stroke_m: full travel.
     """
 
     largest_relative_std: float
     position_noise_m: float
     pressure_noise_pa: float
+    stroke_m: float
 
     def parameters(self, solution: Solution) -> tuple[Estimate, Estimate, Estimate, Estimate]:
         """Return a, b, c and b/c."""
         a, b, c = solution.theta.tolist()
-        singly = _refusal_of_each(solution)
+        together = self._refusal_of_all(solution)
+        singly = _refusal_of_each(solution) if together is Refusal.VALID else together
         unit = np.eye(3)
         ratio = np.array((0.0, 1 / c, -b / c**2))
         return (
             self._estimate(a, _std(solution, unit[0], biased=True), Refusal.A_POSITIVE if a > 0 else None, singly),
             self._estimate(b, _std(solution, unit[1], biased=True), Refusal.B_NOT_NEGATIVE if b >= 0 else None, singly),
             self._estimate(c, _std(solution, unit[2], biased=True), Refusal.C_NOT_POSITIVE if c <= 0 else None, singly),
-            self._estimate(b / c, _std(solution, ratio), Refusal.B_OVER_C_NOT_NEGATIVE if b / c >= 0 else None),
+            self._estimate(
+                b / c, _std(solution, ratio), Refusal.B_OVER_C_NOT_NEGATIVE if b / c >= 0 else None, together
+            ),
         )
 
     def friction(self, solution: Solution, means: Means, direction: int) -> tuple[Estimate, Estimate]:
@@ -63,11 +72,18 @@ class ValidityCheck:
         of_ratio = np.array((-v, -x, -u - direction * k / c)) * direction / c
         k_std = _std(solution, of_k, filters, biased=True)
         ratio_std = _std(solution, of_ratio, filters / c)
-        singly = _refusal_of_each(solution)
+        together = self._refusal_of_all(solution)
+        singly = _refusal_of_each(solution) if together is Refusal.VALID else together
         return (
             self._estimate(k, k_std, Refusal.K_NOT_NEGATIVE if k >= 0 else None, singly),
-            self._estimate(k / c, ratio_std, Refusal.K_OVER_C_NOT_NEGATIVE if k / c >= 0 else None),
+            self._estimate(k / c, ratio_std, Refusal.K_OVER_C_NOT_NEGATIVE if k / c >= 0 else None, together),
         )
+
+    def _refusal_of_all(self, solution: Solution) -> Refusal:
+        """Return why not even the ratios may be used."""
+        left_m = solution.misfit * self.position_noise_m
+        misfits = solution.misfit > LARGEST_MISFIT and left_m > LEAST_MISFIT * self.stroke_m
+        return Refusal.MODEL_DOES_NOT_FIT if misfits else Refusal.VALID
 
     def _estimate(
         self, value: float, std: float, unphysical: Refusal | None, singly: Refusal = Refusal.VALID

@@ -17,6 +17,8 @@ leaves out h^2 Δ / 12, whose mean square is taken for each interval between two
 is sampled.
 
     first order     cov θ = A E[e e'] A'
+    residual        misfit^2 = e' W e / (rows - 3) with e = q - P θ: 1 where noise is all that is left, give or take
+                    chance; a sensor that jumped leaves some hundred
     second order    bias = E[-A δP A e + (P' W P)^-1 δP' W (I - P A) e],     for ν is in P as well (errors in variables)
 
 All numbers here are in the units of `Identifier`: windows of time, strokes, units of pressure.
@@ -24,7 +26,7 @@ All numbers here are in the units of `Identifier`: windows of time, strokes, uni
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import factorial
+from math import factorial, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -105,6 +107,7 @@ class Solution:
             it is well below 1.
         condition: of P in its own units.
         gaps: steps over which commands were missed.
+        misfit: what is left of the rows, in what noise leaves.
     """
 
     theta: Array
@@ -113,6 +116,7 @@ class Solution:
     noise_share: float
     condition: float
     gaps: int
+    misfit: float
 
 
 def solve(
@@ -206,7 +210,14 @@ def _weighed(
         noise_share=float(np.linalg.norm(shares)),
         condition=condition,
         gaps=gaps,
+        misfit=_misfit(weights @ (q - P @ theta)),
     )
+
+
+def _misfit(white: Array) -> float:
+    """Return the size of residuals that are white where noise is all, (rows,); three rows say nothing."""
+    free = len(white) - 3
+    return sqrt(float(white @ white) / free) if free > 0 else 0.0
 
 
 def _root_of_inverse(spread: Array) -> Array:

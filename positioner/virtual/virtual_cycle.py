@@ -13,6 +13,7 @@ from drivers.in_memory import MemoryDriver, Plant
 from positioner.control.controller import Controller
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
+from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, HealthSettings
 from positioner.daemon.link import Link
@@ -24,12 +25,24 @@ Script = Callable[[Snapshot, Requests], Requests]
 """A DCS: what it asks for after a snapshot, given what it asked for before."""
 
 
-def virtual_cycle(daemon: DaemonFile, device: Plant, requests: Requests, settings: Settings | None = None) -> Cycle:
+def virtual_cycle(
+    daemon: DaemonFile,
+    device: Plant,
+    requests: Requests,
+    settings: Settings | None = None,
+    restored: ValveKnowledge | None = None,
+) -> Cycle:
     """Return a daemon's cycle that commands a device in memory, such as that of `sim.slave.modbus_slave`."""
-    return lockstep_cycle(daemon, MemoryDriver(device), requests, settings)
+    return lockstep_cycle(daemon, MemoryDriver(device), requests, settings, restored)
 
 
-def lockstep_cycle(daemon: DaemonFile, driver: Driver, requests: Requests, settings: Settings | None = None) -> Cycle:
+def lockstep_cycle(
+    daemon: DaemonFile,
+    driver: Driver,
+    requests: Requests,
+    settings: Settings | None = None,
+    restored: ValveKnowledge | None = None,
+) -> Cycle:
     """Return a daemon's cycle on a device in lockstep, wherever its driver finds it.
 
     Args:
@@ -37,12 +50,13 @@ def lockstep_cycle(daemon: DaemonFile, driver: Driver, requests: Requests, setti
         driver: of the device.
         requests: what the DCS asks for at first.
         settings: of the controller; those of the file where nobody says.
+        restored: what was known of the valve before.
     """
     pace = DevicePace()
     link = Link(driver, pace)
     held_pa, _ = link.open()
     health = Health(HealthSettings.of(daemon.health, daemon.valve.stroke_m))
-    controller = Controller(settings or Settings.of(daemon), held_pa, InProcessRefiner())
+    controller = Controller(settings or Settings.of(daemon), held_pa, InProcessRefiner(), restored)
     return Cycle(link, controller, pace, requests, recorder=None, health=health)
 
 

@@ -1,14 +1,15 @@
 """What is kept of a valve's health over a restart: one small JSON file, replaced whole.
 
-The file is written beside itself, forced to the disk and renamed, so a crash leaves the old one or the new one. One
+A crash leaves the old one or the new one (`config.whole_file`). One
 that cannot be read is never mended: it is put aside as `FILE.unreadable`, the log says why, and the counts start anew.
 """
 
 import json
 import math
-import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+
+from config.whole_file import replace_whole
 
 VERSION = 1
 
@@ -51,13 +52,8 @@ def write_record(path: Path, valve: str, record: HealthRecord) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    beside = path.with_name(path.name + ".new")
-    with beside.open("w", encoding="utf-8") as file:
-        json.dump({"version": VERSION, "valve": valve, **asdict(record)}, file, allow_nan=False)
-        file.write("\n")
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
+    content = {"version": VERSION, "valve": valve, **asdict(record)}
+    replace_whole(path, json.dumps(content, allow_nan=False) + "\n")
 
 
 def _parsed(text: bytes, valve: str) -> HealthRecord:

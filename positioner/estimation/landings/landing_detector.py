@@ -60,6 +60,16 @@ class SlideOutcome(NamedTuple):
     """Whether the balance of the moving stem holds here."""
 
 
+class Answers(NamedTuple):
+    """How long a stem takes to answer, as learnt: s, s/Pa, Pa; 0: not learnt."""
+
+    longest_s: float = 0.0
+    slowness_s_per_pa: float = 0.0
+    """Of a pressure that moves at a limited rate ..."""
+    large_pa: float = 0.0
+    """... from steps like this."""
+
+
 class LandingDetector:
     """The rests of a stem and how they came about.
 
@@ -68,6 +78,7 @@ class LandingDetector:
         stops_m: positions of the stops, m; by default 0 and the stroke.
 
     Attributes:
+        answers: of the stem.
         rest: of the stem under the command in force; None while it moves or may yet move.
         quantum_m: of the position, whose steps are multiples of it; 0 until a sample differed from the one before it.
     """
@@ -85,7 +96,8 @@ class LandingDetector:
         self._away = 0
         self._known = True
         """Whether what the last change of the command did is known."""
-        self._answer_s = self._slowness_s_per_pa = self._step_pa = self._large_pa = 0.0
+        self.answers = Answers()
+        self._step_pa = 0.0
         self._level_s = self._interval_s = self._time_s = 0.0
         self.rest: Rest | None = None
         self.quantum_m = 0.0
@@ -93,8 +105,9 @@ class LandingDetector:
     def _patience_s(self, rest: Rest) -> float:
         """Return for how long a stem must have been waited for: longer, if it has not moved after a large step."""
         if self._known or abs(rest.position_m - self._from_m) > self._visible_m(rest):
-            return PATIENCE * self._answer_s
-        return PATIENCE * (max(self._answer_s, self._slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S)
+            return PATIENCE * self.answers.longest_s
+        longest_s, slowness_s_per_pa, _ = self.answers
+        return PATIENCE * (max(longest_s, slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S)
 
     def _visible_m(self, rest: Rest) -> float:
         return max(VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m)
@@ -168,10 +181,13 @@ class LandingDetector:
 
     def _learn_answer(self, answer_s: float) -> None:
         """Learn how long the stem takes to answer, in all and for a pressure step (a rate limit)."""
-        self._answer_s = max(answer_s, FORGOTTEN * self._answer_s)
-        self._large_pa = max(self._step_pa, FORGOTTEN * self._large_pa)
-        if self._step_pa > LARGE * self._large_pa:
-            self._slowness_s_per_pa = max(answer_s / self._step_pa, FORGOTTEN * self._slowness_s_per_pa)
+        longest_s, slowness_s_per_pa, large_pa = (FORGOTTEN * each for each in self.answers)
+        large_pa = max(self._step_pa, large_pa)
+        if self._step_pa > LARGE * large_pa:
+            slowness_s_per_pa = max(answer_s / self._step_pa, slowness_s_per_pa)
+        else:
+            slowness_s_per_pa = self.answers.slowness_s_per_pa
+        self.answers = Answers(max(answer_s, longest_s), slowness_s_per_pa, large_pa)
 
     def _outcome(self, time_s: float, rest: Rest) -> SlideOutcome:
         moved = self._sense * (rest.position_m - self._from_m) > self._visible_m(rest)

@@ -5,13 +5,14 @@ others say of b/c and k/c is tested on them: `tested` refuses what lands elsewhe
 """
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 
 from config.codes import Refusal
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
-from positioner.estimation.landings.landing_detector import LandingDetector, SlideOutcome
+from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
 from positioner.estimation.landings.local_balance import ahead_m
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
 
@@ -65,6 +66,14 @@ class StaticIdentification:
         self._elsewhere = 0
         self.law: StaticLaw = no_static_law(Refusal.LANDINGS_TOO_FEW)
 
+    def restore(self, landings: Iterable[SlideOutcome], held: tuple[SlideOutcome, ...], answers: Answers) -> None:
+        """Remember what was known before a restart; the latest first, times negative."""
+        self.restart()
+        for each in reversed(tuple(landings)):
+            self._in_direction[each.direction].appendleft(each)
+        self._solve()
+        self.held, self.detector.answers = held[: self._each], answers
+
     def update(
         self, time_s: float, position_m: float, command_pa: float, pressure_pa: float, *, arrived: bool = True
     ) -> SlideOutcome | None:
@@ -98,6 +107,9 @@ class StaticIdentification:
 
     def _take(self, outcome: SlideOutcome) -> None:
         self._in_direction[outcome.direction].appendleft(outcome)
+        self._solve()
+
+    def _solve(self) -> None:
         both = (*self._in_direction[1], *self._in_direction[-1])
         landings = tuple(sorted(both, key=lambda each: -each.time_s))
         self.law = static_law(landings, self._stroke_m)

@@ -1,0 +1,113 @@
+"""What was restored after a restart is provisional until the first landings agree with it.
+
+It is used at once, so that a valve that has not changed is controlled as before. Each change of the command is a test:
+
+    landing      x = (p - offset - s φ)/κ, corrected by the landings near it, within max(3 deviations, 0.3 % of stroke)
+    no landing   the stem rests where static friction can hold it: no slide by the law from there is much longer than
+                 the shortest that breaks loose, in either direction
+
+The deviation is that of what was kept, widened by 1 % of friction, for a packing that sat still. Three landings that
+agree, one in each direction at least, confirm. One that does not, and all that was restored is dropped: nothing is left
+to command by, the pressure is held, and somebody must identify the valve. Until then a reference waits for the stem to
+rest, so that there is never a second move before the first has been judged.
+"""
+
+from dataclasses import dataclass, replace
+from math import hypot
+
+from config.codes import Restored
+from positioner.control.valve_knowledge import ValveKnowledge
+from positioner.estimation.landings.landing_detector import STOP, VISIBLE, SlideOutcome
+from positioner.estimation.landings.local_balance import landing_pa
+
+DEVIATIONS, LEAST = 3.0, 3e-3
+"""Of the stroke: landings nearer than this agree."""
+SAT_STILL = 0.01
+"""Of friction: a standard deviation of what a packing that was left alone holds more or less."""
+CONFIRMING = 3
+MUCH_LONGER = 2.0
+"""Times the shortest slide that breaks loose."""
+
+
+@dataclass(frozen=True, slots=True)
+class Restoration:
+    """What was restored, and what has become of it.
+
+    Attributes:
+        knowledge: None when nothing was.
+        trust: in it.
+        ups, downs: landings that agreed.
+    """
+
+    knowledge: ValveKnowledge | None = None
+    trust: Restored = Restored.NOTHING
+    ups: int = 0
+    downs: int = 0
+
+    @classmethod
+    def of(cls, knowledge: ValveKnowledge | None) -> "Restoration":
+        """Return what has become of it before anything was seen."""
+        return cls(knowledge, Restored.NOTHING if knowledge is None else Restored.PROVISIONAL)
+
+    @property
+    def provisional(self) -> bool:
+        """Whether landings have still to agree."""
+        return self.trust is Restored.PROVISIONAL
+
+    def replaced(self) -> "Restoration":
+        """Return what has become of it when the valve is identified anew."""
+        return self if self.trust is Restored.NOTHING else replace(self, trust=Restored.REPLACED)
+
+    def after(self, outcome: SlideOutcome | None, stroke_m: float) -> "Restoration":
+        """Return what has become of it after what a change of the command did, if that is known now."""
+        if outcome is None or not self.provisional or self.knowledge is None:
+            return self
+        agrees = _agrees(outcome, self.knowledge, stroke_m)
+        if agrees is None:
+            return self
+        if not agrees:
+            return replace(self, trust=Restored.DROPPED)
+        ups, downs = self.ups + (outcome.direction > 0), self.downs + (outcome.direction < 0)
+        confirmed = ups + downs >= CONFIRMING and min(ups, downs) > 0
+        return replace(self, ups=ups, downs=downs, trust=Restored.CONFIRMED if confirmed else self.trust)
+
+
+def _agrees(outcome: SlideOutcome, knowledge: ValveKnowledge, stroke_m: float) -> bool | None:
+    """Return whether what a change of the command did agrees with what was restored; None: it does not say."""
+    s, at_m = outcome.direction, outcome.position_m
+    should_m = _landing_m(outcome.command_pa, s, knowledge, stroke_m)
+    within_m = _within_m(outcome, should_m, s, knowledge, stroke_m)
+    if outcome.landing:
+        return abs(at_m - should_m) <= within_m
+    went = s * (at_m - outcome.from_m) > VISIBLE * stroke_m
+    free = STOP * stroke_m < at_m < (1 - STOP) * stroke_m
+    if went and not free:  # onto a stop: it should have come to rest before
+        contradicts = within_m < should_m < stroke_m - within_m
+    elif went and s * (should_m - outcome.from_m) > knowledge.shortest_m(s):  # less far than a slide goes
+        contradicts = abs(at_m - should_m) > within_m
+    else:
+        contradicts = free and any(
+            _held_against_m(outcome, d, knowledge, stroke_m) > MUCH_LONGER * knowledge.shortest_m(d) + within_m
+            for d in (1, -1)
+        )
+    return False if contradicts else None
+
+
+def _held_against_m(outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, stroke_m: float) -> float:
+    """Return how far a slide from where the stem rests would go in a direction, m."""
+    return direction * (_landing_m(outcome.command_pa, direction, knowledge, stroke_m) - outcome.position_m)
+
+
+def _landing_m(command_pa: float, direction: int, knowledge: ValveKnowledge, stroke_m: float) -> float:
+    """Return where a slide lands: by the straight law, corrected by what landings near there missed it by."""
+    ratios, straight_m = knowledge.ratios, knowledge.landing_m(command_pa, direction)
+    off_pa = landing_pa(straight_m, direction, ratios, knowledge.landings, stroke_m) - command_pa
+    return straight_m - off_pa / -ratios.b_over_c
+
+
+def _within_m(
+    outcome: SlideOutcome, should_m: float, direction: int, knowledge: ValveKnowledge, stroke_m: float
+) -> float:
+    still_m = SAT_STILL * knowledge.friction_m
+    std_m = hypot(knowledge.deviation_m(should_m, direction), still_m, outcome.std_m)
+    return max(DEVIATIONS * std_m, LEAST * stroke_m)

@@ -1,0 +1,52 @@
+"""For which configuration something is known: the keys of the daemon's file that it hangs on, and their values.
+
+A device that stands elsewhere or scales its registers otherwise is another device; who changes stroke, period, pressure
+limits or table `[law]` knows better than what was learnt. How long a reply may take says nothing of the valve.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from config.daemon_file import DaemonFile
+
+TABLES = ("device", "valve", "pressure", "law")
+KEYS = ("cycle.period_s",)
+OF_THE_LINK = frozenset(
+    {"device.reply_timeout_s", "device.communication_timeout_s", "device.communication_action", "device.tls"}
+)
+"""These say how the device is talked to, not what it is."""
+
+Conditions = Mapping[str, str]
+"""Values by key, both as in the file: what is JSON is TOML."""
+
+
+def conditions_of(file: DaemonFile) -> Conditions:
+    """Return the keys that what is known of a valve hangs on, with their values."""
+    tables = file.model_dump(mode="json")
+    flat = _flat({key: tables[key] for key in TABLES} | {"cycle": {"period_s": file.cycle.period_s}})
+    return {key: value for key, value in sorted(flat.items()) if not _of_the_link(key)}
+
+
+def changed(kept: Conditions, now: Conditions) -> str | None:
+    """Say which key has changed, from what to what; None if none has."""
+    for key in sorted(kept.keys() | now.keys()):
+        was, has = kept.get(key, "nothing"), now.get(key, "nothing")
+        if was != has:
+            return f"{key} was {was}, is {has}"
+    return None
+
+
+def _of_the_link(key: str) -> bool:
+    return any(key == each or key.startswith(f"{each}.") for each in OF_THE_LINK)
+
+
+def _flat(tables: Mapping[str, Any], before: str = "") -> dict[str, str]:
+    """Return what stands in tables by dotted keys; what is not given has no key."""
+    found: dict[str, str] = {}
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{before}{key}.")
+        elif value is not None:
+            found[f"{before}{key}"] = json.dumps(value)
+    return found

@@ -1,0 +1,137 @@
+"""What is known of a valve as JSON, and back. Nothing is taken that could not be true."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from positioner.control.breakaway_memory import LearntPush
+from positioner.control.slide_memory import Margin
+from positioner.control.valve_knowledge import ValveKnowledge
+from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
+
+MOST = 40
+"""Landings, and changes that held."""
+Row = tuple[float, float, float]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+class _Slide(_Record):
+    time_s: float = Field(le=0.0)
+    direction: int
+    from_m: float
+    command_pa: float
+    position_m: float
+    std_m: float = Field(ge=0.0)
+    moved: bool
+    landing: bool
+
+
+class _Margin(_Record):
+    way_m: float = Field(ge=0.0)
+    broke: bool
+    held: bool
+
+
+class _Push(_Record):
+    push_m: float = Field(ge=0.0)
+    moved: bool
+
+
+class KnowledgeRecord(_Record):
+    """What is kept of a valve; SI units."""
+
+    b_over_c_pa_per_m: float = Field(lt=0.0)
+    k_over_c_pa: float = Field(lt=0.0)
+    offset_pa: float
+    covariance: list[list[float]] = Field(min_length=3, max_length=3)
+    residual_m: float = Field(ge=0.0)
+    landings: list[_Slide] = Field(max_length=MOST)
+    held: list[_Slide] = Field(max_length=MOST)
+    answers: list[float] = Field(min_length=3, max_length=3)
+    margins: list[_Margin] | None = Field(min_length=2, max_length=2)
+    pushes: list[_Push] | None = Field(min_length=2, max_length=2)
+    tracked: dict[str, float]
+
+
+def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
+    """Return what is known as it is written."""
+    ratios = knowledge.ratios
+    return {
+        "b_over_c_pa_per_m": ratios.b_over_c,
+        "k_over_c_pa": ratios.k_over_c,
+        "offset_pa": ratios.offset_pa,
+        "covariance": [list(row) for row in knowledge.covariance],
+        "residual_m": knowledge.residual_m,
+        "landings": [each._asdict() for each in knowledge.landings[:MOST] if _finite(each)],
+        "held": [each._asdict() for each in knowledge.held[:MOST] if _finite(each)],
+        "answers": list(knowledge.answers),
+        "margins": _pair(knowledge.margins, "way_m", "broke", "held"),
+        "pushes": _pair(knowledge.pushes, "push_m", "moved"),
+        "tracked": dict(knowledge.tracked),
+    }
+
+
+def knowledge_in(content: object) -> ValveKnowledge:
+    """Return what was written.
+
+    Raises:
+        ValueError: it cannot be true; one line names the key.
+    """
+    try:
+        record = KnowledgeRecord.model_validate(content)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        where = ".".join(str(each) for each in fault["loc"])
+        raise ValueError(f"{where}: {fault['msg']}") from None
+    a, b, c = (_row(row) for row in record.covariance)
+    return ValveKnowledge(
+        ratios=Ratios(record.b_over_c_pa_per_m, record.k_over_c_pa, record.offset_pa),
+        covariance=(a, b, c),
+        residual_m=record.residual_m,
+        landings=_outcomes(record.landings),
+        held=_outcomes(record.held),
+        answers=Answers(*record.answers),
+        margins=_margins(record.margins),
+        pushes=_pushes(record.pushes),
+        tracked=record.tracked,
+    )
+
+
+def _pair(learnt: Sequence[Margin] | Sequence[LearntPush] | None, *names: str) -> list[dict[str, Any]] | None:
+    return None if learnt is None else [{name: getattr(each, name) for name in names} for each in learnt]
+
+
+def _margins(both: list[_Margin] | None) -> tuple[Margin, Margin] | None:
+    if both is None:
+        return None
+    up, down = (Margin(each.way_m, each.broke, each.held) for each in both)
+    return up, down
+
+
+def _pushes(both: list[_Push] | None) -> tuple[LearntPush, LearntPush] | None:
+    if both is None:
+        return None
+    up, down = (LearntPush(each.push_m, each.moved) for each in both)
+    return up, down
+
+
+def _row(row: list[float]) -> Row:
+    if len(row) != 3:
+        raise ValueError("covariance: must be three rows of three numbers")
+    return row[0], row[1], row[2]
+
+
+def _outcomes(slides: list[_Slide]) -> tuple[SlideOutcome, ...]:
+    if any(each.direction not in (1, -1) for each in slides):
+        raise ValueError("direction: must be 1 or -1")
+    return tuple(SlideOutcome(**each.model_dump()) for each in slides)
+
+
+def _finite(each: SlideOutcome) -> bool:
+    return all(math.isfinite(value) for value in (each.from_m, each.command_pa, each.position_m, each.std_m))

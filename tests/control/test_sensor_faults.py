@@ -1,0 +1,47 @@
+"""A position sensor that jumps or freezes in the middle of S3: nothing wrong is ever applied."""
+
+from math import inf, nan
+
+import pytest
+
+from benchmarks.sensor_faults import EXPERIMENTS, NO_FAULT, STROKE_M, SensorFault, identified, off
+from config.codes import Refusal
+from positioner.estimation.refiner import InProcessRefiner, RefinementJob
+
+SINE, *STAIRCASES = EXPERIMENTS
+JUMPS = [SensorFault(at_s, inf, by * STROKE_M) for by in (-0.1, 0.02, 0.1) for at_s in (0.25, 0.5, 0.8)]
+SHORT = [SensorFault(0.5, 1e-3, 0.1 * STROKE_M), SensorFault(0.7, 0.2, -0.02 * STROKE_M), SensorFault(0.4, 0.2, nan)]
+
+
+def wrong(fault: SensorFault, seed: int = 0) -> bool:
+    """Whether S3 by a sine applies what is off by more than its deviations."""
+    decision, _ = identified(SINE, fault, seed)
+    by_m = fault.by_m if fault.by_m == fault.by_m else 0.0
+    return decision.applied.ratios is not None and min(off(SINE, decision, each) for each in (0.0, by_m)) > 1.0
+
+
+@pytest.mark.parametrize("fault", [*JUMPS, *SHORT], ids=str)
+def test_a_sine_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFault) -> None:
+    assert not wrong(fault)
+
+
+@pytest.mark.parametrize("fault", JUMPS, ids=str)
+def test_nor_where_nobody_refines(fault: SensorFault, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The algebraic estimates have a residual of their own."""
+
+    def nobody(_self: InProcessRefiner, _job: RefinementJob) -> bool:
+        return False
+
+    monkeypatch.setattr(InProcessRefiner, "submit", nobody)
+    assert not wrong(fault)
+
+
+def test_the_reason_is_that_the_model_does_not_fit() -> None:
+    decision, _ = identified(SINE, SensorFault(0.5, inf, 0.1 * STROKE_M), 0)
+    assert decision.applied.ratios is None
+    assert decision.applied.last_refusal is Refusal.MODEL_DOES_NOT_FIT
+
+
+def test_without_a_fault_the_same_is_applied() -> None:
+    decision, _ = identified(SINE, NO_FAULT, 0)
+    assert off(SINE, decision, 0.0) < 1.0
