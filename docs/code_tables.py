@@ -5,7 +5,18 @@
 
 from pathlib import Path
 
-from config.codes import Code, Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, Refusal, State
+from config.codes import (
+    Code,
+    ExperimentState,
+    Fault,
+    InhibitReason,
+    Mode,
+    Ne107Cause,
+    Ne107Status,
+    Quality,
+    Refusal,
+    State,
+)
 from positioner.daemon.health.ne107 import CLASS
 
 HERE = Path(__file__).parent
@@ -23,6 +34,7 @@ SERVED: dict[type[Code], str] = {
     Quality: "quality",
     InhibitReason: "why",
     Refusal: "*_reason, refusal",
+    ExperimentState: "experiment_state",
     Ne107Status: "ne107",
     Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes",
 }

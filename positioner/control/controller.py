@@ -11,6 +11,7 @@ from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
 from positioner.control.law_memory import held_pa as held_by_law_pa
+from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -47,6 +48,7 @@ class ControllerMemory(NamedTuple):
     consumed: ConsumedRequests
     state: State
     excitation: ActiveExcitation | None
+    experiment: PlayedExperiment
     identifying: bool
     law: LawMemory | None
     """None: a law without a memory."""
@@ -66,6 +68,7 @@ class Decision(NamedTuple):
     estimates: Estimates
     applied: Applied
     static_law: StaticLaw
+    experiment: PlayedExperiment
 
 
 class Controller:
@@ -84,6 +87,7 @@ class Controller:
             consumed=ConsumedRequests(),
             state=State.S0_START,
             excitation=None,
+            experiment=PlayedExperiment(),
             identifying=False,
             law=first_memory(settings.law_with_memory, held_pa),
         )
@@ -126,6 +130,20 @@ def step(
     )
     if excitation is not None and memory.excitation is None:
         statics.restart()
+    experiment = experiment_after(
+        memory.experiment,
+        requests.experiment,
+        Surroundings(
+            now_s=sample.now_s,
+            mode=supervision.mode,
+            fault=supervision.fault,
+            excited=requests.eta[0] == 0,
+            position_m=sample.position_m if fresh else None,
+            command_pa=memory.command_pa,
+            held_pa=held_by_law_pa(memory.law, memory.command_pa),
+        ),
+        settings.experiment,
+    )
     outcome = None
     if fresh:
         outcome = statics.update(sample.now_s, sample.position_m, memory.command_pa, sample.pressure_pa)
@@ -133,11 +151,11 @@ def step(
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
     identifying, applied = _identify(memory, excitation, sample, fresh, requests, identification, statics)
-    if outcome is not None and outcome.landing:
+    if outcome is not None and outcome.landing and not experiment.commands:
         applied = statics.corrected(applied)
     situation = Situation(
         automatic=supervision.mode is Mode.AUTOMATIC,
-        exciting=excitation is not None and not excitation.ended,
+        exciting=experiment.commands or (excitation is not None and not excitation.ended),
         law_ready=applied.ratios is not None,
         delta_r_m=reference.delta_m,
     )
@@ -163,7 +181,8 @@ def step(
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
         wanted_pa = requests.manual_pa
     else:
-        wanted_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, law_memory)
+        exciting = experiment if experiment.commands else excitation
+        wanted_pa = _pressure_pa(state, held_pa, exciting, sample.now_s, reference, applied, settings, law_memory)
     limited_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
     command_pa = settings.delivered_pa(limited_pa)
 
@@ -186,6 +205,7 @@ def step(
         estimates=_estimates(excitation, identification, statics),
         applied=applied,
         static_law=statics.law,
+        experiment=experiment,
     )
     return ControllerMemory(
         command_pa,
@@ -196,6 +216,7 @@ def step(
         consumed,
         state,
         excitation,
+        experiment,
         identifying,
         law_memory,
     ), decision
@@ -287,7 +308,7 @@ def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMem
 def _pressure_pa(
     state: State,
     held_pa: float,
-    excitation: ActiveExcitation | None,
+    exciting: ActiveExcitation | PlayedExperiment | None,
     now_s: float,
     reference: Reference,
     applied: Applied,
@@ -295,8 +316,8 @@ def _pressure_pa(
     law_memory: LawMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
-    if state is State.S3_IDENTIFY and excitation is not None:
-        return excitation.pressure_pa(now_s)
+    if state is State.S3_IDENTIFY and exciting is not None:
+        return exciting.pressure_pa(now_s)
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
         if law_memory is not None:
             return law_memory.level_pa
