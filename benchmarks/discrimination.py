@@ -7,9 +7,9 @@ one set with more than one class, the hidden effect visible: the same seeds make
 set that was named then, fitted anew to both recordings. The valve answers as `workbench.blind.trial` has it, dirty ones
 with pressure noise, break-away jitter and 12 bits; the hidden effect is looked at after the last round.
 
-Each case is played twice: by experiments designed for the rivals, and by whole inputs of the menu, of which the one
-with the largest separation is chosen anew in every round. Odds, permissives and the rule that stops are the same; the
-menu may use `MENU_BUDGET` moves. A line of JSON is kept a case, so that a run can be broken off and taken up again.
+Each case is played twice: by experiments designed for the rivals, and by whole inputs of the menu, chosen anew in
+every round as a diagnosis chooses. Odds, permissives and the rule that stops are the same; the menu may use
+`MENU_BUDGET` moves. A line of JSON is kept a case, so that a run can be broken off and taken up again.
 """
 
 import argparse
@@ -32,16 +32,15 @@ from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
 from workbench.fit.fitting import Fit, fit
-from workbench.fit.threads import on_threads
 from workbench.select.discrimination import BUDGET, Discrimination, Played, Player, discriminate
 from workbench.select.equivalence import algebraic_class, classes
-from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import Bounds, DesignedExperiment, Rivalry, courses, designed
+from workbench.select.experiment import REST_S, experiment
+from workbench.select.experiment_design import Bounds, DesignedExperiment, courses, designed
 
 PERIOD_S = 0.01
 RATE_PA_PER_S = 400e3
 LONGEST_S = 26.0
-MENU_BUDGET = 240
+MENU_BUDGET = 120
 WHOLE = 1000
 """More moves than an input of the menu has."""
 
@@ -49,17 +48,18 @@ Line = Mapping[str, Any]
 
 
 def menu(
-    fits: Sequence[Fit], record: Record, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+    fits: Sequence[Fit],
+    record: Record,
+    bounds: Bounds,
+    *,
+    seed: int,
+    most_moves: int,  # noqa: ARG001 - its inputs are whole
+    workers: int | None,
 ) -> DesignedExperiment | None:
-    """Choose the whole input of the menu with the largest separation."""
-    rivalry = Rivalry(fits, record, bounds, seed)
-    whole = [each.within(bounds) for each in courses(record, bounds, WHOLE)]
-    allowed = [each for each in whole if each.moves <= most_moves and rivalry.score(each) > -np.inf]
-    rated = list(on_threads(rivalry.separation, allowed, workers))
-    if not rated:
-        return None
-    best = int(np.argmax(rated))
-    return DesignedExperiment(allowed[best], rated[best])
+    """Choose the whole input of the menu as a diagnosis does."""
+    chosen = experiment(fits, record, seed=seed, workers=workers)
+    course = next(each for each in courses(record, bounds, WHOLE) if each.name == chosen.name)
+    return DesignedExperiment(course.within(bounds), np.inf)
 
 
 def player(made: Hidden, dirty: bool, seed: int) -> Player:

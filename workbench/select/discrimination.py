@@ -15,8 +15,8 @@ is named, and the best must explain the experiments as well as a model can. Memb
 
     resolved       the best one's odds have reached 100 : 1
     one_class      all rivals are one by algebra: no record of pressure and position tells them apart
-    not_separable  what the best experiment inside the bounds promises, n sep^2 / 2 for n independent samples, would
-                   not reach these odds however often the budget allowed it
+    not_separable  what the best experiment inside the bounds promises, n/2 log(separation) for n independent samples,
+                   would not reach these odds however often the budget allowed it
     budget_spent   the moves allowed are used up
     unexplained    the best one does not explain the experiments: the effect is none of the rivals
     stopped        the valve did not play an experiment: a permissive, a veto, a fault
@@ -33,7 +33,7 @@ import numpy as np
 from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
-from config.valve_file import ValveFile
+from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import joined
@@ -51,6 +51,7 @@ from workbench.select.block_errors import (
     block_logs,
     relative_error_reduction,
 )
+from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import parameters_json
 from workbench.select.equivalence import classes
 from workbench.select.experiment import REST_S
@@ -62,6 +63,10 @@ if TYPE_CHECKING:
 ODDS = 100.0
 BUDGET = 60
 """Moves."""
+FEW_MOVES, SURE = 3, 3.0
+"""An experiment of few moves will do if it promises so many times the log odds wanted."""
+DOUBT = 2.0
+"""Factor on what an experiment promises before it is given up: it is worked out under few draws of the noise."""
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
 
@@ -247,9 +252,7 @@ def discriminate(
     problem, used = "", 0
     while outcome is None:
         left = budget - used
-        alive = [race.fits[name] for name, odds in race.relative.items() if odds > 1.0 / ODDS]
-        most = min(MOST_MOVES, left)
-        chosen = design(alive, race.record, bounds, seed=seed + len(rounds), most_moves=most, workers=workers)
+        chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
         if chosen is None or not race.worthwhile(chosen, left):
             outcome = "not_separable"
             break
@@ -266,6 +269,27 @@ def discriminate(
         outcome = race.decided or ("budget_spent" if used >= budget else None)
     named = next(each for each in gathered if each[0] == race.best) if outcome in ("resolved", "one_class") else ()
     return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
+
+
+def _chosen(
+    race: "Race", bounds: Bounds, design: Designer, left: int, seed: int, workers: int | None
+) -> DesignedExperiment | None:
+    """Return the experiment of few moves if it promises the odds by itself, else one of more."""
+    chosen = None
+    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES)}):
+        chosen = design(race.alive, race.record, bounds, seed=seed, most_moves=most, workers=workers)
+        if chosen is not None and race.promised(chosen) >= SURE * log(ODDS):
+            break
+    return chosen
+
+
+def rivals_of(diagnosis: Diagnosis) -> dict[str, Fit]:
+    """Return the fits of the first set with more than one member; empty if there is none."""
+    for step in diagnosis.steps:
+        fits = {each.name: each.model.fit for each in step.indistinguishable if each.model}
+        if len(fits) > 1:
+            return fits
+    return {}
 
 
 def log_odds(best: Weighed, rival: Weighed) -> float:
@@ -304,6 +328,12 @@ class Race:
         return {name: exp(-log_odds(best, each)) if name != self.best else 1.0 for name, each in self._all.items()}
 
     @property
+    def alive(self) -> list[Fit]:
+        """Fits of the rivals that have not lost yet, at least two, likeliest first."""
+        ranked = sorted(self.relative.items(), key=lambda each: -each[1])
+        return [self.fits[name] for i, (name, odds) in enumerate(ranked) if i < 2 or odds > 1.0 / ODDS]
+
+    @property
     def odds(self) -> float:
         """The odds of the best against all others together."""
         others = sum(self.relative.values()) - 1.0
@@ -316,11 +346,14 @@ class Race:
             return None
         return "resolved" if self.explained else "unexplained"
 
+    def promised(self, chosen: DesignedExperiment) -> float:
+        """Return by how much an experiment is to raise the log odds."""
+        samples = (chosen.course.duration_s - REST_S) / self.record.period_s
+        return 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
+
     def worthwhile(self, chosen: DesignedExperiment, left: int) -> bool:
         """Whether an experiment, repeated while so many moves are left, promises odds enough."""
-        samples = (chosen.course.duration_s - REST_S) / self.record.period_s
-        promised = 0.5 * self._all[self.best].share * samples * chosen.separation**2
-        return promised * max(1.0, left / max(1, chosen.course.moves)) >= log(ODDS)
+        return DOUBT * self.promised(chosen) * max(1.0, left / max(1, chosen.course.moves)) >= log(ODDS)
 
     @property
     def explained(self) -> bool:
@@ -340,17 +373,14 @@ class Race:
 
     def searched_anew(self) -> "Race":
         """Return it with every rival searched from many starts; the better of both is kept."""
-        found = {}
+        found, bases = {}, dict[tuple[EffectTable, ...], Fit]()
         for name, here in self.fits.items():
             others = tuple(each for each in here.valve.effect if each.name != name)
-            there = fit(
-                self._whole,
-                ValveFile(valve=here.valve.valve, effect=others),
-                effects=(name,),
-                seed=self._seed,
-                workers=self._workers,
-                profile=False,
-            )
+            bare = ValveFile(valve=self.fits[self.best].valve.valve, effect=others)
+            how: dict[str, Any] = {"seed": self._seed, "workers": self._workers, "profile": False}
+            base = bases.get(others) or fit(self._whole, bare, **how)
+            bases[others] = base
+            there = fit(self._whole, bare, effects=(name,), base=base, **how)
             found[name] = min(here, there, key=lambda each: each.cost)
         return self._with(found)
 
@@ -368,7 +398,8 @@ class Race:
         for name, value in zip(bests.names, bests.theta.tolist(), strict=True):
             if name in composition.names:
                 shared[composition.names.index(name)] = value
-        ends = [settled(error, descended(error, z, MIDDLING)) for z in (own, error.coordinates(shared))]
+        starts = [own, error.coordinates(shared), *map(error.coordinates, here.seeds)]
+        ends = [settled(error, descended(error, z, MIDDLING)) for z in starts]
         z = min(ends, key=error.cost)
         theta = error.theta(z)
         values: dict[str, float] = dict(zip(composition.names, theta.tolist(), strict=True))

@@ -2,38 +2,42 @@
 
 A course is a first level and legs, each a ramp to a level, then a hold; a leg is a move. It begins as some consecutive
 moves of an input of the menu (`experiment`) and is changed at random, one leg or all lengths at a time, a change kept
-if it separates more. One valve A answers a course, its rival B is refitted to it by one Gauss-Newton step, held to what
-the recordings so far say of its parameters z:
+if it separates more.
 
-    d = (y_B - y_A) / sigma,   dz = argmin |d + J dz|^2 + dz' H dz,   e = d + J dz       H = J' J over the recordings
-    score = least over pairs of the mean over seconds b of log sqrt(1 + mean of e^2 in b)
+A valve A answers a course, under a pressure noise that makes it repeat itself no better than the recordings show. It
+and its rival B are refitted to the answer by one Gauss-Newton step, each held to what the recordings so far say of its
+parameters z:
 
-The best few are then refitted in full, by descents from wide to narrow, and the one with the largest separation is
-chosen: the rms error that the worst-placed rival is left with, the sensor's noise taken off, in units of sigma. sigma
-is how well the valve repeats itself where the recordings show it, and no less than what the best rival leaves there.
-The logarithm keeps one mistimed slip from outweighing all else.
+    dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, H = J' J over the recordings
+    separation = C(e_B) / C(e_A)     C soft-L1 cost; both ways in the geometric mean, least of all pairs
+    sigma_p = k_s / A sqrt(sigma^2 - sigma_sensor^2)     of the noise, an autoregression of 0.2 s; sigma floor
+
+The best few, and the best of the menu as they are, are then refitted in full, by descents from wide to narrow under
+other noise, and the one with the largest separation is chosen: by how many times a refitted rival is worse off than the
+valve that answered. A slip that only luck decides mistimes both, and separates nothing.
 
 Every course stays inside its bounds: pressures, rate, length; and every rival says that the stem stays in its window.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, permutations
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from config.errors import InputError
 from config.recording import Recording
 from config.results.result import Brief
-from sim.composition import Composition
+from sim.composition import AREA, SPRING, Composition
 from sim.effect import FINE_STEP_S
 from sim.karnopp import Vector
 from sim.open_loop import respond
 from workbench.data.record import Record, ready
 from workbench.fit.descent import descended_through
 from workbench.fit.fitting import Fit
-from workbench.fit.objective import SimulationError
+from workbench.fit.objective import FINAL, SimulationError, soft
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -41,13 +45,15 @@ from workbench.select.experiment import LENGTH_S, MARGIN, MENU, REST_S, Command,
 
 MOST_MOVES = 8
 """Of one experiment."""
-TRIED, KEPT, CONFIRMED = 40, 3, 3
-"""Changes tried of each course that is kept; courses of the menu that are kept; courses refitted in full."""
+TRIED, KEPT = 25, 2
+"""Changes tried of each course of the menu that is kept; how many are, changed and as they are."""
 WINDOWS = 3
 """Courses cut out of an input of the menu."""
 DIFFERENCE = 1e-3
 """Of a log-parameter, for the one step: wide enough to see across a stair."""
-SECOND = 1.0
+SEARCHED, CHECKED = (1, 2), (3, 4, 5)
+"""Draws of the noise for which a course is sought, and for which the best are refitted in full."""
+CORRELATION_S = 0.2
 SHORTEST_S = 0.05
 """Of a leg."""
 
@@ -136,7 +142,7 @@ class Course(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class DesignedExperiment(Brief):
-    """A course, and by how many times the noise it separates the least distinct pair after a refit."""
+    """A course, and by how many times it leaves the rival worse off in the least distinct pair after a refit."""
 
     course: Course
     separation: float
@@ -176,26 +182,27 @@ def designed(
     scores = list(on_threads(rivalry.score, starts, workers))
     order = sorted((i for i, score in enumerate(scores) if score > -np.inf), key=lambda i: -scores[i])
 
-    def improved(i: int) -> tuple[Course, float]:
+    def improved(i: int) -> Course:
         return _improved(rivalry, starts[i], scores[i], bounds, np.random.default_rng([seed, i]))
 
-    found = sorted(on_threads(improved, order[:KEPT], workers), key=lambda each: -each[1])
-    rated = list(on_threads(rivalry.separation, [course for course, _ in found[:CONFIRMED]], workers))
+    kept = order[:KEPT]
+    found = [*on_threads(improved, kept, workers), *(starts[i] for i in kept)]
+    rated = list(on_threads(rivalry.separation, found, workers))
     if not rated:
         return None
     best = int(np.argmax(rated))
-    return DesignedExperiment(found[best][0], rated[best])
+    return DesignedExperiment(found[best], rated[best])
 
 
 def _improved(
     rivalry: "Rivalry", course: Course, score: float, bounds: Bounds, generator: np.random.Generator
-) -> tuple[Course, float]:
+) -> Course:
     for _ in range(TRIED):
         changed = _changed(course, bounds, generator)
         there = rivalry.score(changed)
         if there > score:
             course, score = changed, there
-    return course, score
+    return course
 
 
 def _changed(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
@@ -279,32 +286,47 @@ class Rivalry:
         self._information = [self._known(i) for i in range(len(fits))]
 
     def score(self, course: Course) -> float:
-        """Return the score; minus infinity where the stem would leave its window."""
-        answers = [self._answer(i, course) for i in range(len(self._compositions))]
-        if any(each is None for each in answers):
-            return -np.inf
-        pairs = permutations(range(len(answers)), 2)
-        return min(self._told(answer, j) for i, j in pairs if (answer := answers[i]) is not None)
+        """Return the separation after one step, by its logarithm; minus infinity where the stem leaves its window."""
+        return self._least(course, SEARCHED, self._stepped)
 
     def separation(self, course: Course) -> float:
-        """Return the least rms error, in units of the noise, that a rival refitted to another's answer is left with."""
-        answers = [self._answer(i, course) for i in range(len(self._compositions))]
-        return min(
-            self._left(answer, j) for i, j in permutations(range(len(answers)), 2) if (answer := answers[i]) is not None
-        )
+        """Return the separation after refits in full."""
+        return float(np.exp(self._least(course, CHECKED, self._refitted)))
 
-    def _answer(self, i: int, course: Course) -> Record | None:
-        composition = self._compositions[i]
-        time_s, command_pa = course.sampled(self._record.period_s)
-        response = respond(composition, composition.theta, command_pa[:-1], np.diff(time_s), step_s=FINE_STEP_S)
+    def _least(self, course: Course, draws: Sequence[int], cost: Callable[[Record, int], float]) -> float:
+        """Return the least of all pairs of log C_B / C_A, the mean over draws of the noise."""
+        told = []
+        for draw in draws:
+            logs = np.full((len(self._compositions),) * 2, np.inf)
+            for i in range(len(self._compositions)):
+                answer = self._answer(i, course, draw)
+                if answer is None:
+                    return -np.inf
+                costs = [cost(answer, j) for j in range(len(self._compositions))]
+                logs[i] = [np.log(each / costs[i]) if j != i else np.inf for j, each in enumerate(costs)]
+            told.append(0.5 * (logs + logs.T))
+        return float(np.min(np.mean(told, axis=0)))
+
+    def _answer(self, i: int, course: Course, draw: int) -> Record | None:
+        composition, period_s = self._compositions[i], self._record.period_s
+        generator = np.random.default_rng([self._seed, draw])
+        time_s, command_pa = course.sampled(period_s)
+        noise_pa = self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
+        periods_s = np.diff(time_s)
+        response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, periods_s, step_s=FINE_STEP_S)
         # The first hold brings the valve from rest to where the course begins: a free run starts after it.
         settled = time_s >= REST_S
         position_m = response.indicated_m[settled]
         if position_m.min() < self._bounds.low_m or position_m.max() > self._bounds.high_m:
             return None
-        noise_m = self._record.noise_m * np.random.default_rng(self._seed).standard_normal(position_m.size)
-        columns = {"time_s": time_s[settled], "command_pa": command_pa[settled], "position_m": position_m + noise_m}
-        return replace(ready(Recording(columns)), noise_m=self._sigma_m)
+        sensed_m = position_m + self._record.noise_m * generator.standard_normal(position_m.size)
+        columns = {"time_s": time_s[settled], "command_pa": command_pa[settled], "position_m": sensed_m}
+        return replace(ready(Recording(columns)), noise_m=self._record.noise_m)
+
+    def _noise_pa(self, i: int) -> float:
+        theta = self._compositions[i].theta
+        spread_m = np.sqrt(max(0.0, self._sigma_m**2 - self._record.noise_m**2))
+        return float(theta[SPRING] / theta[AREA] * spread_m)
 
     def _error(self, i: int, record: Record) -> SimulationError:
         composition = self._compositions[i]
@@ -312,29 +334,33 @@ class Rivalry:
         return SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
 
     def _known(self, i: int) -> NDArray[np.float64]:
-        """Return H of a rival: what the recordings so far say of its parameters."""
-        error = self._error(i, replace(self._record, noise_m=self._sigma_m))
+        """Return H of a rival: what the recordings so far say of its parameters, in units of the sensor's noise."""
+        error = self._error(i, self._record)
         z = error.coordinates(self._compositions[i].theta)
         J = error.jacobian(z, error.residuals(z), DIFFERENCE)
         return np.asarray(J.T @ J + np.eye(z.size))
 
-    def _told(self, answer: Record, j: int) -> float:
-        """Return the mean over seconds of what one step leaves of the difference."""
+    def _stepped(self, answer: Record, j: int) -> float:
+        """Return C after one step."""
         error = self._error(j, answer)
         z = error.coordinates(self._compositions[j].theta)
-        d = error.residuals(z)
-        J = error.jacobian(z, d, DIFFERENCE)
-        dz = -np.linalg.solve(J.T @ J + self._information[j], J.T @ d)
-        e = d + J @ dz
-        rows = np.flatnonzero(answer.valid)[: e.size]
-        _, block = np.unique(np.floor(answer.time_s[rows] / SECOND), return_inverse=True)
-        return float(np.mean(0.5 * np.log1p(np.bincount(block, e**2) / np.bincount(block))))
+        r = error.residuals(z)
+        J = error.jacobian(z, r, DIFFERENCE)
+        dz = -np.linalg.solve(J.T @ J + self._information[j], J.T @ r)
+        return min(soft(r, FINAL), soft(r + J @ dz, FINAL))
 
-    def _left(self, answer: Record, j: int) -> float:
+    def _refitted(self, answer: Record, j: int) -> float:
+        """Return C after a refit in full."""
         held = _Held(self._error(j, answer), self._information[j], self._compositions[j].theta)
-        z = descended_through(held, held.middle)
-        noise = self._record.noise_m / self._sigma_m
-        return float(np.sqrt(max(0.0, float(np.mean(held.of_record(z) ** 2)) - noise**2)))
+        return soft(held.of_record(descended_through(held, held.middle)), FINAL)
+
+
+def _autoregression(generator: np.random.Generator, count: int, period_s: float) -> Vector:
+    """Return noise of variance 1 that forgets itself over `CORRELATION_S`, (count,)."""
+    kept = float(np.exp(-period_s / CORRELATION_S))
+    fresh = generator.standard_normal(count)
+    fresh[1:] *= np.sqrt(1.0 - kept**2)
+    return np.asarray(lfilter([1.0], [1.0, -kept], fresh), dtype=np.float64)
 
 
 class _Held(SimulationError):
