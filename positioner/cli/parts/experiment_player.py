@@ -20,8 +20,8 @@ RECORDED_WITHIN_S = 10.0
 POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
-SAME = 0.01
-"""Of the sequence's pressures: farther from them in most of its samples, a recording is of something else."""
+SAME, MOSTLY = 0.01, 0.95
+"""Of the sequence's pressures, and of its length: farther from them, or for less, a recording is of something else."""
 
 
 def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
@@ -119,10 +119,12 @@ def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool
     wanted_s = np.linspace(0.0, at_s[-1], 400)
     wanted_pa = np.interp(wanted_s, at_s, levels_pa)
     span_pa = max(float(np.ptp(levels_pa)), 1.0)
-    return any(
-        np.median(np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)) < SAME * span_pa
-        for begin_s in np.linspace(0.0, latest_s, 200)
-    )
+
+    def share(begin_s: float) -> float:
+        apart_pa = np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)
+        return float(np.mean(apart_pa < SAME * span_pa))
+
+    return any(share(begin_s) > MOSTLY for begin_s in np.linspace(0.0, latest_s, 200).tolist())
 
 
 def _read(path: Path) -> Recording | None:
