@@ -94,6 +94,26 @@ class Restored(Code):
     REPLACED = 4, "replaced by an identification"
 
 
+class ExperimentState(Code):
+    """What a played experiment does, or what became of the last one; why one did not begin."""
+
+    NONE = 0, "none since the start"
+    UNDER_WAY = 1, "under way"
+    RETURNING = 2, "on its way back to the command before"
+    COMPLETE = 3, "complete"
+    NOT_AUTOMATIC = 4, "not automatic"
+    NO_CONSENT = 5, "no consent of the DCS"
+    VETOED = 6, "vetoed"
+    EXCITED = 7, "eta_1 asks for another excitation"
+    NO_MEASUREMENT = 8, "no good measurement"
+    OUTSIDE_WINDOW = 9, "the stem is outside the travel window"
+    NO_SEQUENCE = 10, "no sequence: at least two points, times from 0 up"
+    BEYOND_PRESSURE = 11, "pressures beyond the limits"
+    TOO_FAST = 12, "faster than the rate limit"
+    TOO_LONG = 13, "longer than the time limit"
+    FAULT = 14, "fault (see there)"
+
+
 class Refusal(Code):
     """Why an estimate is not valid; 0 when it is."""
 

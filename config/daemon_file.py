@@ -111,6 +111,25 @@ class ExcitationTable(Schema):
         return self
 
 
+class ExperimentTable(Schema):
+    """Table `[experiment]`: what an experiment that the DCS consents to must stay inside."""
+
+    travel_window: tuple[Fraction, Fraction] = (0.05, 0.95)
+    """Beyond it the experiment is broken off, as shares of the stroke."""
+    minimum_pa: NonNegative | None = None
+    """Those of `[pressure]` where nobody says."""
+    maximum_pa: Positive | None = None
+    rate_limit_pa_per_s: Positive = 100e3
+    limit_s: Positive = 60.0
+
+    @model_validator(mode="after")
+    def _window_is_open(self) -> Self:
+        low, high = self.travel_window
+        if high - low < NARROWEST_WINDOW:
+            raise ValueError(f"travel_window must be at least {NARROWEST_WINDOW:g} wide, it is {low:g} to {high:g}")
+        return self
+
+
 class LawTable(Schema):
     """Table `[law]`: what the law knows before anything is identified: an extended valve, or an earlier identification.
 
@@ -218,6 +237,7 @@ class DaemonFile(Schema):
     safety: SafetyTable = SafetyTable()
     identification: IdentificationTable = IdentificationTable()
     excitation: ExcitationTable = ExcitationTable()
+    experiment: ExperimentTable = ExperimentTable()
     law: LawTable | None = None
     control: ControlTable = ControlTable()
     supervisory: SupervisoryTable = SupervisoryTable()

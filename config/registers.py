@@ -9,7 +9,18 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Literal
 
-from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, Restored, State, listed
+from config.codes import (
+    ExperimentState,
+    Fault,
+    InhibitReason,
+    Mode,
+    Ne107Cause,
+    Ne107Status,
+    Quality,
+    Restored,
+    State,
+    listed,
+)
 from config.errors import InputError
 from config.quantities import DeviceStatus, listed_bits
 from config.register_format import Format, WireType
@@ -19,6 +30,8 @@ MAP_VERSION = 1
 WORD_TEST = 0xB38C
 LONG_TEST = 0x12345678
 FLOAT_TEST = 1234.5
+MOST_POINTS = 200
+"""Of an experiment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +213,19 @@ HEALTH = (
     Register("moves_judged", 520, "uint32", "1", "moves behind the stiction index"),
 )
 
-REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH)
+EXPERIMENT = (
+    _writable("experiment_consent", 600, "uint16", "1", 0, 1, "1: experiments may be played; 0 breaks one off"),
+    _operable("experiment_veto", 601, "uint16", "1", 0, 1, "1: none may be played; breaks one off"),
+    _writable("experiment_point", 602, "uint16", "1", 0, MOST_POINTS - 1, "which point is written; 0 begins anew"),
+    _writable("experiment_time", 603, "float32", "s", 0.0, 1e5, "its time; written together with the point"),
+    _writable("experiment_pressure", 605, "float32", "Pa", 0.0, _LARGEST_PA, "its pressure; the same"),
+    _writable("experiment_start", 607, "uint16", "1", 2, MOST_POINTS, "write the number of points: plays them"),
+    Register("experiment_points", 608, "uint16", "1", "how many there are"),
+    Register("experiment_state", 609, "uint16", "1", listed(ExperimentState)),
+    Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),
+)
+
+REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH, *EXPERIMENT)
 
 BY_NAME = {register.name: register for register in REGISTERS}
 

@@ -5,7 +5,19 @@
 
 from pathlib import Path
 
-from config.codes import Code, Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, Quality, Refusal, Restored, State
+from config.codes import (
+    Code,
+    ExperimentState,
+    Fault,
+    InhibitReason,
+    Mode,
+    Ne107Cause,
+    Ne107Status,
+    Quality,
+    Refusal,
+    Restored,
+    State,
+)
 from positioner.daemon.health.ne107 import CLASS
 
 HERE = Path(__file__).parent
@@ -24,6 +36,7 @@ SERVED: dict[type[Code], str] = {
     InhibitReason: "why",
     Restored: "restored",
     Refusal: "*_reason, refusal",
+    ExperimentState: "experiment_state",
     Ne107Status: "ne107",
     Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes",
 }

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
 
-from config.codes import Fault, InhibitReason, Refusal, State
+from config.codes import ExperimentState, Fault, InhibitReason, Refusal, State
 from config.errors import CommandFailed, InputError
 from config.modbus_map import MOST_REGISTERS
 from config.registers import Register, register_named
@@ -133,6 +133,43 @@ class Dcs:
         if self.get("identifications") != applied_before:
             return None
         return problem or Refusal(int(self.get("refusal"))).text
+
+    def play(self, points: Sequence[tuple[float, float]], timeout_s: float) -> ExperimentState:
+        """Have an experiment played; return what became of it once the law has the command back.
+
+        However this ends before (Ctrl-C, no answer any more), a veto breaks the experiment off; it is taken back when
+        the command is.
+
+        Args:
+            points: times, s, from 0 up, and pressures, Pa.
+            timeout_s: broken off after this long.
+
+        Raises:
+            DcsError: the daemon refuses the sequence, or it took too long.
+        """
+        for number, (time_s, pressure_pa) in enumerate(points):
+            self.set_all({"experiment_point": number, "experiment_time": time_s, "experiment_pressure": pressure_pa})
+        try:
+            self.set("experiment_start", len(points))
+            if (state := self._played_within(timeout_s)) is None:
+                raise DcsError(f"{self._where}: the experiment took longer than {timeout_s:g} s, broken off")
+            return state
+        except BaseException:
+            self.set("experiment_veto", 1)
+            if self._played_within(timeout_s) is not None:
+                self.set("experiment_veto", 0)
+            raise
+
+    def _played_within(self, timeout_s: float) -> ExperimentState | None:
+        """Wait until no experiment commands; return what became of it, None if one still does after so long."""
+        due_s = time.monotonic() + timeout_s
+        self._wait_for_a_cycle()
+        while time.monotonic() < due_s:
+            state = ExperimentState(int(self.get("experiment_state")))
+            if state not in (ExperimentState.UNDER_WAY, ExperimentState.RETURNING):
+                return state
+            time.sleep(POLL_S)
+        return None
 
     def _wait_for_a_cycle(self) -> None:
         """Wait until the daemon has decided on what it was told, however slow its loop; not for one that stands."""

@@ -20,6 +20,7 @@ COMMANDS = (
     "get",
     "set",
     "identify",
+    "discriminate",
     "map",
     "simulate",
     "play",

@@ -18,4 +18,5 @@ real time.
     rest_detector                               where the stem rests
     excitation                                  S3: which excitation is under way, and when it ends
     sine_excitation, staircase_excitation       a sine, or a staircase of slides
+    played_experiment                           a sequence that the DCS consents to: what it may, how it ends
 """

@@ -12,6 +12,7 @@ from positioner.control import pressure_path
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
 from positioner.control.law_memory import held_pa as held_by_law_pa
+from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
@@ -54,6 +55,7 @@ class ControllerMemory(NamedTuple):
     consumed: ConsumedRequests
     state: State
     excitation: ActiveExcitation | None
+    experiment: PlayedExperiment
     identifying: bool
     law: LawMemory | None
     """None: a law without a memory."""
@@ -77,6 +79,7 @@ class Decision(NamedTuple):
     applied: Applied
     static_law: StaticLaw
     restoration: Restoration
+    experiment: PlayedExperiment
 
 
 class Controller:
@@ -111,6 +114,7 @@ class Controller:
             consumed=ConsumedRequests(),
             state=State.S0_START,
             excitation=None,
+            experiment=PlayedExperiment(),
             identifying=False,
             law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored),
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
@@ -175,6 +179,20 @@ def step(
     )
     if excitation is not None and memory.excitation is None:
         statics.restart()
+    experiment = experiment_after(
+        memory.experiment,
+        requests.experiment,
+        Surroundings(
+            now_s=sample.now_s,
+            mode=supervision.mode,
+            fault=supervision.fault,
+            excited=requests.eta[0] == 0,
+            position_m=sample.position_m if fresh else None,
+            command_pa=memory.wanted_pa,
+            held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
+        ),
+        settings.experiment,
+    )
     outcome = None
     if fresh:
         arrived = (
@@ -187,15 +205,16 @@ def step(
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
     identifying, applied = _identify(memory, excitation, sample, fresh, requests, identification, statics)
-    restoration = _restoration(memory, applied, outcome if excitation is None else None, settings)
+    ordinary = excitation is None and not experiment.commands
+    restoration = _restoration(memory, applied, outcome if ordinary else None, settings)
     dropped = restoration.trust is Restored.DROPPED
     if dropped and memory.restoration.provisional:
         memory, applied = _nothing_known(memory, applied, settings, statics)
-    elif outcome is not None and outcome.landing:
+    elif outcome is not None and outcome.landing and not experiment.commands:
         applied = statics.corrected(applied)
     situation = Situation(
         automatic=supervision.mode is Mode.AUTOMATIC,
-        exciting=excitation is not None and not excitation.ended,
+        exciting=experiment.commands or (excitation is not None and not excitation.ended),
         law_ready=applied.ratios is not None,
         delta_r_m=reference.delta_m,
         dropped=dropped,
@@ -223,7 +242,8 @@ def step(
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
         asked_pa = requests.manual_pa
     else:
-        asked_pa = _pressure_pa(state, held_pa, excitation, sample.now_s, reference, applied, settings, law_memory)
+        exciting = experiment if experiment.commands else excitation
+        asked_pa = _pressure_pa(state, held_pa, exciting, sample.now_s, reference, applied, settings, law_memory)
     limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
     wanted_pa = settings.delivered_pa(limited_pa)
     follows = supervision.fault is Fault.NONE and state in (State.S1_UP, State.S2_DOWN)
@@ -250,6 +270,7 @@ def step(
         applied=applied,
         static_law=statics.law,
         restoration=restoration,
+        experiment=experiment,
     )
     return ControllerMemory(
         command_pa,
@@ -261,6 +282,7 @@ def step(
         consumed,
         state,
         excitation,
+        experiment,
         identifying,
         law_memory,
         path,
@@ -398,7 +420,7 @@ def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMem
 def _pressure_pa(
     state: State,
     held_pa: float,
-    excitation: ActiveExcitation | None,
+    exciting: ActiveExcitation | PlayedExperiment | None,
     now_s: float,
     reference: Reference,
     applied: Applied,
@@ -406,8 +428,8 @@ def _pressure_pa(
     law_memory: LawMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
-    if state is State.S3_IDENTIFY and excitation is not None:
-        return excitation.pressure_pa(now_s)
+    if state is State.S3_IDENTIFY and exciting is not None:
+        return exciting.pressure_pa(now_s)
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
         if law_memory is not None:
             return law_memory.level_pa

@@ -15,6 +15,16 @@ QUIET: Eta = (1, 1, 1)
 
 
 @dataclass(frozen=True, slots=True)
+class ExperimentRequest:
+    """An experiment to be played: times, s, and pressures, Pa; `starts` counts, consent and veto hold while they do."""
+
+    points: tuple[tuple[float, float], ...] = ()
+    starts: int = 0
+    consented: bool = False
+    vetoed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Requests:
     """The DCS's side of the registers. Everything starts so that nothing moves the valve."""
 
@@ -32,3 +42,4 @@ class Requests:
     heartbeats: int = 0
     baseline_writes: int = 0
     health_resets: int = 0
+    experiment: ExperimentRequest = ExperimentRequest()

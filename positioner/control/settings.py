@@ -9,6 +9,7 @@ from config.quantities import ActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.conventional_law import ConventionalSettings
+from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.slide_memory import SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
@@ -38,6 +39,7 @@ class Settings:
     law_with_memory: BreakawaySettings | SlideSettings | ConventionalSettings | None
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
+    experiment: ExperimentLimits
     delivered_pa: Callable[[float], float]
     """The command, Pa, that the device can be told in place of one."""
     valve: ExtendedValve | None
@@ -88,6 +90,7 @@ class Settings:
             if file.control.law in WITH_MEMORY
             else None,
             staircase=_staircase(file) if file.by_slides else None,
+            experiment=_experiment(file),
             delivered_pa=file.device.delivered_pa,
             valve=valve,
         )
@@ -151,6 +154,19 @@ WITH_MEMORY: dict[str, Callable[[DaemonFile], BreakawaySettings | SlideSettings 
 def _staircase(file: DaemonFile) -> StaircaseLimits:
     low, high = (share * file.valve.stroke_m for share in file.excitation.travel_window)
     return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa)
+
+
+def _experiment(file: DaemonFile) -> ExperimentLimits:
+    table, pressure = file.experiment, file.pressure
+    low, high = (share * file.valve.stroke_m for share in table.travel_window)
+    return ExperimentLimits(
+        minimum_pa=pressure.minimum_pa if table.minimum_pa is None else max(pressure.minimum_pa, table.minimum_pa),
+        maximum_pa=pressure.maximum_pa if table.maximum_pa is None else min(pressure.maximum_pa, table.maximum_pa),
+        rate_pa_per_s=table.rate_limit_pa_per_s,
+        longest_s=table.limit_s,
+        low_m=low,
+        high_m=high,
+    )
 
 
 def _ratios(law: LawTable | None) -> Ratios | None:

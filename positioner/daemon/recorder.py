@@ -44,7 +44,7 @@ class Recorder:
     def __init__(self, folder: Path, name: str, file_bytes: int, keep_files: int) -> None:
         self.unrecorded = 0
         self._folder = folder
-        self._stem = re.sub(r"[^A-Za-z0-9_-]+", "-", name)
+        self._stem = _stem(name)
         self._file_bytes = file_bytes
         self._keep_files = keep_files
         self._waiting: deque[tuple[Row, int]] = deque()
@@ -130,11 +130,24 @@ class Recorder:
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         header = f"# valve: {self._stem}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{','.join(COLUMNS)}\n".encode()
         self._room = self._file_bytes - os.write(self._file, header)
-        # By its whole name: a valve FV-1 must not delete what belongs to a valve FV-1-A.
-        mine = re.compile(re.escape(self._stem) + r"-\d{8}T\d{6}Z-\d+\.csv")
-        for old in sorted(each for each in self._folder.iterdir() if mine.fullmatch(each.name))[: -self._keep_files]:
+        for old in _files(self._folder, self._stem)[: -self._keep_files]:
             old.unlink()
         log_event(log, logging.INFO, "recording", file=str(path))
+
+
+def files_of(folder: Path, name: str) -> list[Path]:
+    """Return the recordings of a valve in a folder, oldest first."""
+    return _files(folder, _stem(name))
+
+
+def _files(folder: Path, stem: str) -> list[Path]:
+    # By its whole name: a valve FV-1 must not take what belongs to a valve FV-1-A.
+    mine = re.compile(re.escape(stem) + r"-\d{8}T\d{6}Z-\d+\.csv")
+    return sorted(each for each in folder.iterdir() if mine.fullmatch(each.name))
+
+
+def _stem(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)
 
 
 def _line(row: Row, unrecorded: int) -> str:

@@ -23,6 +23,7 @@ from config.codes import Fault, Mode
 from config.registers import (
     BY_NAME,
     ESTIMATED,
+    EXPERIMENT,
     FLOAT_TEST,
     LONG_TEST,
     MAP_VERSION,
@@ -32,7 +33,7 @@ from config.registers import (
     Register,
 )
 from fieldbus.modbus.register_answers import RegisterError, Table
-from positioner.control.requests import Requests
+from positioner.control.requests import ExperimentRequest, Requests
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.logs import log_event, logging_valve
@@ -43,6 +44,8 @@ log = logging.getLogger(__name__)
 
 AT = {address: register for register in REGISTERS for address in range(register.address, register.end)}
 """The register that each word belongs to."""
+
+EXPERIMENT_NAMES = frozenset(register.name for register in EXPERIMENT)
 
 SCALE = 10_000
 """Whole numbers per p.u. in the scaled registers."""
@@ -150,6 +153,8 @@ class SupervisoryRegisters:
             requests = replace(requests, baseline_writes=requests.baseline_writes + 1)
         if values.get("health_reset") == 1:
             requests = replace(requests, health_resets=requests.health_resets + 1)
+        if values.keys() & EXPERIMENT_NAMES:
+            requests = replace(requests, experiment=_experiment_asked(requests.experiment, values))
         if "heartbeat" in values:
             self._heartbeat = int(values["heartbeat"])
             requests = replace(requests, heartbeats=requests.heartbeats + 1)
@@ -204,6 +209,7 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         **_statistics_getters(cycle),
         **_identity_getters(),
         **_health_getters(cycle, stroke_m),
+        **_experiment_getters(),
     }
     assert getters.keys() == BY_NAME.keys() - {"heartbeat"}, getters.keys() ^ BY_NAME.keys()
     return getters
@@ -314,6 +320,51 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "reversals": lambda _s, _r: health.record.reversals,
         "stiction_index": lambda _s, _r: health.record.stiction_index,
         "moves_judged": lambda _s, _r: health.record.moves_judged,
+    }
+
+
+def _experiment_asked(before: ExperimentRequest, values: Mapping[str, float]) -> ExperimentRequest:
+    """Return what is asked for after writes to the experiment's registers."""
+    after = replace(
+        before,
+        consented=bool(values.get("experiment_consent", before.consented)),
+        vetoed=bool(values.get("experiment_veto", before.vetoed)),
+    )
+    point = [values.get(f"experiment_{what}") for what in ("point", "time", "pressure")]
+    if any(each is not None for each in point):
+        number, time_s, pressure_pa = point
+        if number is None or time_s is None or pressure_pa is None:
+            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "experiment_point: point, time and pressure go in one request")
+        if number not in (0, len(after.points)):
+            raise WriteRejected(
+                ExcCodes.ILLEGAL_VALUE, f"experiment_point: the next is {len(after.points)}, or 0, got {number:g}"
+            )
+        after = replace(after, points=(*after.points[: int(number)], (time_s, pressure_pa)))
+    if "experiment_start" in values:
+        if values["experiment_start"] != len(after.points):
+            raise WriteRejected(
+                ExcCodes.ILLEGAL_VALUE,
+                f"experiment_start: there are {len(after.points)} points, not {values['experiment_start']:g}",
+            )
+        after = replace(after, starts=after.starts + 1)
+    return after
+
+
+def _experiment_getters() -> dict[str, Getter]:
+    def last(request: Requests, which: int) -> float:
+        points = request.experiment.points
+        return points[-1][which] if points else 0.0
+
+    return {
+        "experiment_consent": lambda _, r: r.experiment.consented,
+        "experiment_veto": lambda _, r: r.experiment.vetoed,
+        "experiment_point": lambda _, r: max(0, len(r.experiment.points) - 1),
+        "experiment_time": lambda _, r: last(r, 0),
+        "experiment_pressure": lambda _, r: last(r, 1),
+        "experiment_start": lambda _s, _r: 0,
+        "experiment_points": lambda _, r: len(r.experiment.points),
+        "experiment_state": lambda s, _: s.decision.experiment.state,
+        "experiment_elapsed": lambda s, _: s.decision.experiment.elapsed_s(s.sample.now_s),
     }
 
 

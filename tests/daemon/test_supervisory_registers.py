@@ -140,7 +140,7 @@ def test_what_is_measured_cannot_be_written(panel: Panel, name: str) -> None:
     assert refused(panel, name, 0) is ExcCodes.ILLEGAL_ADDRESS
 
 
-@pytest.mark.parametrize(("address", "words"), [(0, [0]), (1, [0]), (1, [0, 0]), (15, [0]), (17, [0]), (600, [0])])
+@pytest.mark.parametrize(("address", "words"), [(0, [0]), (1, [0]), (1, [0, 0]), (15, [0]), (17, [0]), (900, [0])])
 def test_a_part_of_a_value_or_nothing_at_all_is_an_illegal_address(
     panel: Panel, address: int, words: list[int]
 ) -> None:

@@ -9,7 +9,8 @@ Its files:
     verdict, verdict_sentence                     what follows, and how it is said
     equivalence                                   what no recording tells apart
     tangent_preview                               the quick first ranking
-    experiment                                    the input that tells rivals apart
+    experiment, experiment_design                 the input that tells rivals apart: off a menu, or designed
+    discrimination                                rivals told apart by one experiment after another
     residual_structure                            the meter of what is unexplained
     extension, extension_json                     adds what was found; the same as JSON
     extension_journal                             what was added when, and why

@@ -1,0 +1,199 @@
+"""Sealed valves whose diagnosis ended `one_of`: do experiments tell the rivals apart, and in how many moves?
+
+    python -m benchmarks.discrimination [--family clean dirty] [--cases 20] [--seeds 37157 ...] [--out FILE]
+
+The cases are those of the kept blind campaign (`benchmarks.blind`) whose diagnosis against the whole library ended in
+one set with more than one class, the hidden effect visible: the same seeds make the same valves, and the rivals are the
+set that was named then, fitted anew to both recordings. The valve answers as `workbench.blind.trial` has it, dirty ones
+with pressure noise, break-away jitter and 12 bits; the hidden effect is looked at after the last round.
+
+Each case is played twice: by experiments designed for the rivals, and by whole inputs of the menu, chosen anew in
+every round as a diagnosis chooses. Odds, permissives and the rule that stops are the same; the menu may use
+`MENU_BUDGET` moves. A line of JSON is kept a case, so that a run can be broken off and taken up again.
+"""
+
+import argparse
+import json
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.blind import FOLDER, kept
+from config.recording import Recording
+from config.slave_file import Sensor
+from sim.composition import Composition
+from sim.effect import shipped_effect, shipped_effects
+from workbench.blind.hiding import Hidden, hide
+from workbench.blind.trial import LEVELS, NOISE_M, Trial
+from workbench.data.held_out import joined
+from workbench.data.record import Record, ready
+from workbench.fit.fitting import Fit, fit
+from workbench.select.discrimination import BUDGET, Discrimination, Played, Player, discriminate
+from workbench.select.equivalence import algebraic_class, classes
+from workbench.select.experiment import REST_S, experiment
+from workbench.select.experiment_design import Bounds, DesignedExperiment, courses, designed
+
+PERIOD_S = 0.01
+RATE_PA_PER_S = 400e3
+LONGEST_S = 26.0
+MENU_BUDGET = 120
+WHOLE = 1000
+"""More moves than an input of the menu has."""
+
+Line = Mapping[str, Any]
+
+
+def menu(
+    fits: Sequence[Fit],
+    record: Record,
+    bounds: Bounds,
+    *,
+    seed: int,
+    most_moves: int,  # noqa: ARG001 - its inputs are whole
+    workers: int | None,
+) -> DesignedExperiment | None:
+    """Choose the whole input of the menu as a diagnosis does."""
+    chosen = experiment(fits, record, seed=seed, workers=workers)
+    course = next(each for each in courses(record, bounds, WHOLE) if each.name == chosen.name)
+    return DesignedExperiment(course.within(bounds), np.inf)
+
+
+def player(made: Hidden, dirty: bool, seed: int) -> Player:
+    """Return the sealed valve, which answers experiments."""
+    generator = np.random.default_rng(seed)
+    truth = Composition.from_file(made.truth)
+    quantum_m = made.truth.valve.stroke_m / LEVELS if dirty else 0.0
+
+    def play(chosen: DesignedExperiment) -> Played:
+        trial = Trial(chosen.course.sampled(PERIOD_S)[1], PERIOD_S)
+        answer_m = trial.with_disturbances_m(truth, generator) if dirty else trial.answer_m(truth, truth.theta)
+        sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
+        whole = trial.recording(answer_m, sensor)
+        settled = whole.time_s >= REST_S
+        return Played(Recording({name: column[settled] for name, column in whole.columns.items()}))
+
+    return play
+
+
+def line(case: Line, workers: int) -> Line:
+    """Play a case by both; return what is kept of it."""
+    began_s = time.perf_counter()
+    library = {name: shipped_effect(name, "library") for name in shipped_effects()}
+    dirty = case["setting"] == "dirty"
+    made = hide(case["seed"], dirty=dirty)
+    recordings = [made.fit, made.test]
+    whole = joined(recordings)
+    base = fit(whole, made.base, profile=False, workers=workers)
+    rivals = {
+        name: fit(whole, made.base, effects=(name,), base=base, profile=False, workers=workers)
+        for name in case["sets"][0]
+    }
+    commands_pa = ready(whole).command_pa
+    stroke_m = made.base.valve.stroke_m
+    bounds = Bounds(
+        float(commands_pa.min()), float(commands_pa.max()), RATE_PA_PER_S, LONGEST_S, -0.1 * stroke_m, 1.1 * stroke_m
+    )
+    found = {
+        name: discriminate(
+            rivals,
+            recordings,
+            player(made, dirty, case["seed"]),
+            bounds,
+            library,
+            budget=budget,
+            design=design,
+            workers=workers,
+        )
+        for name, design, budget in (("designed", designed, BUDGET), ("menu", menu, MENU_BUDGET))
+    }
+    return {
+        "seed": case["seed"],
+        "setting": case["setting"],
+        "hidden": case["hidden"],
+        "rivals": case["sets"][0],
+        "seconds": round(time.perf_counter() - began_s, 1),
+        **{name: _kept(each, case["hidden"][0]) for name, each in found.items()},
+    }
+
+
+def _kept(found: Discrimination, hidden: str) -> dict[str, Any]:
+    library = {name: shipped_effect(name, "library") for name in shipped_effects()}
+    right = bool(algebraic_class(hidden, library) & set(found.named)) if found.named else None
+    return {
+        "outcome": found.outcome,
+        "named": list(found.named),
+        "right": right,
+        "moves": found.moves,
+        "experiments": len(found.rounds),
+    }
+
+
+def cases(families: Sequence[str], seeds: Sequence[int] | None) -> list[Line]:
+    """Return the kept blind cases that ended in one set of more than one class, the hidden effect visible."""
+    library = {name: shipped_effect(name, "library") for name in shipped_effects()}
+    lines = [*kept(FOLDER), *kept(FOLDER / "before")]
+    return [
+        each
+        for each in lines
+        if each["verdict"] == "one_of"
+        and each["visible"]
+        and each["family"] in families
+        and len(each["sets"]) == 1
+        and len(classes(each["sets"][0], library)) > 1
+        and (seeds is None or each["seed"] in seeds)
+    ]
+
+
+def report(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield a line a case, then the figures."""
+    for each in lines:
+        yield f"{each['seed']} {each['setting']:<6}{each['hidden'][0]} of {'/'.join(each['rivals'])}: " + "; ".join(
+            f"{how} {each[how]['outcome']} {'/'.join(each[how]['named'])} {each[how]['moves']} moves"
+            for how in ("designed", "menu")
+        )
+    for how in ("designed", "menu"):
+        yield from _figures(how, [each[how] for each in lines])
+    both = [each for each in lines if each["designed"]["right"] and each["menu"]["right"]]
+    if both:
+        shares = [each["designed"]["moves"] / each["menu"]["moves"] for each in both if each["menu"]["moves"]]
+        yield f"moves, designed over menu, resolved by both: median {np.median(shares):.2f} of {len(shares)} cases"
+
+
+def _figures(how: str, found: Sequence[Line]) -> Iterator[str]:
+    count = len(found)
+    right, wrong = sum(each["right"] is True for each in found), sum(each["right"] is False for each in found)
+    yield f"{how}: resolved rightly {right} of {count} ({right / count:.0%}), wrongly {wrong} ({wrong / count:.0%})"
+    told = ", ".join(f"{name} {n}" for name, n in sorted(Counter(each["outcome"] for each in found).items()))
+    yield f"  outcomes: {told}; moves in all {sum(each['moves'] for each in found)}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--family", nargs="*", choices=("clean", "dirty"), default=["clean", "dirty"])
+    parser.add_argument("--cases", type=int, default=20, help="at most so many (20)")
+    parser.add_argument("--seeds", type=int, nargs="*", help="these cases alone")
+    parser.add_argument("--workers", type=int, default=1, help="threads (1)")
+    parser.add_argument("--out", type=Path, help="where a line a case is kept; those there are not played again")
+    arguments = parser.parse_args()
+    lines: list[Line] = []
+    if arguments.out is not None and arguments.out.is_file():
+        lines = [json.loads(each) for each in arguments.out.read_text().splitlines()]
+    there = {each["seed"] for each in lines}
+    for case in cases(arguments.family, arguments.seeds)[: arguments.cases]:
+        if case["seed"] in there:
+            continue
+        done = line(case, arguments.workers)
+        lines.append(done)
+        print(f"{done['seed']}: {done['seconds']:g} s", flush=True)
+        if arguments.out is not None:
+            with arguments.out.open("a", encoding="utf-8") as file:
+                print(json.dumps(done), file=file, flush=True)
+    print(*report(lines), sep="\n")
+
+
+if __name__ == "__main__":
+    main()

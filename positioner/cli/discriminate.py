@@ -1,0 +1,121 @@
+"""`positioner discriminate`: where a diagnosis ends `one_of`, experiments on the running valve tell rivals apart."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from positioner.cli.parts.output_files import make_folder, write_json
+
+if TYPE_CHECKING:
+    from config.daemon_file import DaemonFile
+    from workbench.select.discrimination import Discrimination, Round
+    from workbench.select.experiment_design import Bounds
+
+HELP = "diagnose, then play experiments on the valve until the rivals are told apart (moves it: state S3)"
+EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
+
+WINDOW_MARGIN = 0.03
+"""Of the stroke: a design keeps so far inside the travel window, as it knows the stem by its models only."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the running daemon's file, with [recorder]")
+    parser.add_argument("--rec", type=Path, nargs="+", required=True, metavar="REC", help="recordings, CSV or Parquet")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
+    parser.add_argument("--effects", nargs="+", metavar="NAME", help="what is tried (all that come with the package)")
+    parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="moves allowed in all (60)")
+    parser.add_argument("--out", type=Path, default=Path("discriminated"), help="where recordings and verdict go")
+    parser.add_argument("--name", help="which of the daemon's valves")
+    parser.add_argument(
+        "--tls",
+        nargs=3,
+        type=Path,
+        metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
+        help="connect with Modbus/TCP Security, as an engineer",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of searches and designs (0)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose, play, print a line a round; 0 if nothing is left to be told apart, else 1."""
+    from config.daemon_file import load_daemon
+    from config.recording import Recording
+    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.experiment_player import player_on, require_ready
+    from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.progress import show
+    from sim.effect import find_effect, shipped_effects
+    from workbench.select.diagnosis import diagnose
+    from workbench.select.discrimination import discriminate, rivals_of
+
+    file = load_daemon(arguments.config, arguments.name)
+    bounds = _bounds(file)
+    require_ready(file, arguments)
+    valve = load_valve(find_valve(arguments.valve))
+    recordings = [Recording.read(path) for path in arguments.rec]
+    test = Recording.read(arguments.test) if arguments.test else None
+    make_folder(arguments.out)
+    named = {"recording": ", ".join(map(str, arguments.rec)), "valve file": arguments.valve}
+    with naming(named):
+        found = diagnose(recordings, valve, test=test, effects=arguments.effects, seed=arguments.seed, progress=show)
+    print(found.sentence, flush=True)
+    fits = rivals_of(found)
+    if found.verdict != "one_of":
+        print("no rivals to be told apart; nothing was played")
+        return 0 if found.verdict in ("adequate", "missing") else 1
+    effects = [find_effect(name, "effects") for name in arguments.effects or shipped_effects()]
+    told = discriminate(
+        fits,
+        [*recordings, test] if test else recordings,
+        player_on(file, arguments),
+        bounds,
+        {each.written: each for each in effects},
+        budget=arguments.budget,
+        seed=arguments.seed,
+        on_round=_tell,
+    )
+    _write(told, arguments.out)
+    print(told.summary())
+    return 0 if told.outcome in ("resolved", "one_class") else 1
+
+
+def _bounds(file: "DaemonFile") -> "Bounds":
+    """Return what designs must stay inside: the daemon's permissives, and room for the approach.
+
+    Raises:
+        InputError: no room is left.
+    """
+    from config.errors import InputError
+    from positioner.control.settings import Settings
+    from workbench.select.experiment_design import Bounds
+
+    limits = Settings.of(file).experiment
+    approach_s = (limits.maximum_pa - limits.minimum_pa) / limits.rate_pa_per_s
+    margin_m = WINDOW_MARGIN * file.valve.stroke_m
+    if limits.longest_s <= 3.0 * approach_s:
+        raise InputError(
+            "experiment.limit_s",
+            f"must exceed {3.0 * approach_s:.3g} s, three times the way through the pressures, "
+            f"got {limits.longest_s:g} s",
+        )
+    return Bounds(
+        minimum_pa=limits.minimum_pa,
+        maximum_pa=limits.maximum_pa,
+        rate_pa_per_s=limits.rate_pa_per_s,
+        longest_s=limits.longest_s - approach_s,
+        low_m=limits.low_m + margin_m,
+        high_m=limits.high_m - margin_m,
+    )
+
+
+def _tell(each: "Round") -> None:
+    odds = ", ".join(f"{name} {value:.2g}" for name, value in each.odds.items())
+    print(f"{each.moves} moves: {each.name}, separation {each.separation:.3g}; odds {odds}", flush=True)
+
+
+def _write(told: "Discrimination", folder: Path) -> None:
+    for number, recording in enumerate(told.recordings, start=1):
+        recording.write(folder / f"experiment-{number}.csv")
+    write_json(folder / "verdict.json", told.as_json(), indent=1)

@@ -1,0 +1,151 @@
+"""Plays experiments on the valve of a running daemon, over its registers, and reads what its recorder wrote."""
+
+import argparse
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from config.recording import Recording
+from positioner.cli.parts.daemon_address import connected
+
+if TYPE_CHECKING:
+    from config.daemon_file import DaemonFile
+    from positioner.dcs import Dcs
+    from workbench.select.discrimination import Player
+    from workbench.select.experiment_design import DesignedExperiment
+
+RECORDED_WITHIN_S = 10.0
+POLL_S = 0.3
+LATEST_FILES = 2
+"""Of the recorder, in which an experiment may lie."""
+SAME, MOSTLY = 0.01, 0.95
+"""Of the sequence's pressures, and of its length: farther from them, or for less, a recording is of something else."""
+
+
+def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
+    """Look whether a daemon answers, in automatic, with consent, and records.
+
+    Raises:
+        InputError: no recorder in the file, or its folder is not on this machine.
+        CommandFailed: no daemon, another mode, no consent, or a veto; says what to do.
+    """
+    from config.codes import Mode
+    from config.errors import CommandFailed, InputError
+
+    if file.recorder is None:
+        raise InputError(str(arguments.config), "recorder: is needed, for experiments are read from its recordings")
+    folder = _folder(file, arguments)
+    if not folder.is_dir():
+        raise InputError(str(folder), "the recorder's folder is not there: run this on the daemon's machine")
+    with _dcs(arguments) as dcs:
+        if dcs.get("mode") != Mode.AUTOMATIC:
+            raise CommandFailed(
+                "the mode is not automatic, so nothing may move the valve: positioner set mode automatic"
+            )
+        if not dcs.get("experiment_consent"):
+            raise CommandFailed("the DCS has not consented to experiments: positioner set experiment_consent 1")
+        if dcs.get("experiment_veto"):
+            raise CommandFailed("experiments are vetoed: positioner set experiment_veto 0")
+
+
+def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
+    """Return what plays experiments on the daemon's valve."""
+    from config.codes import ExperimentState
+    from workbench.select.discrimination import Played
+
+    folder = _folder(file, arguments)
+
+    def play(chosen: "DesignedExperiment") -> Played:
+        points = chosen.course.points()
+        within_s = 2.0 * file.experiment.limit_s + RECORDED_WITHIN_S
+        with _dcs(arguments) as dcs:
+            state = dcs.play(points, within_s)
+        if state is not ExperimentState.COMPLETE:
+            return Played(None, state.text)
+        recording = recorded(folder, file.valve.name, points)
+        return Played(recording, "" if recording else f"no recording of it in {folder} within {RECORDED_WITHIN_S:g} s")
+
+    return play
+
+
+def recorded(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:
+    """Return the rows of the experiment that has just ended, once the recorder has written them; None if it does not.
+
+    Raises:
+        InputError: a recording cannot be read.
+    """
+    due_s = time.monotonic() + RECORDED_WITHIN_S
+    while time.monotonic() < due_s:
+        if found := last_excited(folder, valve):
+            return found if is_of(found, points) else None
+        time.sleep(POLL_S)
+    return None
+
+
+def last_excited(folder: Path, valve: str) -> Recording | None:
+    """Return the last stretch in S3 of the newest recordings, once something follows it; None before."""
+    import numpy as np
+
+    from config.codes import State
+    from positioner.daemon.recorder import files_of
+    from workbench.data.held_out import joined
+
+    newest = files_of(folder, valve)[-LATEST_FILES:]
+    parts = [each for each in map(_read, newest) if each is not None]
+    if not parts:
+        return None
+    whole = joined(parts)
+    excited = whole.columns["state"] == State.S3_IDENTIFY
+    rows = np.flatnonzero(excited)
+    if not rows.size or excited[-1]:
+        return None
+    last = int(rows[-1])
+    before = np.flatnonzero(~excited[:last])
+    first = int(before[-1]) + 1 if before.size else 0
+    return Recording({name: column[first : last + 1] for name, column in whole.columns.items()}, whole.metadata)
+
+
+def is_of(recording: Recording, points: tuple[tuple[float, float], ...]) -> bool:
+    """Whether a recording's commands go through a sequence, wherever in it that begins."""
+    import numpy as np
+
+    at_s, levels_pa = np.array(points).T
+    time_s = recording.time_s - recording.time_s[0]
+    latest_s = float(time_s[-1] - at_s[-1])
+    if latest_s < 0.0:
+        return False
+    wanted_s = np.linspace(0.0, at_s[-1], 400)
+    wanted_pa = np.interp(wanted_s, at_s, levels_pa)
+    span_pa = max(float(np.ptp(levels_pa)), 1.0)
+
+    def share(begin_s: float) -> float:
+        apart_pa = np.abs(np.interp(begin_s + wanted_s, time_s, recording.command_pa) - wanted_pa)
+        return float(np.mean(apart_pa < SAME * span_pa))
+
+    return any(share(begin_s) > MOSTLY for begin_s in np.linspace(0.0, latest_s, 200).tolist())
+
+
+def _read(path: Path) -> Recording | None:
+    """Read a recording; None for one without a row yet."""
+    from config.errors import InputError
+
+    try:
+        return Recording.read(path)
+    except InputError as error:
+        if error.problem == "holds no samples":
+            return None
+        raise
+
+
+def _folder(file: "DaemonFile", arguments: argparse.Namespace) -> Path:
+    assert file.recorder is not None
+    return Path(arguments.config).parent / file.recorder.folder
+
+
+@contextmanager
+def _dcs(arguments: argparse.Namespace) -> "Iterator[Dcs]":
+    where = {"config": arguments.config, "valve": arguments.name, "tls": arguments.tls}
+    with connected(argparse.Namespace(host=None, port=None, unit=None, **where)) as dcs:
+        yield dcs

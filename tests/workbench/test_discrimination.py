@@ -1,0 +1,181 @@
+"""The odds on hand-made fits, the rounds with a scripted designer and player, and one whole journey in virtual time."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf, log
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from sim.composition import Composition
+from sim.effect import shipped_effect, shipped_effects
+from sim.open_loop import respond
+from tests.workbench.valves import drawn_valve, record_of, with_effect
+from workbench.data.record import Record
+from workbench.fit.fitting import Fit, fit
+from workbench.select.discrimination import Played, Weighed, discriminate, log_odds
+from workbench.select.experiment import REST_S
+from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg, designed, moves_in
+
+LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
+BARE = drawn_valve(np.random.default_rng(11))
+LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.06)
+RIVALS = ("ip_lag", "dead_time")
+PERIOD_S = 0.01
+BOUNDS = Bounds(0.0, 90e3, 400e3, 12.0, -1.0, 1.0)
+COURSE = Course("by hand", 10e3, (Leg(60e3, 0.1, 2.0), Leg(15e3, 0.1, 2.0)))
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return record_of(LAGGING, 1, 700)
+
+
+@pytest.fixture(scope="module")
+def fits(recording: Recording) -> dict[str, Fit]:
+    base = fit(recording, BARE, profile=False)
+    return {name: fit(recording, BARE, effects=(name,), base=base, profile=False) for name in RIVALS}
+
+
+def weighed(one: Fit, cost: float, logs: Sequence[float], share: float = 1.0, count: int = 1000) -> Weighed:
+    return Weighed(replace(one, cost=cost, count=count), np.array(logs), share)
+
+
+def apart(size: float) -> list[float]:
+    """Return block errors that differ from none by so much, with some scatter."""
+    return [size * (1.0 + 0.1 * (-1.0) ** i) for i in range(20)]
+
+
+def test_log_odds_by_hand(fits: dict[str, Fit]) -> None:
+    one = fits["ip_lag"]
+    best = weighed(one, 500.0, [0.0] * 20)
+    assert log_odds(best, weighed(one, 550.0, apart(0.05))) == pytest.approx(500.0 * log(1.1))
+
+
+def test_what_hangs_together_counts_once(fits: dict[str, Fit]) -> None:
+    one = fits["ip_lag"]
+    best = weighed(one, 500.0, [0.0] * 20, share=0.01)
+    assert log_odds(best, weighed(one, 550.0, apart(0.05))) == pytest.approx(5.0 * log(1.1))
+
+
+def test_a_parameter_more_costs_the_rival_evidence(fits: dict[str, Fit]) -> None:
+    one = fits["ip_lag"]
+    more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})
+    best, rival = weighed(one, 500.0, [0.0] * 20), weighed(more, 550.0, apart(0.05))
+    assert log_odds(best, rival) == pytest.approx(500.0 * log(1.1) + 0.5 * log(1000.0))
+
+
+def test_one_second_that_went_wrong_gives_no_odds(fits: dict[str, Fit]) -> None:
+    one = fits["ip_lag"]
+    best = weighed(one, 500.0, [0.0] * 20)
+    assert log_odds(best, weighed(one, 900.0, [3.0] + [0.0] * 19)) < 1.0
+
+
+def test_a_better_rival_is_not_spoken_against(fits: dict[str, Fit]) -> None:
+    one = fits["ip_lag"]
+    assert log_odds(weighed(one, 500.0, [0.0] * 20), weighed(one, 400.0, apart(-0.05))) == 0.0
+
+
+def test_moves_are_counted_between_holds_and_reversals() -> None:
+    assert moves_in(np.array([0.0, 0, 1, 2, 2, 3, 1, 1, 0])) == 4
+    assert COURSE.moves == 2
+    assert moves_in(COURSE.sampled(PERIOD_S)[1]) == 2
+
+
+def test_a_course_stays_inside_its_bounds() -> None:
+    wild = Course("wild", 200e3, (Leg(-50e3, 0.0, 60.0), Leg(100e3, 1.0, 60.0)))
+    tame = wild.within(BOUNDS)
+    time_s, command_pa = tame.sampled(1e-3)
+    assert command_pa.min() >= BOUNDS.minimum_pa
+    assert command_pa.max() <= BOUNDS.maximum_pa
+    assert tame.duration_s <= BOUNDS.longest_s * (1 + 1e-9)
+    assert np.max(np.abs(np.diff(command_pa)) / np.diff(time_s)) <= BOUNDS.rate_pa_per_s * (1 + 1e-6)
+
+
+def answering(chosen: DesignedExperiment) -> Played:
+    """Let the lagging valve answer."""
+    composition = Composition.from_file(LAGGING)
+    time_s, command_pa = chosen.course.sampled(PERIOD_S)
+    response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
+    noise_m = 5e-5 * np.random.default_rng(chosen.course.moves).standard_normal(time_s.size)
+    columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m + noise_m}
+    return Played(Recording({name: column[time_s >= REST_S] for name, column in columns.items()}))
+
+
+class Design:
+    """A designer that always says the same, and notes what it was allowed."""
+
+    def __init__(self, separation: float) -> None:
+        self.separation = separation
+        self.asked: list[int] = []
+
+    def __call__(
+        self, fits: Sequence[Fit], record: Record, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+    ) -> DesignedExperiment | None:
+        self.asked.append(most_moves)
+        return DesignedExperiment(COURSE, self.separation)
+
+
+def silent(_: DesignedExperiment) -> Played:
+    return Played(None, "vetoed")
+
+
+def test_one_class_by_algebra_is_said_and_nothing_is_played(fits: dict[str, Fit], recording: Recording) -> None:
+    twins = {"preload": fits["ip_lag"], "sensor_offset": fits["ip_lag"]}
+    found = discriminate(twins, [recording], silent, BOUNDS, LIBRARY)
+    assert (found.outcome, found.rounds) == ("one_class", ())
+    assert set(found.named) == {"preload", "sensor_offset"}
+    assert "one by algebra" in found.sentence
+
+
+def test_what_a_refit_imitates_is_not_played(fits: dict[str, Fit], recording: Recording) -> None:
+    found = discriminate(fits, [recording], silent, BOUNDS, LIBRARY, design=Design(1.0))
+    assert (found.outcome, found.named, found.rounds) == ("not_separable", (), ())
+    assert "cannot be told apart by this valve within these permissives" in found.sentence
+
+
+def test_what_the_valve_does_not_play_stops_it(fits: dict[str, Fit], recording: Recording) -> None:
+    found = discriminate(fits, [recording], silent, BOUNDS, LIBRARY, design=Design(2.0))
+    assert (found.outcome, found.named) == ("stopped", ())
+    assert "vetoed" in found.sentence
+
+
+def test_twins_spend_the_budget_and_nothing_is_named(fits: dict[str, Fit], recording: Recording) -> None:
+    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
+    design = Design(2.0)
+    found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
+    assert (found.outcome, found.named, found.moves) == ("budget_spent", (), 4)
+    assert len(found.recordings) == len(found.rounds) == 2
+    assert max(design.asked) <= 4
+    assert found.odds == pytest.approx(1.0)
+
+
+def test_a_lag_and_a_dead_time_are_told_apart(
+    fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workbench.select.experiment_design.TRIED", 4)
+    found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=designed, workers=2)
+    assert (found.outcome, found.named) == ("resolved", ("ip_lag",)), found.sentence
+    assert found.odds >= 100.0
+    assert 0 < found.moves <= 8
+    said = found.as_json()
+    assert said["named"] == ["ip_lag"]
+    assert said["odds"] is None or said["odds"] < inf
+    assert "ip_lag is missing" in found.summary()
+
+
+def test_an_effect_that_is_none_of_the_rivals_is_not_named(fits: dict[str, Fit], recording: Recording) -> None:
+    """After the recordings, something else begins to act: the better rival explains it no better than chance."""
+    changed = with_effect(LAGGING, "position_friction", growth=1.5, travel_m=BARE.valve.stroke_m)
+
+    def other(chosen: DesignedExperiment) -> Played:
+        composition = Composition.from_file(changed)
+        time_s, command_pa = chosen.course.sampled(PERIOD_S)
+        response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
+        columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m}
+        return Played(Recording({name: column[time_s >= REST_S] for name, column in columns.items()}))
+
+    found = discriminate(fits, [recording], other, BOUNDS, LIBRARY, design=Design(2.0), budget=4)
+    assert found.outcome in ("unexplained", "budget_spent", "not_separable")
+    assert found.named == ()

@@ -1,0 +1,458 @@
+"""Rivals told apart by experiments: design, play, refit all on all recordings, weigh; until one is left.
+
+    lambda_i = n/2 log(C_i / C) + (k_i - k)/2 log n     log odds of the best against rival i; C cost, k parameters
+    n = N var(c) / (m var(mean of c in a block))        independent ones of N samples: c loss of the best, sample by
+                                                        sample, m samples in a block of 2 s
+    odds of the best = 1 / sum exp(-lambda_i)           against all the others together
+
+So the noise is what the best itself scatters by: where break-away jitters, its errors come in stretches, each of which
+counts once. Besides, lambda_i is at most z_i^2 / 2 as long as the errors of the two, second by second, differ by less
+than z_i = 2 standard errors (`block_errors`), as they must for a diagnosis to tell them apart.
+
+Nothing is named by a search that failed: rivals that have lost are searched anew from many starts before the best one
+is named, and the best must explain the experiments as well as a model can. Members of one class by algebra
+(`equivalence`) are one rival; no experiment is played for them.
+
+    resolved       the best one's odds have reached 100 : 1
+    one_class      all rivals are one by algebra: no record of pressure and position tells them apart
+    not_separable  what the best experiment inside the bounds promises, n/2 log(separation) for n independent samples,
+                   would not reach these odds however often the budget allowed it
+    budget_spent   the moves allowed are used up
+    unexplained    the best one does not explain the experiments: the effect is none of the rivals
+    stopped        the valve did not play an experiment: a permissive, a veto, a fault
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import exp, inf, log
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+
+from config.recording import Recording
+from config.results.block import Block, Table
+from config.results.result import Result
+from config.valve_file import EffectTable, ValveFile
+from sim.composition import Composition
+from sim.effect import Effect
+from workbench.data.held_out import joined
+from workbench.data.record import Record, ready, require_fittable
+from workbench.fit.descent import MIDDLING, descended, settled
+from workbench.fit.fitting import Fit, fit
+from workbench.fit.objective import FINAL, SimulationError
+from workbench.fit.threads import on_threads
+from workbench.model.free_run import FreeRun
+from workbench.model.parameters import free_parameters
+from workbench.select.block_errors import (
+    NEGLIGIBLE,
+    RARELY_OFF,
+    SAME_STANDARD_ERRORS,
+    block_logs,
+    relative_error_reduction,
+)
+from workbench.select.diagnosis import Diagnosis
+from workbench.select.diagnosis_json import parameters_json
+from workbench.select.equivalence import classes
+from workbench.select.experiment import REST_S
+from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, designed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ODDS = 100.0
+BUDGET = 60
+"""Moves."""
+FEW_MOVES, SURE = 3, 3.0
+"""An experiment of few moves will do if it promises so many times the log odds wanted."""
+DOUBT = 2.0
+"""Factor on what an experiment promises before it is given up: it is worked out under few draws of the noise."""
+STRETCH_S = 2.0
+"""Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
+
+Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What came of an experiment: its recording, or why there is none."""
+
+    recording: Recording | None
+    problem: str = ""
+
+
+Player = Callable[[DesignedExperiment], Played]
+"""Plays an experiment on the valve, real or simulated."""
+
+
+class Designer(Protocol):
+    """Chooses the next experiment."""
+
+    def __call__(
+        self, fits: Sequence[Fit], record: Record, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+    ) -> DesignedExperiment | None:
+        """Return it; None if none is allowed."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """A rival in all recordings so far: its fit, log rms of its error by blocks, and what is independent of it."""
+
+    fit: Fit
+    logs: np.ndarray[Any, np.dtype[np.float64]]
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """An experiment played: moves used by then, and the odds of each rival against the best, at most 1."""
+
+    name: str
+    separation: float
+    moves: int
+    odds: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Discrimination(Result):
+    """What the experiments came to."""
+
+    outcome: Outcome
+    named: tuple[str, ...]
+    """The effect that was found, with those that are one with it by algebra; empty if none."""
+    rivals: tuple[tuple[str, ...], ...]
+    """Classes by algebra."""
+    rounds: tuple[Round, ...]
+    odds: float
+    """Of the best against all others together."""
+    fits: Mapping[str, Fit]
+    recordings: tuple[Recording, ...]
+    """Of the experiments."""
+    problem: str
+
+    @property
+    def moves(self) -> int:
+        """Used."""
+        return self.rounds[-1].moves if self.rounds else 0
+
+    @property
+    def sentence(self) -> str:
+        """Say what came of it."""
+        who = " or ".join("/".join(each) for each in self.rivals)
+        after = f"after {self.moves} moves in {len(self.rounds)} experiments"
+        match self.outcome:
+            case "resolved":
+                same = f" ({' and '.join(self.named[1:])} would look the same)" if len(self.named) > 1 else ""
+                return f"{self.named[0]} is missing{same}: odds {_odds(self.odds)} {after}"
+            case "one_class":
+                return f"{who}: one by algebra, no record of pressure and position tells them apart"
+            case "not_separable":
+                return f"{who}: cannot be told apart by this valve within these permissives ({after})"
+            case "budget_spent":
+                return f"{who}: not told apart {after}, the budget; best odds {_odds(self.odds)}"
+            case "unexplained":
+                return f"none of {who} explains the experiments: something else is missing ({after})"
+        return f"{who}: not told apart, the valve did not play on: {self.problem} ({after})"
+
+    def blocks(self) -> list[Block]:
+        """Say the outcome, and each round."""
+        names = [each[0] for each in self.rivals]
+        rows = [
+            (
+                str(i),
+                each.name,
+                str(each.moves),
+                f"{each.separation:.3g}",
+                *(f"{each.odds[name]:.2g}" for name in names),
+            )
+            for i, each in enumerate(self.rounds, start=1)
+        ]
+        table = [Table(("round", "experiment", "moves", "separation", *names), rows)] if rows else []
+        return [f"{self.outcome}: {self.sentence}", *table]
+
+    def frame_columns(self) -> dict[str, list[object]]:
+        """Return a row an experiment."""
+        columns: dict[str, list[object]] = {
+            "experiment": [each.name for each in self.rounds],
+            "moves": [each.moves for each in self.rounds],
+            "separation": [each.separation for each in self.rounds],
+        }
+        return columns | {each[0]: [row.odds[each[0]] for row in self.rounds] for each in self.rivals}
+
+    def plot(self) -> "Figure":
+        """Draw the odds of each rival against the best, experiment by experiment."""
+        from config.results.drawing import MEASURED, legend, line, panels
+
+        figure, (axes,) = panels((3.0,))
+        moves = np.array([each.moves for each in self.rounds], dtype=np.float64)
+        for name in (each[0] for each in self.rivals):
+            line(axes, moves, np.array([each.odds[name] for each in self.rounds]), MEASURED, name)
+        axes.set_yscale("log")
+        axes.set_xlabel("moves")
+        axes.set_ylabel("odds against the best")
+        legend(axes)
+        return figure
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it in plain types; SI units, in the names."""
+        return {
+            "outcome": self.outcome,
+            "sentence": self.sentence,
+            "named": list(self.named),
+            "rivals": [list(each) for each in self.rivals],
+            "odds": self.odds if self.odds < inf else None,
+            "moves": self.moves,
+            "problem": self.problem,
+            "rounds": [
+                {"experiment": each.name, "separation": each.separation, "moves": each.moves, "odds": dict(each.odds)}
+                for each in self.rounds
+            ],
+            "fits": {
+                name: {"rmse_m": each.rms_m, "parameters": parameters_json(each)} for name, each in self.fits.items()
+            },
+        }
+
+
+def discriminate(
+    fits: Mapping[str, Fit],
+    recordings: Sequence[Recording],
+    player: Player,
+    bounds: Bounds,
+    library: Mapping[str, Effect],
+    *,
+    budget: int = BUDGET,
+    design: Designer = designed,
+    seed: int = 0,
+    workers: int | None = None,
+    on_round: Callable[[Round], None] | None = None,
+) -> Discrimination:
+    """Tell rivals apart by experiments on the valve.
+
+    Args:
+        fits: by the name of the effect in which they differ: each valve as fitted to the recordings.
+        recordings: so far.
+        player: plays an experiment.
+        bounds: that every experiment stays inside.
+        library: the effects by name.
+        budget: moves allowed.
+        design: chooses the next experiment.
+        seed: of the designs and searches.
+        workers: threads, by default one a core.
+        on_round: told each round when it is weighed.
+
+    Raises:
+        InputError: the recordings hold too little.
+    """
+    gathered = tuple(tuple(sorted(each, key=list(fits).index)) for each in classes(fits, library))
+    race = Race({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), seed, workers)
+    rounds: list[Round] = []
+    experiments: list[Recording] = []
+    outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
+    problem, used = "", 0
+    while outcome is None:
+        left = budget - used
+        chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
+        if chosen is None or not race.worthwhile(chosen, left):
+            outcome = "not_separable"
+            break
+        played = player(chosen)
+        if played.recording is None:
+            outcome, problem = "stopped", played.problem
+            break
+        experiments.append(played.recording)
+        used += chosen.course.moves
+        race = race.with_recording(played.recording)
+        rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
+        if on_round:
+            on_round(rounds[-1])
+        outcome = race.decided or ("budget_spent" if used >= budget else None)
+    named = next(each for each in gathered if each[0] == race.best) if outcome in ("resolved", "one_class") else ()
+    return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
+
+
+def _chosen(
+    race: "Race", bounds: Bounds, design: Designer, left: int, seed: int, workers: int | None
+) -> DesignedExperiment | None:
+    """Return the experiment of few moves if it promises the odds by itself, else one of more."""
+    chosen = None
+    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES)}):
+        chosen = design(race.alive, race.record, bounds, seed=seed, most_moves=most, workers=workers)
+        if chosen is not None and race.promised(chosen) >= SURE * log(ODDS):
+            break
+    return chosen
+
+
+def rivals_of(diagnosis: Diagnosis) -> dict[str, Fit]:
+    """Return the fits of the first set with more than one member; empty if there is none."""
+    for step in diagnosis.steps:
+        fits = {each.name: each.model.fit for each in step.indistinguishable if each.model}
+        if len(fits) > 1:
+            return fits
+    return {}
+
+
+def log_odds(best: Weighed, rival: Weighed) -> float:
+    """Return lambda of the best against a rival: 0 where nothing speaks against it."""
+    n = best.share * best.fit.count
+    ratio = log(max(rival.fit.cost, np.finfo(float).tiny) / max(best.fit.cost, np.finfo(float).tiny))
+    evidence = 0.5 * (n * ratio + (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0)))
+    _, z = relative_error_reduction(rival.logs, best.logs)
+    return max(0.0, evidence if z >= SAME_STANDARD_ERRORS else min(evidence, 0.5 * max(0.0, z) ** 2))
+
+
+class Race:
+    """The rivals in all recordings so far."""
+
+    def __init__(
+        self, fits: Mapping[str, Fit], recordings: tuple[Recording, ...], seed: int, workers: int | None, first: int = 0
+    ) -> None:
+        self._recordings = recordings
+        self._first = first or len(recordings)
+        self._whole = joined(recordings)
+        require_fittable(self._whole)
+        self.record = ready(self._whole)
+        self._seed = seed
+        self._workers = workers
+        self.fits = dict(fits)
+        self._sigma_m = self.record.noise_m or np.finfo(float).tiny
+        weighed = {name: self._weighed(each) for name, each in fits.items()}
+        self._all = weighed
+        # The likeliest, by the cost and the number of its parameters.
+        self.best = min(weighed, key=lambda name: _criterion(weighed[name].fit))
+
+    @property
+    def relative(self) -> Mapping[str, float]:
+        """The odds of each rival against the best."""
+        best = self._all[self.best]
+        return {name: exp(-log_odds(best, each)) if name != self.best else 1.0 for name, each in self._all.items()}
+
+    @property
+    def alive(self) -> list[Fit]:
+        """Fits of the rivals that have not lost yet, at least two, likeliest first."""
+        ranked = sorted(self.relative.items(), key=lambda each: -each[1])
+        return [self.fits[name] for i, (name, odds) in enumerate(ranked) if i < 2 or odds > 1.0 / ODDS]
+
+    @property
+    def odds(self) -> float:
+        """The odds of the best against all others together."""
+        others = sum(self.relative.values()) - 1.0
+        return 1.0 / others if others > 0.0 else inf
+
+    @property
+    def decided(self) -> Outcome | None:
+        """What the odds come to; None below `ODDS`."""
+        if self.odds < ODDS:
+            return None
+        return "resolved" if self.explained else "unexplained"
+
+    def promised(self, chosen: DesignedExperiment) -> float:
+        """Return by how much an experiment is to raise the log odds."""
+        samples = (chosen.course.duration_s - REST_S) / self.record.period_s
+        return 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
+
+    def worthwhile(self, chosen: DesignedExperiment, left: int) -> bool:
+        """Whether an experiment, repeated while so many moves are left, promises odds enough."""
+        return DOUBT * self.promised(chosen) * max(1.0, left / max(1, chosen.course.moves)) >= log(ODDS)
+
+    @property
+    def explained(self) -> bool:
+        """Whether the best does as well in the experiments as in the recordings before, or as the sensor allows."""
+        before = sum(map(len, self._recordings[: self._first]))
+        error_m = self._error_m(self.fits[self.best])
+        yardstick_m = max(self.record.floor_m, _typical_m(self.record.time_s[:before], error_m[:before]))
+        return _typical_m(self.record.time_s[before:], error_m[before:]) <= RARELY_OFF * yardstick_m
+
+    def with_recording(self, recording: Recording) -> "Race":
+        """Return it after another recording: every rival refitted from where it was, and from where the best was."""
+        race = Race(self.fits, (*self._recordings, recording), self._seed, self._workers, self._first)
+        names = list(self.fits)
+        refitted = on_threads(lambda name: race._refitted(self.fits[name], self.fits[self.best]), names, self._workers)
+        found = race._with(dict(zip(names, refitted, strict=True)))
+        return found.searched_anew() if found.odds >= ODDS else found
+
+    def searched_anew(self) -> "Race":
+        """Return it with every rival searched from many starts; the better of both is kept."""
+        found, bases = {}, dict[tuple[EffectTable, ...], Fit]()
+        for name, here in self.fits.items():
+            others = tuple(each for each in here.valve.effect if each.name != name)
+            bare = ValveFile(valve=self.fits[self.best].valve.valve, effect=others)
+            how: dict[str, Any] = {"seed": self._seed, "workers": self._workers, "profile": False}
+            base = bases.get(others) or fit(self._whole, bare, **how)
+            bases[others] = base
+            there = fit(self._whole, bare, effects=(name,), base=base, **how)
+            found[name] = min(here, there, key=lambda each: each.cost)
+        return self._with(found)
+
+    def _with(self, fits: Mapping[str, Fit]) -> "Race":
+        return Race(fits, self._recordings, self._seed, self._workers, self._first)
+
+    def _refitted(self, here: Fit, best: Fit) -> Fit:
+        """Return a fit to the whole record, from its own parameters and from those that it shares with the best."""
+        composition = Composition.from_file(here.valve)
+        parameters = free_parameters(composition, tuple(here.parameters))
+        error = SimulationError(FreeRun(composition, self.record), composition, parameters, composition.theta)
+        own = error.coordinates(composition.theta)
+        shared = composition.theta.copy()
+        bests = Composition.from_file(best.valve)
+        for name, value in zip(bests.names, bests.theta.tolist(), strict=True):
+            if name in composition.names:
+                shared[composition.names.index(name)] = value
+        starts = [own, error.coordinates(shared), *map(error.coordinates, here.seeds)]
+        ends = [settled(error, descended(error, z, MIDDLING)) for z in starts]
+        z = min(ends, key=error.cost)
+        theta = error.theta(z)
+        values: dict[str, float] = dict(zip(composition.names, theta.tolist(), strict=True))
+        base = here.valve.valve.model_copy(
+            update={name: value for name, value in values.items() if name in type(here.valve.valve).model_fields}
+        )
+        tables = tuple(
+            each.model_copy(update={key: values[f"{each.name}.{key}"] for key in each.parameters})
+            for each in here.valve.effect
+        )
+        fitted = {
+            each.name: replace(here.parameters[each.name], value=float(theta[each.index])) for each in error.parameters
+        }
+        return replace(
+            here,
+            valve=ValveFile(valve=base, effect=tables),
+            parameters=fitted,
+            rms_m=error.rms_m(z),
+            cost=error.cost(z),
+            count=error.count,
+        )
+
+    def _error_m(self, found: Fit) -> np.ndarray[Any, np.dtype[np.float64]]:
+        composition = Composition.from_file(found.valve)
+        position_m = FreeRun(composition, self.record).position_m(composition.theta)
+        return np.where(self.record.valid, position_m - self.record.position_m, np.nan)
+
+    def _weighed(self, found: Fit) -> Weighed:
+        error_m = self._error_m(found)
+        negligible_m = NEGLIGIBLE * self.record.floor_m
+        parts = np.cumsum([0, *map(len, self._recordings)])
+        logs = [block_logs(self.record.time_s[a:b], error_m[a:b], negligible_m) for a, b in pairwise(parts.tolist())]
+        return Weighed(found, np.concatenate(logs), _independent_share(error_m / self._sigma_m, self.record.period_s))
+
+
+def _typical_m(time_s: np.ndarray[Any, Any], error_m: np.ndarray[Any, Any]) -> float:
+    """Return the median of the blocks' errors, m."""
+    return exp(float(np.median(block_logs(time_s, error_m, 0.0))))
+
+
+def _independent_share(residuals: np.ndarray[Any, Any], period_s: float) -> float:
+    """Return n / N of the residuals, in units of the noise."""
+    loss = np.sqrt(1.0 + (residuals[np.isfinite(residuals)] / FINAL) ** 2)
+    size = max(1, round(STRETCH_S / period_s))
+    blocks = loss[: loss.size // size * size].reshape(-1, size)
+    spread = size * float(np.var(blocks.mean(axis=1)))
+    return min(1.0, float(np.var(loss)) / spread) if spread > 0.0 else 1.0
+
+
+def _criterion(found: Fit) -> float:
+    n = found.count
+    return n * log(max(found.cost, np.finfo(float).tiny)) + len(found.parameters) * log(n)
+
+
+def _odds(odds: float) -> str:
+    return f"{odds:.3g} : 1" if odds < inf else "beyond number"

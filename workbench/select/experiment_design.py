@@ -1,0 +1,380 @@
+"""An experiment designed for rivals: levels, ramps and holds sought so that a refit imitates as little as possible.
+
+A course is a first level and legs, each a ramp to a level, then a hold; a leg is a move. It begins as some consecutive
+moves of an input of the menu (`experiment`) and is changed at random, one leg or all lengths at a time, a change kept
+if it separates more.
+
+A valve A answers a course, under a pressure noise that makes it repeat itself no better than the recordings show. It
+and its rival B are refitted to the answer by one Gauss-Newton step, each held to what the recordings so far say of its
+parameters z:
+
+    dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, H = J' J over the recordings
+    separation = C(e_B) / C(e_A)     C soft-L1 cost; both ways in the geometric mean, least of all pairs
+    sigma_p = k_s / A sqrt(sigma^2 - sigma_sensor^2)     of the noise, an autoregression of 0.2 s; sigma floor
+
+The best few, and the best of the menu as they are, are then refitted in full, by descents from wide to narrow under
+other noise, and the one with the largest separation is chosen: by how many times a refitted rival is worse off than the
+valve that answered. A slip that only luck decides mistimes both, and separates nothing.
+
+Every course stays inside its bounds: pressures, rate, length; and every rival says that the stem stays in its window.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from config.errors import InputError
+from config.recording import Recording
+from config.results.result import Brief
+from sim.composition import AREA, SPRING, Composition
+from sim.effect import FINE_STEP_S
+from sim.karnopp import Vector
+from sim.open_loop import respond
+from workbench.data.record import Record, ready
+from workbench.fit.descent import descended_through
+from workbench.fit.fitting import Fit
+from workbench.fit.objective import FINAL, SimulationError, soft
+from workbench.fit.threads import on_threads
+from workbench.model.free_run import FreeRun
+from workbench.model.parameters import free_parameters
+from workbench.select.experiment import LENGTH_S, MARGIN, MENU, REST_S, Command, Experiment, Shape
+
+MOST_MOVES = 8
+"""Of one experiment."""
+TRIED, KEPT = 25, 2
+"""Changes tried of each course of the menu that is kept; how many are, changed and as they are."""
+WINDOWS = 3
+"""Courses cut out of an input of the menu."""
+DIFFERENCE = 1e-3
+"""Of a log-parameter, for the one step: wide enough to see across a stair."""
+SEARCHED, CHECKED = (1, 2), (3, 4, 5)
+"""Draws of the noise for which a course is sought, and for which the best are refitted in full."""
+CORRELATION_S = 0.2
+SHORTEST_S = 0.05
+"""Of a leg."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What an experiment must stay inside: Pa, Pa/s, s, and m of stem travel."""
+
+    minimum_pa: float
+    maximum_pa: float
+    rate_pa_per_s: float
+    longest_s: float
+    low_m: float
+    high_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A ramp to a level, Pa, then a hold; s."""
+
+    level_pa: float
+    ramp_s: float
+    hold_s: float
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Course(Brief):
+    """A first level, Pa, held until the valve has settled, and the legs that follow."""
+
+    name: str
+    first_pa: float
+    legs: tuple[Leg, ...]
+
+    @property
+    def moves(self) -> int:
+        """Legs that go anywhere."""
+        levels = [self.first_pa, *(leg.level_pa for leg in self.legs)]
+        return sum(before != after for before, after in pairwise(levels))
+
+    @property
+    def duration_s(self) -> float:
+        """With the first hold."""
+        return REST_S + sum(leg.ramp_s + leg.hold_s for leg in self.legs)
+
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Return times, s, and pressures, Pa, between which the command goes straight."""
+        time_s, level_pa = REST_S, self.first_pa
+        points = [(0.0, level_pa), (time_s, level_pa)]
+        for leg in self.legs:
+            for length_s in (leg.ramp_s, leg.hold_s):
+                time_s += length_s
+                if length_s > 0.0:
+                    points.append((time_s, leg.level_pa))
+        return tuple(points)
+
+    def sampled(self, period_s: float) -> tuple[Command, Command]:
+        """Return times, s, and commands, Pa, each held for a period."""
+        at_s, levels_pa = np.array(self.points()).T
+        time_s = np.asarray(period_s * np.arange(max(2, round(self.duration_s / period_s))), dtype=np.float64)
+        return time_s, np.asarray(np.interp(time_s, at_s, levels_pa), dtype=np.float64)
+
+    def within(self, bounds: Bounds) -> "Course":
+        """Return it with its levels inside the pressures, its ramps no faster than the rate, no longer than allowed.
+
+        Raises:
+            InputError: the ramps alone take longer than allowed.
+        """
+        levels = np.clip([self.first_pa, *(leg.level_pa for leg in self.legs)], bounds.minimum_pa, bounds.maximum_pa)
+        least_s = np.abs(np.diff(levels)) / bounds.rate_pa_per_s
+        ramps_s = np.maximum([leg.ramp_s for leg in self.legs], least_s)
+        holds_s = np.array([leg.hold_s for leg in self.legs])
+        room_s = bounds.longest_s - REST_S - least_s.sum()
+        if room_s <= 0.0:
+            raise InputError(
+                "experiment", f"{bounds.longest_s:g} s are too short for {len(self.legs)} moves at the rate"
+            )
+        spare_s = (ramps_s - least_s).sum() + holds_s.sum()
+        part = min(1.0, room_s / spare_s) if spare_s > 0.0 else 1.0
+        lengths = zip(
+            levels[1:].tolist(), (least_s + part * (ramps_s - least_s)).tolist(), holds_s.tolist(), strict=True
+        )
+        return Course(
+            self.name, float(levels[0]), tuple(Leg(level, ramp, part * hold) for level, ramp, hold in lengths)
+        )
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class DesignedExperiment(Brief):
+    """A course, and by how many times it leaves the rival worse off in the least distinct pair after a refit."""
+
+    course: Course
+    separation: float
+
+    def experiment(self, period_s: float) -> Experiment:
+        """Return it as an input sampled at a period, s."""
+        return Experiment(self.course.name, self.separation, *self.course.sampled(period_s))
+
+
+def moves_in(command_pa: Command) -> int:
+    """Return how often a command sets out: stretches in which it goes one way, between holds and reversals."""
+    way = np.sign(np.diff(command_pa))
+    return int(np.sum((way != 0) & (way != np.concatenate([[0], way[:-1]]))))
+
+
+def designed(
+    fits: Sequence[Fit],
+    record: Record,
+    bounds: Bounds,
+    *,
+    seed: int = 0,
+    most_moves: int = MOST_MOVES,
+    workers: int | None = None,
+) -> DesignedExperiment | None:
+    """Design the experiment that best tells fitted valves apart; None if no course stays inside the bounds.
+
+    Args:
+        fits: two or more.
+        record: of all recordings so far.
+        bounds: to stay inside.
+        seed: of the changes tried, and of the noise.
+        most_moves: of the experiment.
+        workers: threads, by default one a core.
+    """
+    rivalry = Rivalry(fits, record, bounds, seed)
+    starts = [course.within(bounds) for course in courses(record, bounds, most_moves)]
+    scores = list(on_threads(rivalry.score, starts, workers))
+    order = sorted((i for i, score in enumerate(scores) if score > -np.inf), key=lambda i: -scores[i])
+
+    def improved(i: int) -> Course:
+        return _improved(rivalry, starts[i], scores[i], bounds, np.random.default_rng([seed, i]))
+
+    kept = order[:KEPT]
+    found = [*on_threads(improved, kept, workers), *(starts[i] for i in kept)]
+    rated = list(on_threads(rivalry.separation, found, workers))
+    if not rated:
+        return None
+    best = int(np.argmax(rated))
+    return DesignedExperiment(found[best], rated[best])
+
+
+def _improved(
+    rivalry: "Rivalry", course: Course, score: float, bounds: Bounds, generator: np.random.Generator
+) -> Course:
+    for _ in range(TRIED):
+        changed = _changed(course, bounds, generator)
+        there = rivalry.score(changed)
+        if there > score:
+            course, score = changed, there
+    return course
+
+
+def _changed(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
+    """Return a course with one leg changed, or all lengths, or its first level."""
+    span_pa = bounds.maximum_pa - bounds.minimum_pa
+    size = 10.0 ** generator.uniform(-2.0, -0.3)
+    what, i = generator.integers(5), int(generator.integers(len(course.legs)))
+    legs = list(course.legs)
+    leg = legs[i]
+    if what == 0:
+        return replace(course, first_pa=course.first_pa + size * span_pa * generator.standard_normal()).within(bounds)
+    if what == 1:
+        stretch = float(np.exp(2.0 * size * generator.standard_normal()))
+        stretched = tuple(replace(each, ramp_s=stretch * each.ramp_s, hold_s=stretch * each.hold_s) for each in legs)
+        return replace(course, legs=stretched).within(bounds)
+    if what == 2:
+        legs[i] = replace(
+            leg, ramp_s=max(SHORTEST_S, leg.ramp_s) * float(np.exp(3.0 * size * generator.standard_normal()))
+        )
+    elif what == 3:
+        legs[i] = replace(
+            leg, hold_s=max(SHORTEST_S, leg.hold_s) * float(np.exp(3.0 * size * generator.standard_normal()))
+        )
+    else:
+        legs[i] = replace(leg, level_pa=leg.level_pa + size * span_pa * float(generator.standard_normal()))
+    return replace(course, legs=tuple(legs)).within(bounds)
+
+
+def courses(record: Record, bounds: Bounds, most_moves: int) -> Iterator[Course]:
+    """Yield stretches of so many moves of each input of the menu, at its own pace and drawn out to the whole length."""
+    least_pa, most_pa = float(record.command_pa.min()), float(record.command_pa.max())
+    low_pa, high_pa = max(least_pa, bounds.minimum_pa), min(most_pa, bounds.maximum_pa)
+    room_s = min(LENGTH_S, bounds.longest_s - REST_S)
+    for name, shape in MENU.items():
+        first, legs = _legs(shape)
+        most = max(0, len(legs) - most_moves)
+        for begin in sorted({round(most * share) for share in np.linspace(0.0, 1.0, WINDOWS)}):
+            chosen = legs[begin : begin + most_moves]
+            level = legs[begin - 1].level_pa if begin else first
+            lengths_s = sum(leg.ramp_s + leg.hold_s for leg in chosen)
+            drawn_out = room_s / lengths_s
+
+            def pressure(share: float) -> float:
+                return low_pa + (high_pa - low_pa) * min(max(share, MARGIN), 1.0 - MARGIN)
+
+            yield Course(
+                name,
+                pressure(level),
+                tuple(Leg(pressure(leg.level_pa), drawn_out * leg.ramp_s, drawn_out * leg.hold_s) for leg in chosen),
+            )
+
+
+def _legs(shape: Shape) -> tuple[float, list[Leg]]:
+    """Return an input of the menu as a first level and legs; levels as shares, 0 to 1, of the range."""
+    count = 2400
+    levels = shape(np.arange(count) / count)
+    way = np.sign(np.round(np.diff(levels), 9))
+    legs: list[Leg] = []
+    step_s = LENGTH_S / count
+    for at, going in enumerate(way.tolist()):
+        if not going:
+            if legs:
+                legs[-1] = replace(legs[-1], hold_s=legs[-1].hold_s + step_s)
+        elif legs and at and going == way[at - 1]:
+            legs[-1] = replace(legs[-1], level_pa=float(levels[at + 1]), ramp_s=legs[-1].ramp_s + step_s)
+        else:
+            legs.append(Leg(float(levels[at + 1]), step_s, 0.0))
+    return float(levels[0]), legs
+
+
+class Rivalry:
+    """Fitted valves held against each other's answers."""
+
+    def __init__(self, fits: Sequence[Fit], record: Record, bounds: Bounds, seed: int) -> None:
+        self._record = record
+        self._bounds = bounds
+        self._seed = seed
+        self._compositions = [Composition.from_file(each.valve) for each in fits]
+        self._names = [tuple(each.parameters) for each in fits]
+        self._sigma_m = max(record.floor_m, min(each.rms_m for each in fits))
+        self._information = [self._known(i) for i in range(len(fits))]
+
+    def score(self, course: Course) -> float:
+        """Return the separation after one step, by its logarithm; minus infinity where the stem leaves its window."""
+        return self._least(course, SEARCHED, self._stepped)
+
+    def separation(self, course: Course) -> float:
+        """Return the separation after refits in full."""
+        return float(np.exp(self._least(course, CHECKED, self._refitted)))
+
+    def _least(self, course: Course, draws: Sequence[int], cost: Callable[[Record, int], float]) -> float:
+        """Return the least of all pairs of log C_B / C_A, the mean over draws of the noise."""
+        told = []
+        for draw in draws:
+            logs = np.full((len(self._compositions),) * 2, np.inf)
+            for i in range(len(self._compositions)):
+                answer = self._answer(i, course, draw)
+                if answer is None:
+                    return -np.inf
+                costs = [cost(answer, j) for j in range(len(self._compositions))]
+                logs[i] = [np.log(each / costs[i]) if j != i else np.inf for j, each in enumerate(costs)]
+            told.append(0.5 * (logs + logs.T))
+        return float(np.min(np.mean(told, axis=0)))
+
+    def _answer(self, i: int, course: Course, draw: int) -> Record | None:
+        composition, period_s = self._compositions[i], self._record.period_s
+        generator = np.random.default_rng([self._seed, draw])
+        time_s, command_pa = course.sampled(period_s)
+        noise_pa = self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
+        periods_s = np.diff(time_s)
+        response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, periods_s, step_s=FINE_STEP_S)
+        # The first hold brings the valve from rest to where the course begins: a free run starts after it.
+        settled = time_s >= REST_S
+        position_m = response.indicated_m[settled]
+        if position_m.min() < self._bounds.low_m or position_m.max() > self._bounds.high_m:
+            return None
+        sensed_m = position_m + self._record.noise_m * generator.standard_normal(position_m.size)
+        columns = {"time_s": time_s[settled], "command_pa": command_pa[settled], "position_m": sensed_m}
+        return replace(ready(Recording(columns)), noise_m=self._record.noise_m)
+
+    def _noise_pa(self, i: int) -> float:
+        theta = self._compositions[i].theta
+        spread_m = np.sqrt(max(0.0, self._sigma_m**2 - self._record.noise_m**2))
+        return float(theta[SPRING] / theta[AREA] * spread_m)
+
+    def _error(self, i: int, record: Record) -> SimulationError:
+        composition = self._compositions[i]
+        parameters = free_parameters(composition, self._names[i])
+        return SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+
+    def _known(self, i: int) -> NDArray[np.float64]:
+        """Return H of a rival: what the recordings so far say of its parameters, in units of the sensor's noise."""
+        error = self._error(i, self._record)
+        z = error.coordinates(self._compositions[i].theta)
+        J = error.jacobian(z, error.residuals(z), DIFFERENCE)
+        return np.asarray(J.T @ J + np.eye(z.size))
+
+    def _stepped(self, answer: Record, j: int) -> float:
+        """Return C after one step."""
+        error = self._error(j, answer)
+        z = error.coordinates(self._compositions[j].theta)
+        r = error.residuals(z)
+        J = error.jacobian(z, r, DIFFERENCE)
+        dz = -np.linalg.solve(J.T @ J + self._information[j], J.T @ r)
+        return min(soft(r, FINAL), soft(r + J @ dz, FINAL))
+
+    def _refitted(self, answer: Record, j: int) -> float:
+        """Return C after a refit in full."""
+        held = _Held(self._error(j, answer), self._information[j], self._compositions[j].theta)
+        return soft(held.of_record(descended_through(held, held.middle)), FINAL)
+
+
+def _autoregression(generator: np.random.Generator, count: int, period_s: float) -> Vector:
+    """Return noise of variance 1 that forgets itself over `CORRELATION_S`, (count,)."""
+    kept = float(np.exp(-period_s / CORRELATION_S))
+    fresh = generator.standard_normal(count)
+    fresh[1:] *= np.sqrt(1.0 - kept**2)
+    return np.asarray(lfilter([1.0], [1.0, -kept], fresh), dtype=np.float64)
+
+
+class _Held(SimulationError):
+    """The error of a rival in an answer, and of its parameters in the recordings before: z - z_0 by the root of H."""
+
+    def __init__(self, error: SimulationError, information: NDArray[np.float64], theta: Vector) -> None:
+        super().__init__(error.run, error.composition, error.parameters, theta)
+        self.middle = self.coordinates(theta)
+        self._root = np.linalg.cholesky(information).T
+
+    def of_record(self, z: Vector) -> Vector:
+        """Return the residuals in the answer alone."""
+        return super().residuals(z)
+
+    def residuals(self, z: Vector) -> Vector:
+        """Return those, and what moving the parameters costs."""
+        return np.concatenate([self.of_record(z), self._root @ (z - self.middle)])
