@@ -71,8 +71,8 @@ def after_step(memory: LawMemory, settings: LawSettings | None, seen: LawInput) 
 
 
 def held_pa(memory: LawMemory | None, command_pa: float) -> float:
-    """Return what to hold when something interrupts the law after a command, Pa: for a push what follows it."""
-    return memory.held_pa(command_pa) if isinstance(memory, BreakawayMemory) else command_pa
+    """Return what to hold when something interrupts the law after a command, Pa: what follows a push, an excursion."""
+    return memory.held_pa(command_pa) if isinstance(memory, BreakawayMemory | SlideMemory) else command_pa
 
 
 def _after_pulses(memory: BreakawayMemory, settings: BreakawaySettings, seen: LawInput) -> BreakawayMemory:

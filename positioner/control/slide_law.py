@@ -234,7 +234,9 @@ def _excursion(
         if not settings.minimum_pa <= balance.pressure_pa(by_m, direction) <= settings.maximum_pa:
             why = InhibitReason.LAW_BEYOND_LIMITS
             continue
-        memory = replace(memory, excursion_s=now_s)
+        return_pa = balance.pressure_pa(target_m, -direction)
+        return_pa = min(max(return_pa, settings.minimum_pa), settings.maximum_pa)
+        memory = replace(memory, excursion_s=now_s, return_pa=return_pa)
         return _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
     return replace(memory, inhibit_reason=why)
 

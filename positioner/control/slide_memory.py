@@ -85,6 +85,8 @@ class SlideMemory:
     """Of the slide in progress."""
     excursion: bool = False
     """Whether it is the first of two."""
+    return_pa: float = nan
+    """The pressure of the second of two, from where the first was to land."""
     slides: int = 0
     """Given since the reference changed ..."""
     slide_s: float = -inf
@@ -98,6 +100,10 @@ class SlideMemory:
     excursion_s: float = -inf
     """When the last excursion began."""
     inhibit_reason: InhibitReason = InhibitReason.NOTHING
+
+    def held_pa(self, command_pa: float) -> float:
+        """Return what to hold when something interrupts after a command, Pa: of two slides the second."""
+        return self.return_pa if self.excursion else command_pa
 
     def margin(self, direction: int) -> Margin:
         """Return the margin in a direction."""

@@ -1,0 +1,231 @@
+"""A move of two slides that something interrupts while the stem is away: it ends where the safety table says."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from config.codes import Fault, Mode, State
+from config.daemon_file import DaemonFile
+from config.quantities import DeviceStatus
+from config.slave_file import SlaveFile
+from config.valve_file import ValveFile, load_valve, shipped_valve
+from drivers.boundary import NoReply, Reading
+from drivers.in_memory import MemoryDriver
+from positioner.control.controller import Decision
+from positioner.control.requests import QUIET, Requests
+from positioner.daemon.cycle import Cycle
+from positioner.virtual.virtual_cycle import identified, lockstep_cycle
+from sim.slave.simulated_device import Device
+from sim.valve import Valve
+
+VALVE = load_valve(shipped_valve("seed")).valve
+STROKE_M = VALVE.stroke_m
+PERIOD_S, LAG_S = 0.02, 0.05
+STILL, SMALL = 0.6, 0.604
+AWAY, THERE = 0.03, 2e-3
+"""Of the stroke."""
+EXCURSION_LIMIT = 0.2
+
+
+class FaultyDriver(MemoryDriver):
+    """A driver whose device fails in one way at a time."""
+
+    def __init__(self, device: Device) -> None:
+        super().__init__(device)
+        self.lost = 0
+        self.spoil: Callable[[Reading], Reading] = lambda reading: reading
+
+    def exchange(self, command_pa: float) -> Reading:
+        if self.lost:
+            self.lost -= 1
+            raise NoReply("lost")
+        return self.spoil(super().exchange(command_pa))
+
+
+class Loop:
+    """A valve behind a slow I/P under the law of slides, identified, its stem at rest at 60 %."""
+
+    def __init__(self, **safety: Any) -> None:
+        daemon = {
+            "valve": {"stroke_m": STROKE_M},
+            "cycle": {"pace": "device", "period_s": PERIOD_S},
+            "safety": {"stale_after_s": 3 * PERIOD_S, **safety},
+            "control": {"law": "slides", "excursion_limit": EXCURSION_LIMIT},
+            "excitation": {"travel_window": (0.3, 0.9)},
+        }
+        slave = {
+            "clock": {"mode": "lockstep", "period_s": PERIOD_S},
+            "sensor": {"noise_std_m": 1e-5, "seed": 1},
+            "initial": {"pressure_pa": 30e3},
+        }
+        lag = {"name": "ip_lag", "time_constant_s": LAG_S}
+        self.valve = Valve.from_file(ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": [lag]}))
+        self.valve.rest_at(0.3 * STROKE_M, 30e3)
+        self.device = Device(self.valve, SlaveFile.model_validate(slave), {})
+        self.driver = FaultyDriver(self.device)
+        first = Requests(mode=Mode.AUTOMATIC, mode_writes=1)
+        self.cycle: Cycle = lockstep_cycle(DaemonFile.model_validate(daemon), self.driver, first)
+        for _ in identified(self.cycle, 120.0, wait=False):
+            pass
+        self.ask(eta=QUIET)
+        self.step_to(STILL)
+        self.run(3.0)
+
+    @property
+    def decision(self) -> Decision:
+        return self.cycle.snapshot.decision
+
+    @property
+    def position(self) -> float:
+        return self.valve.indicated_m / STROKE_M
+
+    def ask(self, **values: Any) -> None:
+        self.cycle.requests = replace(self.cycle.requests, **values)
+
+    def step_to(self, reference: float) -> None:
+        self.ask(reference_m=reference * STROKE_M, reference_writes=self.cycle.requests.reference_writes + 1)
+
+    def choose(self, mode: Mode) -> None:
+        self.ask(mode=mode, mode_writes=self.cycle.requests.mode_writes + 1)
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD_S)):
+            self.cycle.once()
+
+    def away(self) -> "Loop":
+        """Ask for a small move and stop while the stem is away from it, the first of two slides under way."""
+        self.step_to(SMALL)
+        for _ in range(100):
+            self.cycle.once()
+            if abs(self.position - SMALL) > AWAY:
+                return self
+        raise AssertionError("no excursion")
+
+
+def unfit(reading: Reading) -> Reading:
+    return replace(reading, status=int(DeviceStatus.SENSOR_FAULT))
+
+
+def absurd(reading: Reading) -> Reading:
+    return replace(reading, position_m=3.0 * STROKE_M)
+
+
+def frozen_at(shown: Reading) -> Callable[[Reading], Reading]:
+    return lambda reading: replace(shown, device_time_s=reading.device_time_s)
+
+
+FAULTS: dict[Fault, Callable[[Reading], Reading]] = {Fault.DEVICE: unfit, Fault.IMPLAUSIBLE: absurd}
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.MANUAL])
+def test_leaving_automatic_lets_the_stem_come_back(mode: Mode) -> None:
+    loop = Loop().away()
+    loop.choose(mode)
+    loop.run(2.0)
+    assert loop.decision.state is State.S0_START
+    assert abs(loop.position - SMALL) < THERE
+
+
+@pytest.mark.parametrize("fault", [*FAULTS, Fault.STALE], ids=lambda each: each.name)
+def test_a_fault_that_holds_lets_the_stem_come_back(fault: Fault) -> None:
+    loop = Loop().away()
+    loop.driver.spoil = frozen_at(loop.driver.read()) if fault is Fault.STALE else FAULTS[fault]
+    loop.run(2.0)
+    assert loop.decision.fault is fault
+    assert abs(loop.position - SMALL) < THERE
+    held_pa = loop.decision.command_pa
+    loop.driver.spoil = lambda reading: reading
+    loop.ask(acknowledgements=1)
+    loop.run(1.0)
+    assert (loop.decision.fault, loop.decision.mode, loop.decision.command_pa) == (Fault.NONE, Mode.HOLD, held_pa)
+
+
+def test_a_silent_dcs_lets_the_stem_come_back() -> None:
+    loop = Loop(heartbeat_timeout_s=500.0).away()
+    controller = loop.cycle._controller
+    limits = replace(controller._settings.limits, heartbeat_timeout_s=0.1)
+    controller._settings = replace(controller._settings, limits=limits)
+    loop.run(2.0)
+    assert loop.decision.fault is Fault.DCS_SILENT
+    assert abs(loop.position - SMALL) < THERE
+
+
+def test_a_fault_that_vents_vents() -> None:
+    loop = Loop(action="vent").away()
+    loop.driver.spoil = unfit
+    loop.run(3.0)
+    assert loop.decision.command_pa == 0.0
+    assert loop.valve.pressure_pa < 100.0
+
+
+def test_the_end_of_the_daemon_leaves_what_would_have_followed() -> None:
+    loop = Loop().away()
+    controller = loop.cycle._controller
+    assert controller.left_pa != controller.command_pa
+    for _ in range(100):
+        loop.driver.write(controller.left_pa)
+    assert abs(loop.position - SMALL) < THERE
+
+
+def test_a_lost_reply_or_two_change_nothing() -> None:
+    loop = Loop().away()
+    loop.driver.lost = 2
+    loop.run(3.0)
+    assert (loop.decision.fault, loop.decision.state) == (Fault.NONE, State.S1_UP)
+    assert abs(loop.position - SMALL) < 1e-3
+
+
+def test_a_bus_that_was_away_leaves_the_device_what_it_holds() -> None:
+    """Nothing moves a valve that is found again, not even back: its stem stays within the excursion's limit."""
+    loop = Loop().away()
+    held_pa = loop.device.command_pa
+    loop.driver.lost = 10
+    loop.run(1.0)
+    assert loop.decision.fault is Fault.RESTARTED  # it holds another command than it was given last
+    assert loop.decision.command_pa == loop.device.command_pa == held_pa
+    loop.run(1.0)
+    assert abs(loop.position - SMALL) < EXCURSION_LIMIT
+    loop.ask(acknowledgements=1)
+    loop.run(0.1)
+    loop.choose(Mode.AUTOMATIC)
+    loop.step_to(STILL)
+    loop.run(3.0)
+    assert abs(loop.position - STILL) < 1e-3
+
+
+def test_a_device_restarted_meanwhile_keeps_its_own_command() -> None:
+    loop = Loop().away()
+    loop.driver.lost = 1
+    loop.cycle.once()
+    loop.device._boot()
+    loop.run(1.0)
+    assert loop.decision.fault is Fault.RESTARTED
+    assert loop.decision.command_pa == loop.device.command_pa == 30e3
+
+
+def test_another_reference_is_where_the_stem_ends() -> None:
+    for reference in (0.61, 0.5, 0.601):
+        loop = Loop().away()
+        loop.step_to(reference)
+        loop.run(4.0)
+        assert abs(loop.position - reference) < 1e-3
+
+
+def test_an_acknowledgement_without_a_fault_changes_nothing() -> None:
+    loop = Loop().away()
+    loop.ask(acknowledgements=1)
+    loop.run(3.0)
+    assert loop.decision.state is State.S1_UP
+    assert abs(loop.position - SMALL) < 1e-3
+
+
+def test_an_identification_begun_meanwhile_and_broken_off_comes_back() -> None:
+    loop = Loop().away()
+    loop.ask(eta=(0, 0, 0))
+    loop.run(0.4)
+    assert loop.decision.state is State.S3_IDENTIFY
+    loop.ask(eta=QUIET)
+    loop.run(4.0)
+    assert abs(loop.position - SMALL) < 1e-3
