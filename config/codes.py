@@ -151,6 +151,10 @@ class Refusal(Code):
         23,
         "slides land elsewhere than this says: a preload, or unlike friction up and down",
     )
+    LANDINGS_SHIFTED = (
+        27,
+        "landings before and after a moment disagree: the sensor jumped, or something shifted the stem; try again",
+    )
 
 
 class Ne107Status(Code):

@@ -95,8 +95,11 @@ def climbed(
     stairs, rest = excitation.signal, statics.detector.rest
     if not isinstance(stairs, Staircase) or settings.staircase is None or excitation.ended or rest is None:
         return excitation
-    if stairs.over(statics.law.valid, settings.staircase):
-        if statics.law.valid:
+    stairs, law_valid = stairs.counted(outcome), statics.law.valid
+    if stairs.over(law_valid):
+        if law_valid:
             return replace(excitation, signal=replace(stairs, complete=True))
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
-    return replace(excitation, signal=stairs.after(outcome, rest.position_m, settings.staircase))
+    if stairs.enough(law_valid, settings.staircase):
+        stairs = stairs.turned_to_close()
+    return replace(excitation, signal=stairs.stepped(rest.position_m, settings.staircase))

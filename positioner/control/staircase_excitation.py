@@ -9,7 +9,9 @@ since the stem last moved:
     from then on       1.05 times the least, or an eighth of the window if that is more: each step is a slide
     at the bound       of the window, or where the next slide would leave it, the staircase turns round
 
-It ends when the landings of both directions give a valid static law, or after `MOST_TURNS`. No alpha and beta are
+When the landings of both directions give a valid static law it turns round once more, for one landing that closes the
+round as a surveyor closes his: a sensor that was shifted meanwhile lands it elsewhere. Then it has ended, or after
+`MOST_TURNS`. No alpha and beta are
 needed: break-away is found by the ramp of small steps, and nothing is asked for beyond the window and the pressure
 limits.
 """
@@ -33,6 +35,8 @@ MANY_EACH = 8
 WIDE = 0.5
 """Of the window, over which the landings of each direction must lie: what changes over the travel shows there."""
 NOT_COMPLETE = 0.99
+NEARLY_TURNED = 0.8
+"""Of the rise that turned friction round before: the first step of the last turn."""
 MOST_TURNS = 6
 
 
@@ -68,6 +72,9 @@ class Staircase:
         up_m, down_m: way over which they lie, the longest without turning round.
         going_m: the same of the direction it goes in.
         turns: how often it turned round.
+        reversal_pa: rise that turned friction round, after a turn; 0: none yet.
+        closing: whether it has turned round for the last landing ...
+        closed: ... and has had that.
         complete: whether it has given a static law.
     """
 
@@ -85,6 +92,9 @@ class Staircase:
     down_m: float = 0.0
     going_m: float = 0.0
     turns: int = 0
+    reversal_pa: float = 0.0
+    closing: bool = False
+    closed: bool = False
     complete: bool = False
 
     @property
@@ -93,16 +103,23 @@ class Staircase:
         had = (min(self.ups, FEWEST_EACH) + min(self.downs, FEWEST_EACH)) / (2 * FEWEST_EACH)
         return 1.0 if self.complete else min(had, NOT_COMPLETE)
 
-    def over(self, law_valid: bool, limits: StaircaseLimits) -> bool:
+    def over(self, law_valid: bool) -> bool:
         """Return whether the staircase has what it wants, or cannot have it."""
+        return (law_valid and self.closed) or self.turns >= MOST_TURNS
+
+    def enough(self, law_valid: bool, limits: StaircaseLimits) -> bool:
+        """Return whether the staircase has all landings but the one that closes it."""
         wide = min(self.up_m, self.down_m) >= WIDE * limits.window_m
         many = self._least_known(limits) or min(self.ups, self.downs) >= MANY_EACH
-        enough = law_valid and min(self.ups, self.downs) >= FEWEST_EACH and wide and many
-        return enough or self.turns >= MOST_TURNS
+        return law_valid and min(self.ups, self.downs) >= FEWEST_EACH and wide and many
 
-    def after(self, outcome: SlideOutcome | None, position_m: float, limits: StaircaseLimits) -> "Staircase":
-        """Return the staircase with its next step, the stem resting at a position, m, after what the last step did."""
-        stairs = self if outcome is None else self._counted(outcome)
+    def turned_to_close(self) -> "Staircase":
+        """Return it in the other direction, for the last landing."""
+        return self if self.closing else replace(self._turned(), closing=True)
+
+    def stepped(self, position_m: float, limits: StaircaseLimits) -> "Staircase":
+        """Return the staircase with its next step, the stem resting at a position, m."""
+        stairs = self
         if stairs.direction == 0:
             stairs = replace(stairs, direction=1 if position_m < limits.high_m else -1)
         bound_m = limits.high_m if stairs.direction > 0 else limits.low_m
@@ -110,7 +127,7 @@ class Staircase:
         at_limit_pa = limits.maximum_pa if stairs.direction > 0 else limits.minimum_pa
         if left_m < stairs.slide_m or left_m <= 0.0 or stairs.level_pa == at_limit_pa:
             stairs = stairs._turned()
-        return stairs._stepped(limits)
+        return stairs._next_step(limits)
 
     def _turned(self) -> "Staircase":
         """Return it in the other direction."""
@@ -125,8 +142,10 @@ class Staircase:
             going_m=0.0,
         )
 
-    def _counted(self, outcome: SlideOutcome) -> "Staircase":
-        """Return it with what the last step did."""
+    def counted(self, outcome: SlideOutcome | None) -> "Staircase":
+        """Return it with what the last step did, if that is known now."""
+        if outcome is None:
+            return self
         first = self.slide_m == 0.0  # of a direction: its rise turned friction round, too
         if not outcome.moved:
             return self if first else replace(self, low_pa=max(self.low_pa, self.rise_pa))
@@ -142,9 +161,10 @@ class Staircase:
             slide_m=went_m,
             rise_pa=0.0,
             step_pa=0.0,
+            closed=self.closed or (self.closing and outcome.landing),
         )
         if first:
-            return counted
+            return replace(counted, reversal_pa=self.rise_pa) if self.turns else counted
         high_pa = self.rise_pa if self.high_pa < self.low_pa else min(self.high_pa or self.rise_pa, self.rise_pa)
         return replace(counted, high_pa=high_pa, slope_pa_per_m=self.rise_pa / went_m)
 
@@ -163,10 +183,14 @@ class Staircase:
             wanted_pa = sqrt(low_pa * self.high_pa) if self.high_pa > low_pa else GROWTH * low_pa
         return wanted_pa if wanted_pa > self.rise_pa else GROWTH * self.rise_pa
 
-    def _stepped(self, limits: StaircaseLimits) -> "Staircase":
+    def _next_step(self, limits: StaircaseLimits) -> "Staircase":
         span_pa = limits.maximum_pa - limits.minimum_pa
         if self.slide_m > 0.0 and self.slope_pa_per_m > 0.0:
             step_pa = self._wanted_rise_pa(limits) - self.rise_pa
+        elif self.closing and not self.step_pa:
+            step_pa = NEARLY_TURNED * self.reversal_pa or FIRST_STEP * span_pa
+        elif self.closing:
+            step_pa = FIRST_STEP * span_pa
         else:
             step_pa = min(GROWTH * self.step_pa, LARGEST_STEP * span_pa) if self.step_pa else FIRST_STEP * span_pa
         level_pa = min(max(self.level_pa + self.direction * step_pa, limits.minimum_pa), limits.maximum_pa)

@@ -45,3 +45,23 @@ def test_the_reason_is_that_the_model_does_not_fit() -> None:
 def test_without_a_fault_the_same_is_applied() -> None:
     decision, _ = identified(SINE, NO_FAULT, 0)
     assert off(SINE, decision, 0.0) < 1.0
+
+
+SLOW = STAIRCASES[-1]
+SHIFTS = [SensorFault(at_s, inf, by * STROKE_M) for at_s in (6.0, 9.98, 10.7, 12.0) for by in (-0.1, 0.02, 0.2)]
+
+
+@pytest.mark.parametrize("fault", SHIFTS, ids=str)
+def test_a_staircase_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFault) -> None:
+    """On the way up, at the turn, in the first slide down, on the way down: there is a last landing up to tell."""
+    decision, _ = identified(SLOW, fault, 3)
+    if decision.applied.ratios is None:
+        assert decision.applied.last_refusal is not Refusal.VALID
+        assert not decision.static_law.valid
+    else:
+        assert min(off(SLOW, decision, each) for each in (0.0, fault.by_m)) < 1.0
+
+
+def test_a_staircase_without_a_fault_is_applied() -> None:
+    decision, _ = identified(SLOW, NO_FAULT, 3)
+    assert off(SLOW, decision, 0.0) < 1.0

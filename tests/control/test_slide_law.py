@@ -184,19 +184,19 @@ def outcome(direction: int, from_m: float, to_m: float) -> SlideOutcome:
 
 
 def test_steps_grow_until_the_stem_breaks_loose() -> None:
-    stairs = Staircase(10e3).after(None, 0.03, LIMITS)
+    stairs = Staircase(10e3).stepped(0.03, LIMITS)
     first_pa = stairs.step_pa
     assert stairs.direction == 1
     assert first_pa == pytest.approx(0.02 * 420e3)
-    stairs = stairs.after(outcome(1, 0.03, 0.03), 0.03, LIMITS)
+    stairs = stairs.counted(outcome(1, 0.03, 0.03)).stepped(0.03, LIMITS)
     assert stairs.step_pa == pytest.approx(1.3 * first_pa)
     assert stairs.level_pa == pytest.approx(10e3 + 2.3 * first_pa)
 
 
 def test_the_staircase_turns_round_before_it_leaves_the_window() -> None:
     stairs = replace(Staircase(80e3, direction=1, slide_m=0.01), rise_pa=5e3)
-    assert stairs.after(outcome(1, 0.075, 0.085), 0.085, LIMITS).direction == -1
-    assert stairs.after(outcome(1, 0.065, 0.075), 0.075, LIMITS).direction == 1
+    assert stairs.counted(outcome(1, 0.075, 0.085)).stepped(0.085, LIMITS).direction == -1
+    assert stairs.counted(outcome(1, 0.065, 0.075)).stepped(0.075, LIMITS).direction == 1
 
 
 @pytest.mark.parametrize(("landed_m", "longer"), [(0.06, False), (0.0585, True)])

@@ -13,6 +13,7 @@ from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
+from positioner.estimation.landings.landing_shift import shifted
 from positioner.estimation.landings.local_balance import ahead_m
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
 
@@ -130,6 +131,11 @@ class StaticIdentification:
         self._elsewhere = self._elsewhere + 1 if elsewhere else 0
         return 0 < self._elsewhere < IN_A_ROW
 
+    def _slides_and_last(self) -> tuple[SlideOutcome, ...]:
+        """Return the slides, and the last landing even if by the law it is none: there the law may be wrong."""
+        last = max((each[0] for each in self._in_direction.values() if each), key=lambda one: one.time_s)
+        return self.landings if last in self.landings else (last, *self.landings)
+
     def tested(self, estimates: Estimates) -> Estimates:
         """Return estimates whose friction is refused if the landings contradict it."""
         if self._tested is None or self._tested[0] is not estimates or self._tested[1] is not self.law:
@@ -154,6 +160,9 @@ class StaticIdentification:
 
     def accepted(self, applied: Applied) -> Applied:
         """Return what is applied after an identification by landings alone: the law's numbers, or those in use."""
+        if self.law.valid and shifted(self._slides_and_last(), self._stroke_m):
+            self.restart()
+            self.law = no_static_law(Refusal.LANDINGS_SHIFTED)
         if not self.law.valid:
             return replace(applied, refusals=applied.refusals + 1, last_refusal=self.law.reason)
         return Applied(self.law.ratios, applied.count + 1, applied.refusals, Refusal.VALID)

@@ -118,7 +118,7 @@ def no_static_law(reason: Refusal, slides: tuple[SlideOutcome, ...] = ()) -> Sta
     return StaticLaw(nothing, nothing, nothing, slides, nan, np.full((3, 3), inf))
 
 
-def _columns(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[Array, Array]:
+def columns(landings: Sequence[SlideOutcome], stroke_m: float) -> tuple[Array, Array]:
     """Return X, (n, 3), with positions in strokes so that its columns are of one size, and p, (n,), Pa."""
     x = np.array([each.position_m for each in landings])
     up = np.array([float(each.direction > 0) for each in landings])
@@ -135,7 +135,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     ups = sum(each.direction > 0 for each in landings)
     if len(landings) < FEWEST or min(ups, len(landings) - ups) < FEWEST_EACH:
         return no_static_law(Refusal.LANDINGS_TOO_FEW, tuple(landings))
-    X, p = _columns(landings, stroke_m)
+    X, p = columns(landings, stroke_m)
     slid = _slides(landings, X, p, stroke_m)
     slides = tuple(compress(landings, slid.tolist()))
     ups, kept = sum(each.direction > 0 for each in slides), len(slides)
@@ -150,7 +150,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     seen_pa = max(FINEST, max(each.std_m for each in landings) / stroke_m) * abs(theta[0])
     s = max(sqrt(float(residual_pa @ residual_pa) / free), seen_pa)
     scale = np.diag((1 / stroke_m, 1.0, 1.0))
-    covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * _t_of_three_deviations(free)) ** 2
+    covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * t_of_three_deviations(free)) ** 2
     slope, up_pa, down_pa = (scale @ theta).tolist()
     std = np.sqrt(np.diag(covariance))
     reason = _refusal(slope, up_pa + down_pa, std, s, stroke_m)
@@ -202,7 +202,7 @@ def _huber(X: Array, p: Array) -> tuple[Array, Array]:
     return theta, weights
 
 
-def _t_of_three_deviations(free: int) -> float:
+def t_of_three_deviations(free: int) -> float:
     """Return the quantile of Student's t that 3 is of the normal distribution, over 3 (Cornish and Fisher)."""
     z = DEVIATIONS
     terms = (

@@ -1,0 +1,56 @@
+"""Was the sensor, or the valve, shifted while landings were gathered?
+
+    p_j = κ x_j + φ_up + δ d_j,   p_j = κ x_j - φ_down + δ d_j       d_j = 0 before an instant, 1 after it
+
+A position sensor that jumps shifts all that lands later by the same way, in either direction. Each instant between two
+landings that leaves the four unknowns apart is tried; the one that leaves the least residual is judged:
+
+    t = |δ| / std δ,   s^2 = max(Σ e^2 / (n - 4), (κ 2e-4 stroke)^2)
+
+An instant between all landings up and all landings down cannot be told from unlike friction: somebody has to land once
+more in the first direction (the staircase does).
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+
+from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_law import DEVIATIONS, FINEST, columns, t_of_three_deviations
+
+SURE = 2.0
+"""Times three deviations, for the instant is sought, and a law that is bent looks like a small shift."""
+LEAST_SHIFT = 2e-3
+"""Of the stroke: a smaller shift counts as none."""
+APART = 1e-3
+"""Least singular value of what tells the unknowns apart."""
+
+
+def shifted(landings: Sequence[SlideOutcome], stroke_m: float) -> bool:
+    """Return whether landings before and after some instant disagree.
+
+    Args:
+        landings: slides, in any order.
+        stroke_m: full travel, m.
+    """
+    ordered = sorted(landings, key=lambda each: each.time_s)
+    free = len(ordered) - 4
+    if free < 1:
+        return False
+    X, p = columns(ordered, stroke_m)
+    least, found = np.inf, (0.0, np.inf, 1.0)
+    for first in range(1, len(ordered)):
+        after = (np.arange(len(ordered)) >= first).astype(float)
+        with_shift = np.column_stack((X, after))
+        if np.linalg.svd(with_shift, compute_uv=False)[-1] < APART:
+            continue
+        theta, _, _, _ = np.linalg.lstsq(with_shift, p)
+        left = float(np.square(p - with_shift @ theta).sum())
+        if left < least:
+            std = sqrt(float(np.linalg.inv(with_shift.T @ with_shift)[3, 3]))
+            least, found = left, (float(theta[3]), std, abs(float(theta[0])))
+    shift_pa, std_per_pa, stroke_pa = found
+    s_pa = max(sqrt(least / free), FINEST * stroke_pa) if np.isfinite(least) else np.inf
+    surely_pa = SURE * DEVIATIONS * t_of_three_deviations(free) * s_pa * std_per_pa
+    return abs(shift_pa) > max(surely_pa, LEAST_SHIFT * stroke_pa)
