@@ -71,7 +71,8 @@ class Loop:
             pass
         self.ask(eta=QUIET)
         self.step_to(STILL)
-        self.run(3.0)
+        self.run(8.0)
+        assert abs(self.position - STILL) < THERE
 
     @property
     def decision(self) -> Decision:
