@@ -98,6 +98,10 @@ class ExtendedValve:
         """Return p_s(x), Pa."""
         return _value(self._landing(direction), stem_m / self.stroke_m)
 
+    def landing_m(self, pressure_pa: float, direction: int) -> float:
+        """Return where the stem is, m, that a slide under a pressure lands: the inverse of p_s(x)."""
+        return _share(self._landing(direction), pressure_pa) * self.stroke_m
+
     def breakaway_pa(self, stem_m: float, direction: int) -> float:
         """Return p'_s(x), Pa."""
         table = self.breakaway_up_pa if direction > 0 else self.breakaway_down_pa
@@ -105,7 +109,7 @@ class ExtendedValve:
 
     def margin_m(self, stem_m: float, direction: int) -> float:
         """Return m_s(x), m."""
-        lands_m = _share(self._landing(direction), self.breakaway_pa(stem_m, direction)) * self.stroke_m
+        lands_m = self.landing_m(self.breakaway_pa(stem_m, direction), direction)
         return max(0.0, direction * (lands_m - stem_m))
 
     def stem_m(self, indicated_m: float, direction: int) -> float:

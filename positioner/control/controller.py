@@ -118,7 +118,7 @@ class Controller:
             identifying=False,
             law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored),
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
-            restoration=Restoration.of(restored),
+            restoration=Restoration.of(restored, settings.valve),
         )
 
     @property
@@ -139,11 +139,13 @@ class Controller:
         """
         memory = self._memory
         trust, exciting = memory.restoration.trust, memory.excitation is not None and not memory.excitation.ended
-        found = trust is Restored.CONFIRMED or (memory.applied.count > 0 and trust is not Restored.PROVISIONAL)
+        followed = memory.applied.count > 0 or (self._settings.valve is not None and bool(self._statics.landings))
+        found = trust is Restored.CONFIRMED or (followed and trust is not Restored.PROVISIONAL)
         if memory.applied.ratios is None or not found or exciting:
             return None
-        stroke_m = self._settings.limits.stroke_m
-        return known(memory.applied.ratios, self._identification.estimates, self._statics, memory.law, stroke_m)
+        settings, estimates = self._settings, self._identification.estimates
+        stroke_m = settings.limits.stroke_m
+        return known(memory.applied.ratios, estimates, self._statics, memory.law, stroke_m, settings.valve)
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""

@@ -2,7 +2,8 @@
 
 It is used at once, so that a valve that has not changed is controlled as before. Each change of the command is a test:
 
-    landing      x = (p - offset - s φ)/κ, corrected by the landings near it, within max(3 deviations, 0.3 % of stroke)
+    landing      x = (p - offset - s φ)/κ, or the extended valve's, corrected by the landings near it, within
+                 max(3 deviations, 0.3 % of stroke)
     no landing   the stem rests where static friction can hold it: no slide by the law from there is much longer than
                  the shortest that breaks loose, in either direction
 
@@ -16,7 +17,9 @@ from dataclasses import dataclass, replace
 from math import hypot
 
 from config.codes import Restored
+from config.extended_valve import ExtendedValve
 from positioner.control.valve_knowledge import ValveKnowledge
+from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import STOP, VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import landing_pa
 
@@ -35,19 +38,21 @@ class Restoration:
 
     Attributes:
         knowledge: None when nothing was.
+        valve: the extended valve that the laws work with, if there is one.
         trust: in it.
         ups, downs: landings that agreed.
     """
 
     knowledge: ValveKnowledge | None = None
+    valve: ExtendedValve | None = None
     trust: Restored = Restored.NOTHING
     ups: int = 0
     downs: int = 0
 
     @classmethod
-    def of(cls, knowledge: ValveKnowledge | None) -> "Restoration":
+    def of(cls, knowledge: ValveKnowledge | None, valve: ExtendedValve | None) -> "Restoration":
         """Return what has become of it before anything was seen."""
-        return cls(knowledge, Restored.NOTHING if knowledge is None else Restored.PROVISIONAL)
+        return cls(knowledge, valve, Restored.NOTHING if knowledge is None else Restored.PROVISIONAL)
 
     @property
     def provisional(self) -> bool:
@@ -62,7 +67,7 @@ class Restoration:
         """Return what has become of it after what a change of the command did, if that is known now."""
         if outcome is None or not self.provisional or self.knowledge is None:
             return self
-        agrees = _agrees(outcome, self.knowledge, stroke_m)
+        agrees = _agrees(outcome, self.knowledge, self.valve, stroke_m)
         if agrees is None:
             return self
         if not agrees:
@@ -72,10 +77,12 @@ class Restoration:
         return replace(self, ups=ups, downs=downs, trust=Restored.CONFIRMED if confirmed else self.trust)
 
 
-def _agrees(outcome: SlideOutcome, knowledge: ValveKnowledge, stroke_m: float) -> bool | None:
+def _agrees(
+    outcome: SlideOutcome, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
+) -> bool | None:
     """Return whether what a change of the command did agrees with what was restored; None: it does not say."""
     s, at_m = outcome.direction, outcome.position_m
-    should_m = _landing_m(outcome.command_pa, s, knowledge, stroke_m)
+    should_m = _landing_m(outcome.command_pa, s, knowledge, valve, stroke_m)
     within_m = _within_m(outcome, should_m, s, knowledge, stroke_m)
     if outcome.landing:
         return abs(at_m - should_m) <= within_m
@@ -87,22 +94,31 @@ def _agrees(outcome: SlideOutcome, knowledge: ValveKnowledge, stroke_m: float) -
         contradicts = abs(at_m - should_m) > within_m
     else:
         contradicts = free and any(
-            _held_against_m(outcome, d, knowledge, stroke_m) > MUCH_LONGER * knowledge.shortest_m(d) + within_m
+            _held_against_m(outcome, d, knowledge, valve, stroke_m) > MUCH_LONGER * knowledge.shortest_m(d) + within_m
             for d in (1, -1)
         )
     return False if contradicts else None
 
 
-def _held_against_m(outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, stroke_m: float) -> float:
+def _held_against_m(
+    outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
+) -> float:
     """Return how far a slide from where the stem rests would go in a direction, m."""
-    return direction * (_landing_m(outcome.command_pa, direction, knowledge, stroke_m) - outcome.position_m)
+    return direction * (_landing_m(outcome.command_pa, direction, knowledge, valve, stroke_m) - outcome.position_m)
 
 
-def _landing_m(command_pa: float, direction: int, knowledge: ValveKnowledge, stroke_m: float) -> float:
-    """Return where a slide lands: by the straight law, corrected by what landings near there missed it by."""
-    ratios, straight_m = knowledge.ratios, knowledge.landing_m(command_pa, direction)
-    off_pa = landing_pa(straight_m, direction, ratios, knowledge.landings, stroke_m) - command_pa
-    return straight_m - off_pa / -ratios.b_over_c
+def _landing_m(
+    command_pa: float, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
+) -> float:
+    """Return where a slide lands: by the law, corrected by what landings near there missed it by."""
+    ratios, landings = knowledge.ratios, knowledge.landings
+    if valve is None:
+        lands_m = knowledge.landing_m(command_pa, direction)
+        should_pa = landing_pa(lands_m, direction, ratios, landings, stroke_m)
+    else:
+        lands_m = valve.landing_m(command_pa, direction)
+        should_pa = extended_landing_pa(lands_m, direction, valve, landings)
+    return lands_m - (should_pa - command_pa) / -ratios.b_over_c
 
 
 def _within_m(

@@ -3,10 +3,11 @@
 Times of what was seen are negative after a restart, seconds before what was kept was taken: older than anything new.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite, sqrt
 
+from config.extended_valve import ExtendedValve
 from positioner.control.breakaway_memory import BreakawayMemory, LearntPush
 from positioner.control.law_memory import LawMemory
 from positioner.control.slide_memory import Margin, SlideMemory
@@ -21,6 +22,7 @@ Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple
 LARGEST_STD = 0.05
 """Of κ and φ: the deviation of what was applied, where nobody knows it any more."""
 UNANSWERED = Answers()
+NO_DOUBT: Covariance = ((0.0, 0.0, 0.0),) * 3
 OTHER_WAY = 0.2
 """Of φ: what a sine, which moves the stem one way, leaves open of the other."""
 
@@ -78,7 +80,12 @@ class ValveKnowledge:
 
 
 def known(
-    ratios: Ratios, estimates: Estimates, statics: StaticIdentification, law: LawMemory | None, stroke_m: float
+    ratios: Ratios,
+    estimates: Estimates,
+    statics: StaticIdentification,
+    law: LawMemory | None,
+    stroke_m: float,
+    valve: ExtendedValve | None,
 ) -> ValveKnowledge:
     """Return what a controller knows of its valve.
 
@@ -88,10 +95,17 @@ def known(
         statics: from landings.
         law: the memory of the law in force.
         stroke_m: full travel.
+        valve: the extended valve that the law works with, if there is one: its shape is given, so landings alone say
+            how far it is off.
     """
     static_law = statics.law
-    residual_m = static_law.residual_m if static_law.valid else FINEST * stroke_m
-    covariance = _rows(static_law.covariance.tolist()) if static_law.valid else _covariance(ratios, estimates)
+    residual_m, covariance = FINEST * stroke_m, NO_DOUBT
+    if valve is not None:
+        residual_m = max(residual_m, _missed_m(statics.landings, valve))
+    elif static_law.valid:
+        residual_m, covariance = static_law.residual_m, _rows(static_law.covariance.tolist())
+    else:
+        covariance = _covariance(ratios, estimates)
     return ValveKnowledge(
         ratios=ratios,
         covariance=covariance,
@@ -113,6 +127,12 @@ def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None) -> LawM
             return replace(law, up=knowledge.pushes[0], down=knowledge.pushes[1])
         case _:
             return law
+
+
+def _missed_m(landings: Sequence[SlideOutcome], valve: ExtendedValve) -> float:
+    """Return the standard deviation, m, of where slides landed about where the valve says."""
+    off_m = [each.position_m - valve.landing_m(each.command_pa, each.direction) for each in landings]
+    return sqrt(sum(each**2 for each in off_m) / len(off_m)) if off_m else 0.0
 
 
 def _before(outcomes: tuple[SlideOutcome, ...], now_s: float) -> tuple[SlideOutcome, ...]:

@@ -140,7 +140,7 @@ def _assembled(
     else:
         _require_plausible(reading, held_pa, settings, where)
     recorder = _recorder(file, source)
-    memory = _memory(file, source)
+    memory = _memory(file, extended, source)
     controller = Controller(
         settings,
         held_pa,
@@ -163,10 +163,10 @@ def _assembled(
     return ServedValve(file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason)
 
 
-def _memory(file: DaemonFile, source: Path) -> StoredMemory | None:
+def _memory(file: DaemonFile, extended: ExtendedValve | None, source: Path) -> StoredMemory | None:
     if file.memory.folder is None:
         return None
-    return StoredMemory.in_folder(source.parent / file.memory.folder, file.valve.name, conditions_of(file))
+    return StoredMemory.in_folder(source.parent / file.memory.folder, file.valve.name, conditions_of(file, extended))
 
 
 def _memory_keeper(memory: StoredMemory, valve: str, controller: Controller, cycle: Cycle) -> MemoryKeeper:

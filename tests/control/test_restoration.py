@@ -7,14 +7,18 @@ import pytest
 
 from config.codes import InhibitReason, Mode, Restored, State
 from config.daemon_file import DaemonFile
+from config.extended_valve import ExtendedValve
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller import Decision
 from positioner.control.requests import QUIET, Requests
+from positioner.control.settings import Settings
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.cycle import Cycle
+from positioner.daemon.memory.conditions import changed, conditions_of
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from sim.slave.simulated_device import Device
+from sim.static_inverse import extended_valve
 from sim.valve import Valve
 
 VALVE = load_valve(shipped_valve("seed")).valve
@@ -34,7 +38,9 @@ def changed_valve(**parameters: float) -> ValveFile:
 class Bench:
     """A valve on its device, and the controllers that come and go."""
 
-    def __init__(self, file: ValveFile, law: str = "slides", seed: int = 1) -> None:
+    def __init__(
+        self, file: ValveFile, law: str = "slides", seed: int = 1, extended: ExtendedValve | None = None
+    ) -> None:
         self._daemon = DaemonFile.model_validate(
             {
                 "valve": {"stroke_m": STROKE_M},
@@ -51,13 +57,14 @@ class Bench:
                 "initial": {"position_m": 0.5 * STROKE_M, "pressure_pa": 45e3},
             }
         )
+        self._settings = Settings.of(self._daemon, extended)
         self.valve = Valve.from_file(file)
         self.valve.rest_at(0.5 * STROKE_M, 45e3)
         self._device = Device(self.valve, slave, {})
 
     def start(self, restored: ValveKnowledge | None = None, mode: Mode = Mode.AUTOMATIC) -> None:
         first = Requests(mode=mode, mode_writes=1)
-        self.cycle: Cycle = virtual_cycle(self._daemon, self._device, first, restored=restored)
+        self.cycle: Cycle = virtual_cycle(self._daemon, self._device, first, self._settings, restored=restored)
 
     @property
     def decision(self) -> Decision:
@@ -196,3 +203,36 @@ def test_a_reference_waits_for_the_landing_that_is_to_confirm(knowledge: ValveKn
     assert bench.decision.reference_m == pytest.approx(0.62 * STROKE_M)
     bench.run(2.0)
     assert abs(bench.valve.indicated_m / STROKE_M - 0.7) < 1e-3
+
+
+def hardened(strength_n_per_m3: float) -> ValveFile:
+    effect = {"name": "spring_hardening", "cubic_n_per_m3": strength_n_per_m3}
+    return ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": [effect]})
+
+
+@pytest.mark.parametrize(("true_n_per_m3", "trust"), [(4e6, Restored.CONFIRMED), (3.5e6, Restored.DROPPED)])
+def test_what_slides_have_taught_of_an_extended_valve_is_held_against_it(true_n_per_m3: float, trust: Restored) -> None:
+    """The straight law of so hard a spring is off by far more than a landing may be: the table must say where."""
+    extended = extended_valve(hardened(4e6), "better.toml")
+    before = Bench(hardened(4e6), extended=extended)
+    before.start()
+    for at in (0.6, 0.8, 0.4, 0.45):
+        before.step_to(at)
+    kept = before.kept()
+    assert kept is not None
+    after = Bench(hardened(true_n_per_m3), extended=extended)
+    after.start(kept)
+    for at in (0.85, 0.3, 0.7):
+        after.step_to(at)
+    assert after.trust() is trust
+
+
+def test_another_extended_valve_is_another_condition() -> None:
+    file = Bench(hardened(4e6))._daemon
+    bare, one, other = (
+        conditions_of(file, extended)
+        for extended in (None, *(extended_valve(hardened(each), "better.toml") for each in (4e6, 4.1e6)))
+    )
+    assert changed(bare, bare) is None
+    assert str(changed(one, other)).startswith("the file of law.valve")
+    assert str(changed(bare, one)).startswith("the file of law.valve")

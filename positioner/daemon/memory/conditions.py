@@ -1,14 +1,18 @@
 """For which configuration something is known: the keys of the daemon's file that it hangs on, and their values.
 
 A device that stands elsewhere or scales its registers otherwise is another device; who changes stroke, period, pressure
-limits or table `[law]` knows better than what was learnt. How long a reply may take says nothing of the valve.
+limits, table `[law]` or the extended valve that it names knows better than what was learnt. How long a reply may take
+says nothing of the valve.
 """
 
 import json
 from collections.abc import Mapping
+from dataclasses import astuple
+from hashlib import sha256
 from typing import Any
 
 from config.daemon_file import DaemonFile
+from config.extended_valve import ExtendedValve
 
 TABLES = ("device", "valve", "pressure", "law")
 KEYS = ("cycle.period_s",)
@@ -17,14 +21,18 @@ OF_THE_LINK = frozenset(
 )
 """These say how the device is talked to, not what it is."""
 
+EXTENDED = "the file of law.valve, its digest"
+
 Conditions = Mapping[str, str]
 """Values by key, both as in the file: what is JSON is TOML."""
 
 
-def conditions_of(file: DaemonFile) -> Conditions:
-    """Return the keys that what is known of a valve hangs on, with their values."""
+def conditions_of(file: DaemonFile, extended: ExtendedValve | None = None) -> Conditions:
+    """Return the keys that what is known of a valve hangs on, with their values; of an extended valve a digest."""
     tables = file.model_dump(mode="json")
     flat = _flat({key: tables[key] for key in TABLES} | {"cycle": {"period_s": file.cycle.period_s}})
+    if extended is not None:
+        flat[EXTENDED] = sha256(repr(astuple(extended)).encode()).hexdigest()
     return {key: value for key, value in sorted(flat.items()) if not _of_the_link(key)}
 
 
