@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from config.recording import Recording
+from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.data.record import Record
 from workbench.fit.fitting import Fit, fit
-from workbench.select.discrimination import Played, Weighed, discriminate, log_odds
+from workbench.select.discrimination import Played, Race, Weighed, discriminate, log_odds
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg, designed, moves_in
 
@@ -93,14 +94,18 @@ def test_a_course_stays_inside_its_bounds() -> None:
     assert np.max(np.abs(np.diff(command_pa)) / np.diff(time_s)) <= BOUNDS.rate_pa_per_s * (1 + 1e-6)
 
 
-def answering(chosen: DesignedExperiment) -> Played:
-    """Let the lagging valve answer."""
-    composition = Composition.from_file(LAGGING)
+def answer_of(valve: ValveFile, chosen: DesignedExperiment) -> Played:
+    """Let a valve answer."""
+    composition = Composition.from_file(valve)
     time_s, command_pa = chosen.course.sampled(PERIOD_S)
     response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
     noise_m = 5e-5 * np.random.default_rng(chosen.course.moves).standard_normal(time_s.size)
     columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m + noise_m}
     return Played(Recording({name: column[time_s >= REST_S] for name, column in columns.items()}))
+
+
+def answering(chosen: DesignedExperiment) -> Played:
+    return answer_of(LAGGING, chosen)
 
 
 class Design:
@@ -165,17 +170,21 @@ def test_a_lag_and_a_dead_time_are_told_apart(
     assert "ip_lag is missing" in found.summary()
 
 
-def test_an_effect_that_is_none_of_the_rivals_is_not_named(fits: dict[str, Fit], recording: Recording) -> None:
-    """After the recordings, something else begins to act: the better rival explains it no better than chance."""
-    changed = with_effect(LAGGING, "position_friction", growth=1.5, travel_m=BARE.valve.stroke_m)
-
-    def other(chosen: DesignedExperiment) -> Played:
-        composition = Composition.from_file(changed)
-        time_s, command_pa = chosen.course.sampled(PERIOD_S)
-        response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
-        columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m}
-        return Played(Recording({name: column[time_s >= REST_S] for name, column in columns.items()}))
-
-    found = discriminate(fits, [recording], other, BOUNDS, LIBRARY, design=Design(2.0), budget=4)
-    assert found.outcome in ("unexplained", "budget_spent", "not_separable")
+def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fit], recording: Recording) -> None:
+    growing = EffectTable.model_validate({"name": "position_friction", "growth": 0.4, "travel_m": BARE.valve.stroke_m})
+    changed = ValveFile(valve=LAGGING.valve, effect=(*LAGGING.effect, growing))
+    found = discriminate(
+        fits, [recording], lambda chosen: answer_of(changed, chosen), BOUNDS, LIBRARY, design=Design(2.0), budget=4
+    )
     assert found.named == ()
+
+
+def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
+    fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workbench.select.discrimination.RARELY_OFF", 0.5)
+    monkeypatch.setattr(Race, "searched_anew", lambda race: race)
+    found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
+    assert (found.outcome, found.named) == ("unexplained", ())
+    assert found.odds >= 100.0
+    assert "something else is missing" in found.sentence
