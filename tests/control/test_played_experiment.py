@@ -177,7 +177,7 @@ def test_what_the_law_uses_is_not_changed_by_landings_in_it(monkeypatch: pytest.
         corrected.append(applied)
         return applied
 
-    monkeypatch.setattr(StaticIdentification, "update", lambda *_: landing)
+    monkeypatch.setattr(StaticIdentification, "update", lambda *_, **__: landing)
     monkeypatch.setattr(StaticIdentification, "corrected", note)
     asked(bench)
     played(bench)
