@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.select.discrimination import discriminate, rivals_of
 
     file = load_daemon(arguments.config, arguments.name)
-    bounds = _bounds(file)
+    bounds = _bounds(file, arguments.config)
     require_ready(file, arguments)
     valve = load_valve(find_valve(arguments.valve))
     recordings = [Recording.read(path) for path in arguments.rec]
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if told.outcome in ("resolved", "one_class") else 1
 
 
-def _bounds(file: "DaemonFile") -> "Bounds":
+def _bounds(file: "DaemonFile", config: Path) -> "Bounds":
     """Return what designs must stay inside: the daemon's permissives, and room for the approach.
 
     Raises:
@@ -96,9 +96,9 @@ def _bounds(file: "DaemonFile") -> "Bounds":
     margin_m = WINDOW_MARGIN * file.valve.stroke_m
     if limits.longest_s <= 3.0 * approach_s:
         raise InputError(
-            "experiment.limit_s",
-            f"must exceed {3.0 * approach_s:.3g} s, three times the way through the pressures, "
-            f"got {limits.longest_s:g} s",
+            str(config),
+            f"experiment.limit_s must exceed {3.0 * approach_s:.3g} s, three times the way through the pressures at "
+            f"rate_limit_pa_per_s, got {limits.longest_s:g} s",
         )
     return Bounds(
         minimum_pa=limits.minimum_pa,

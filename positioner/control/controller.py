@@ -190,7 +190,7 @@ def step(
             fault=supervision.fault,
             excited=requests.eta[0] == 0,
             position_m=sample.position_m if fresh else None,
-            command_pa=memory.wanted_pa,
+            command_pa=memory.command_pa,
             held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
         ),
         settings.experiment,

@@ -8,7 +8,10 @@ import pytest
 from config.codes import ExperimentState, Fault, Mode, Quality, State
 from positioner.control.controller import Decision
 from positioner.control.requests import ExperimentRequest
-from tests.control.test_controller import HELD_PA, LAW, STROKE_M, Bench, automatic
+from positioner.estimation.acceptance import Applied
+from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_identification import StaticIdentification
+from tests.control.test_controller import HELD_PA, STROKE_M, Bench, automatic
 
 RATE = 100e3
 """Pa/s, the default."""
@@ -165,14 +168,17 @@ def test_another_mode_ends_it_at_once_and_automatic_does_not_bring_it_back() -> 
     assert {bench.step().command_pa for _ in range(50)} == {HELD_PA}
 
 
-def test_what_the_law_uses_is_not_changed_by_it() -> None:
+def test_what_the_law_uses_is_not_changed_by_landings_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
     bench, _ = following()
-    before = bench.step().applied
+    landing = SlideOutcome(0.0, 1, 0.02, 50e3, 0.03, 1e-5, moved=True, landing=True)
+    corrected: list[Applied] = []
+
+    def note(_: StaticIdentification, applied: Applied) -> Applied:
+        corrected.append(applied)
+        return applied
+
+    monkeypatch.setattr(StaticIdentification, "update", lambda *_, **__: landing)
+    monkeypatch.setattr(StaticIdentification, "corrected", note)
     asked(bench)
-    for where in (0.031, 0.04, 0.05, 0.045):
-        bench.position_m = where
-        for _ in range(20):
-            bench.step()
-    assert bench.step().applied == before
-    assert before.ratios is not None
-    assert before.ratios.b_over_c == LAW["b_over_c_pa_per_m"]
+    played(bench)
+    assert len(corrected) == 1, "that of the first step after it"

@@ -1,22 +1,27 @@
 """The odds on hand-made fits, the rounds with a scripted designer and player, and one whole journey in virtual time."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
-from math import inf, log
+from math import log
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from config.recording import Recording
+from config.valve_file import EffectTable, ValveFile
+from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.data.record import Record
 from workbench.fit.fitting import Fit, fit
-from workbench.select.discrimination import Played, Weighed, discriminate, log_odds
+from workbench.select.discrimination import Played, Race, Weighed, discriminate, log_odds
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg, designed, moves_in
+from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg, moves_in
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))
@@ -93,14 +98,18 @@ def test_a_course_stays_inside_its_bounds() -> None:
     assert np.max(np.abs(np.diff(command_pa)) / np.diff(time_s)) <= BOUNDS.rate_pa_per_s * (1 + 1e-6)
 
 
-def answering(chosen: DesignedExperiment) -> Played:
-    """Let the lagging valve answer."""
-    composition = Composition.from_file(LAGGING)
+def answer_of(valve: ValveFile, chosen: DesignedExperiment) -> Played:
+    """Let a valve answer."""
+    composition = Composition.from_file(valve)
     time_s, command_pa = chosen.course.sampled(PERIOD_S)
     response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
     noise_m = 5e-5 * np.random.default_rng(chosen.course.moves).standard_normal(time_s.size)
     columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m + noise_m}
     return Played(Recording({name: column[time_s >= REST_S] for name, column in columns.items()}))
+
+
+def answering(chosen: DesignedExperiment) -> Played:
+    return answer_of(LAGGING, chosen)
 
 
 class Design:
@@ -151,31 +160,62 @@ def test_twins_spend_the_budget_and_nothing_is_named(fits: dict[str, Fit], recor
     assert found.odds == pytest.approx(1.0)
 
 
-def test_a_lag_and_a_dead_time_are_told_apart(
+def test_the_command_tells_a_lag_from_a_dead_time(
+    fits: dict[str, Fit],
+    recording: Recording,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """All but the diagnosis and the wire, which have their own tests."""
+    rivals = [SimpleNamespace(name=name, model=SimpleNamespace(fit=each)) for name, each in fits.items()]
+    steps = [SimpleNamespace(indistinguishable=rivals)]
+    diagnosis = SimpleNamespace(verdict="one_of", sentence="one of two", steps=steps)
+    monkeypatch.setattr("workbench.select.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
+    monkeypatch.setattr("positioner.cli.parts.experiment_player.player_on", lambda *_: answering)
+    monkeypatch.setattr("workbench.select.experiment_design.TRIED", 4)
+    config, out = tmp_path / "site.toml", tmp_path / "told"
+    config.write_text(
+        f"[valve]\nstroke_m = {BARE.valve.stroke_m}\n[pressure]\nmaximum_pa = 80e3\n"
+        "[experiment]\ntravel_window = [0.0, 1.0]\nrate_limit_pa_per_s = 400e3\nlimit_s = 10.0\n"
+    )
+    recording.write(tmp_path / "rec.csv")
+    words = ["discriminate", str(config), "--rec", str(tmp_path / "rec.csv"), "--valve", "seed", "--out", str(out)]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "resolved: ip_lag is missing" in said
+    assert "separation" in said.splitlines()[1], "a line a round, as it comes"
+    verdict = json.loads((out / "verdict.json").read_text())
+    assert (verdict["outcome"], verdict["named"]) == ("resolved", ["ip_lag"])
+    assert verdict["odds"] is None or verdict["odds"] >= 100.0
+    assert 0 < verdict["moves"] <= 8
+    assert len(list(out.glob("experiment-*.csv"))) == len(verdict["rounds"]) > 0
+    assert set(verdict["fits"]["ip_lag"]) == {"rmse_m", "parameters"}
+
+
+def test_a_time_limit_that_leaves_no_room_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = tmp_path / "site.toml"
+    config.write_text("[valve]\nstroke_m = 0.1\n[experiment]\nrate_limit_pa_per_s = 10e3\nlimit_s = 60.0\n")
+    assert main(["discriminate", str(config), "--rec", "none.csv", "--valve", "seed"]) == 2
+    assert "site.toml: experiment.limit_s must exceed 126 s" in capsys.readouterr().err
+
+
+def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fit], recording: Recording) -> None:
+    growing = EffectTable.model_validate({"name": "position_friction", "growth": 0.4, "travel_m": BARE.valve.stroke_m})
+    changed = ValveFile(valve=LAGGING.valve, effect=(*LAGGING.effect, growing))
+    found = discriminate(
+        fits, [recording], lambda chosen: answer_of(changed, chosen), BOUNDS, LIBRARY, design=Design(2.0), budget=4
+    )
+    assert found.named == ()
+
+
+def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("workbench.select.experiment_design.TRIED", 4)
-    found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=designed, workers=2)
-    assert (found.outcome, found.named) == ("resolved", ("ip_lag",)), found.sentence
+    monkeypatch.setattr("workbench.select.discrimination.RARELY_OFF", 0.5)
+    monkeypatch.setattr(Race, "searched_anew", lambda race: race)
+    found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
+    assert (found.outcome, found.named) == ("unexplained", ())
     assert found.odds >= 100.0
-    assert 0 < found.moves <= 8
-    said = found.as_json()
-    assert said["named"] == ["ip_lag"]
-    assert said["odds"] is None or said["odds"] < inf
-    assert "ip_lag is missing" in found.summary()
-
-
-def test_an_effect_that_is_none_of_the_rivals_is_not_named(fits: dict[str, Fit], recording: Recording) -> None:
-    """After the recordings, something else begins to act: the better rival explains it no better than chance."""
-    changed = with_effect(LAGGING, "position_friction", growth=1.5, travel_m=BARE.valve.stroke_m)
-
-    def other(chosen: DesignedExperiment) -> Played:
-        composition = Composition.from_file(changed)
-        time_s, command_pa = chosen.course.sampled(PERIOD_S)
-        response = respond(composition, composition.theta, command_pa[:-1], PERIOD_S)
-        columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m}
-        return Played(Recording({name: column[time_s >= REST_S] for name, column in columns.items()}))
-
-    found = discriminate(fits, [recording], other, BOUNDS, LIBRARY, design=Design(2.0), budget=4)
-    assert found.outcome in ("unexplained", "budget_spent", "not_separable")
-    assert found.named == ()
+    assert "something else is missing" in found.sentence
