@@ -42,7 +42,7 @@ class Accuracy:
 
 FINE = Accuracy(1.0, 3e-4)
 """Within 0.5 um rms of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
-ROUGH = Accuracy(4.0, 1e-3)
+ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um, in half the time."""
 MOST_CORRECTIONS = 3
 """Of the stem at the start, until the model indicates what was measured there."""
