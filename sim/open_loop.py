@@ -6,6 +6,7 @@ been acting up to that time, before the new command.
 """
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,8 @@ from sim.composition import Composition
 from sim.karnopp import TOLERANCE, Vector
 
 STEP_S = 1e-5
+PATH_ROWS, INDICATED = 5, 4
+"""Rows that the kernel writes: t, p, x, v, indicated; which of them is the last."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -66,7 +69,7 @@ def at_rest(composition: Composition, theta: Vector, time_s: float, position_m: 
     Raises:
         ValueError: a number that is not finite.
     """
-    if not np.isfinite([time_s, position_m, pressure_pa]).all():
+    if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
         raise ValueError(f"position and pressure must be finite, got {position_m} m and {pressure_pa} Pa")
     state = np.zeros(composition.kernel.state_size)
     composition.kernel.rest(theta, state, time_s, position_m, pressure_pa)
@@ -89,17 +92,37 @@ def follow(
     Raises:
         ValueError: as `respond`.
     """
-    commands = np.array(command_pa, dtype=np.float64, ndmin=1)
-    if commands.ndim != 1 or commands.size == 0 or not np.isfinite(commands).all():
-        raise ValueError("command_pa must be a series of at least one finite number")
-    periods = np.array(np.broadcast_to(np.asarray(period_s, dtype=np.float64), commands.shape))
-    if not (np.isfinite(periods).all() and (periods > 0.0).all()):
-        raise ValueError("period_s must be finite and greater than 0")
-    path = np.empty((5, commands.size + 1))
+    commands = checked_commands(command_pa)
+    periods = checked_periods(period_s, commands)
+    path = np.empty((PATH_ROWS, commands.size + 1))
     composition.kernel.respond(theta, state, commands, periods, checked_step(step_s), tolerance, path)
     held = np.append(commands, commands[-1])
     time, pressure, position, velocity, indicated = path
     return Response(time, held, pressure, position, velocity, indicated)
+
+
+def checked_commands(command_pa: npt.ArrayLike) -> Vector:
+    """Return a series of commands, Pa, (n,), as the kernel takes it: a copy.
+
+    Raises:
+        ValueError: it is empty, or holds what is not a finite number.
+    """
+    commands = np.array(command_pa, dtype=np.float64, ndmin=1)
+    if commands.ndim != 1 or commands.size == 0 or not np.isfinite(commands).all():
+        raise ValueError("command_pa must be a series of at least one finite number")
+    return commands
+
+
+def checked_periods(period_s: npt.ArrayLike, commands: Vector) -> Vector:
+    """Return the periods, s, of the commands, (n,), as the kernel takes them: a copy.
+
+    Raises:
+        ValueError: one is not a positive number, or their number is another.
+    """
+    periods = np.array(np.broadcast_to(np.asarray(period_s, dtype=np.float64), commands.shape))
+    if not (np.isfinite(periods).all() and (periods > 0.0).all()):
+        raise ValueError("period_s must be finite and greater than 0")
+    return periods
 
 
 def checked_step(step_s: float) -> float:

@@ -51,7 +51,12 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
     """Search with a library of these names, each fit coming to what the test says."""
 
     def searched(
-        ends: Ends, *library: str, local_minimum: float = np.inf, workers: int = 2, first: float = 1.0
+        ends: Ends,
+        *library: str,
+        local_minimum: float = np.inf,
+        workers: int = 2,
+        first: float = 1.0,
+        from_landings: list[tuple[str, bool]] | None = None,
     ) -> tuple[EffectStep, ...]:
         def made(valve: ValveFile, effects: Sequence[str]) -> Fit:
             there = tuple(each.name for each in valve.effect)
@@ -61,7 +66,9 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         def fit(_: Recording, valve: ValveFile, **__: object) -> Fit:
             return made(valve, ())
 
-        def begun_fit(_: Recording, valve: ValveFile, effects: Sequence[str], __: Fit) -> Begun:
+        def begun_fit(_: Recording, valve: ValveFile, effects: Sequence[str], __: Fit, *, landed: bool) -> Begun:
+            if from_landings is not None:
+                from_landings.append((effects[0], landed))
             best = made(valve, effects)
             return Begun(replace(best, cost=first * best.cost, rms_m=first * best.rms_m), best)
 
@@ -165,7 +172,11 @@ def test_what_the_base_left_behind_is_refitted_from_it(searched: Callable[..., t
             return next(backlashes)
         return 3.9 if there | added else next(bases)
 
-    first = searched(ends, "backlash", "ip_lag", local_minimum=4.0 * AT_FLOOR)[0]
+    begun: list[tuple[str, bool]] = []
+    first = searched(ends, "backlash", "ip_lag", local_minimum=4.0 * AT_FLOOR, from_landings=begun)[0]
+    assert begun.count(("backlash", False)) == 1, (
+        "landings, which know nothing of the base, are not searched from again"
+    )
     errors_m = {each.name: each.model.errors.test_rmse_m for each in first.candidates if each.model}
     assert errors_m["backlash"] == pytest.approx(4.0 * FLOOR_M)
 

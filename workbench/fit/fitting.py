@@ -33,7 +33,7 @@ from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.guesses import FINEST
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
-from workbench.fit.starts import base_starts, effect_starts, forces_regressed
+from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
 from workbench.fit.strewing import proved, strewn
 from workbench.fit.threads import on_threads
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
@@ -191,13 +191,17 @@ def fit(
     return replace(found, seeds=(*found.seeds, *origins))
 
 
-def begun_fit(recording: Recording, valve: ValveFile, effects: Sequence[str], base: Fit) -> "BegunFit":
+def begun_fit(
+    recording: Recording, valve: ValveFile, effects: Sequence[str], base: Fit, *, landed: bool = True
+) -> "BegunFit":
     """Fit a valve with effects added to a base fit, on one thread, as far as to where the best search stays.
+
+    Without `landed` no search begins at landings: those of an earlier base fit were the same.
 
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect.
     """
-    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None).settled(1)
+    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None, landed=landed).settled(1)
 
 
 def profiled(found: Fit, recording: Recording) -> Fit:
@@ -277,6 +281,8 @@ def _begun(
     free: Sequence[str] | None,
     workers: int | None,
     progress: Progress | None,
+    *,
+    landed: bool = True,
 ) -> "BegunFit":
     """Search with effects added to a base fit, as far as the middling scale."""
     composition = _extended(base.valve, effects, valve.valve)
@@ -285,7 +291,9 @@ def _begun(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    return _carried(composition, error, effect_starts(error, added, seeds), effort, workers, progress)
+    starts = effect_starts(error, added, seeds, landed=landed)
+    begun = _carried(composition, error, starts, effort, workers, progress)
+    return replace(begun, weakest=weakest_start(error, added, seeds[0]))
 
 
 def _carried(
@@ -327,6 +335,8 @@ class BegunFit:
     tell: Progress
     ends: tuple[Place, ...] = ()
     """Where the first of them stay, best first."""
+    weakest: Place | None = None
+    """Where what is added makes next to nothing of the base."""
 
     @property
     def cost(self) -> float:
@@ -347,7 +357,7 @@ class BegunFit:
     def finished(self, *, profile: bool) -> Fit:
         """Return the fit, searches brought to where they stay two at a time until they agree.
 
-        Where a sensor rounds, places about the best are tried before the agreement counts.
+        Where a sensor rounds by more than the noise hides, places about the best are tried before the agreement counts.
 
         Args:
             profile: follow the cost for the intervals.
@@ -356,7 +366,8 @@ class BegunFit:
         while len(here.ends) < most and (not here.ends or agreeing(here.error, here.ends) < here.effort.agreeing):
             # One that was there already is the first of two: the fit is the same whether it was begun apart or not.
             here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
-        if here._rounds(here.ends[0].z):
+        best = here.ends[0].z
+        if here._rounds(best) and here._shows(best):
             here = replace(here, ends=proved(here.error, here.ends))
         return here.judged(profile=profile)
 
@@ -366,7 +377,8 @@ class BegunFit:
         Args:
             profile: follow the cost for the intervals.
         """
-        error, found = self.error, [end.z for end in self.ends]
+        error, ends = self.error, self._never_worse().ends
+        found = [end.z for end in ends]
         best = _centred(error, found[0])
         determined = uncertainty(error, best, found, profile=profile)
         self.tell(1.0)
@@ -378,7 +390,7 @@ class BegunFit:
             error.cost(best),
             error.count,
             tuple(_search(error, z) for z in found),
-            agreeing(error, self.ends) if self._shows(best) else 1,
+            agreeing(error, ends) if self._shows(found[0]) else 1,
             determined.condition,
             determined.undetermined,
             error.run.record.notes,
@@ -386,11 +398,18 @@ class BegunFit:
             tuple(error.theta(z) for z in (best, *_elsewhere(found))),
         )
 
+    def _never_worse(self) -> "BegunFit":
+        """Search from the base too where all ends are worse than that."""
+        if self.weakest is None or self.cost <= self.error.cost(self.weakest.z):
+            return self
+        end = replace(self.weakest, z=settled(self.error, self.weakest.z, self.effort.improves_below))
+        return replace(self, ends=(end, *self.ends))
+
     def _shows(self, z: Vector) -> bool:
         """Whether what is added makes something better than the base, a quantum by more than the noise hides."""
         theta, noise_m = self.error.theta(z), self.error.run.record.noise_m
         quanta_m = [theta[each.index] for each in self.error.parameters if each.guess == "quantum"]
-        return self.cost < self.effort.improves_below and all(each >= FINEST * noise_m for each in quanta_m)
+        return self.error.cost(z) < self.effort.improves_below and all(each >= FINEST * noise_m for each in quanta_m)
 
     def _rounds(self, z: Vector) -> bool:
         """Whether the sensor rounds at z, and that makes something better than the base."""

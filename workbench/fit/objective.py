@@ -37,7 +37,11 @@ class SimulationError:
         simulated = np.zeros(len(record), dtype=np.bool_)
         for first, end in record.segments:
             simulated[first:end] = True
-        self._rows = np.flatnonzero(simulated & record.valid)
+        rows = np.flatnonzero(simulated & record.valid)
+        self.count = rows.size
+        """Number of valid samples."""
+        whole = rows.size == len(record)
+        self._rows = slice(None) if whole else rows
         self._measured_m = record.position_m[self._rows]
         self.sigma_m = record.noise_m or 1e-6 * composition.valve.stroke_m
         self._theta = np.array(theta)
@@ -50,11 +54,6 @@ class SimulationError:
         """The same over a simulation of longer steps."""
         run = FreeRun(self.composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH)
         return SimulationError(run, self.composition, self.parameters, self._theta)
-
-    @property
-    def count(self) -> int:
-        """Number of valid samples."""
-        return len(self._rows)
 
     def theta(self, z: Vector) -> Vector:
         """Return the parameter vector at z."""
@@ -81,6 +80,10 @@ class SimulationError:
         if key not in self._costs:
             self._costs[key] = soft(self.residuals(z), scale)
         return self._costs[key]
+
+    def keep(self, z: Vector, residuals: Vector, scale: float) -> None:
+        """Keep the cost at z, of residuals that were worked out elsewhere."""
+        self._costs[z.tobytes(), scale] = soft(residuals, scale)
 
     def screened(self, pool: Iterable[Vector], count: int) -> list[Vector]:
         """Return the best of a pool, by the middling scale's cost of the rough simulation."""
@@ -140,6 +143,8 @@ def smoothed(error: SimulationError, z: Vector) -> SimulationError:
 
 
 def _bounded(residuals: Vector) -> Vector:
+    if residuals @ residuals < HOPELESS**2:
+        return residuals
     clipped = np.clip(residuals, -HOPELESS, HOPELESS)
     return np.where(np.isnan(clipped), HOPELESS, clipped)
 
@@ -151,4 +156,9 @@ def root_weights(residuals: Vector, scale: float) -> Vector:
 
 def soft(residuals: Vector, scale: float) -> float:
     """Return the soft-L1 cost."""
-    return float(scale**2 * np.sum(np.sqrt(1.0 + (residuals / scale) ** 2) - 1.0))
+    roots = residuals / scale
+    roots *= roots
+    roots += 1.0
+    np.sqrt(roots, out=roots)
+    roots -= 1.0
+    return float(scale**2 * np.sum(roots))

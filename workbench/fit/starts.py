@@ -71,7 +71,9 @@ def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, co
     ]
 
 
-def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector]) -> list[Place]:
+def effect_starts(
+    error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector], *, landed: bool = True
+) -> list[Place]:
     """Return where searches with effects begin: landings, and at each base fit the best strengths by screening.
 
     Args:
@@ -79,18 +81,16 @@ def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Seq
         added: the parameters of the effects to be added.
         seeds: theta of base fits, the best first, with the effects switched off; the last two are the valve file's and
             the regression's.
+        landed: begin at landings too; they are the same whatever the base fits.
     """
-    ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
-    weakest = min(
-        (error.coordinates(seeds[0]), *(_with(error, seeds[0], added, values) for values in ends)), key=error.cost
-    )
     guesses = guessed_values(added, error.run.record)
     points = [*strengths(added), *guesses]
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
     rounds = any(each.guess == "quantum" for each in added)
+    solved = (rounds and guesses[:1]) or points
     starts = [
-        *landed_starts(error, (seeds[-2],), (rounds and guesses[:1]) or points, added, LANDED_EFFECT),
-        Place(weakest, "base fit 1"),
+        *(landed_starts(error, (seeds[-2],), solved, added, LANDED_EFFECT) if landed else ()),
+        weakest_start(error, added, seeds[0]),
     ]
     for number, theta in enumerate(seeds, 1):
         grid = [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
@@ -99,6 +99,19 @@ def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Seq
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
     return starts
+
+
+def weakest_start(error: SimulationError, added: Sequence[Parameter], seed: Vector) -> Place:
+    """Return the best base fit with the effects as weak as they may be, at whichever end of their ranges that is.
+
+    Args:
+        error: by whose cost the ends are compared.
+        added: the parameters of the effects to be added.
+        seed: theta of the best base fit, with the effects switched off.
+    """
+    ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
+    places = (error.coordinates(seed), *(_with(error, seed, added, values) for values in ends))
+    return Place(min(places, key=error.cost), "base fit 1")
 
 
 def landed_starts(

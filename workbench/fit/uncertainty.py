@@ -96,9 +96,9 @@ def uncertainty(
     as_good = np.array([z, *(each for each in others if error.cost(each) < limit)])
     lower, upper = np.minimum(lower, as_good.min(axis=0)), np.maximum(upper, as_good.max(axis=0))
     condition = float(np.linalg.cond(scaled)) if sensitive.all() else np.inf
-    deviations = np.sqrt(kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))
+    along = np.sqrt(_variances(values, kappa))
     undetermined = tuple(
-        _combination(error, vectors[:, i]) for i in range(z.size) if deviations[i] > 1.0 or (condition > ILL and i == 0)
+        _combination(error, vectors[:, i]) for i in range(z.size) if along[i] > 1.0 or (condition > ILL and i == 0)
     )
     return Uncertainty(np.maximum(std, 0.5 * (upper - lower) / 1.96), lower, upper, condition, undetermined, rise)
 
@@ -114,7 +114,12 @@ def information(error: SimulationError, z: Vector) -> tuple[Vector, NDArray[np.f
 def deviations(error: SimulationError, z: Vector) -> Vector:
     """Return s at z, (parameters,): s_i^2 = sum_k kappa v_ki^2 / lambda_k."""
     values, vectors, kappa = information(error, z)
-    return np.asarray(np.sqrt(vectors**2 @ (kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))))
+    return np.asarray(np.sqrt(vectors**2 @ _variances(values, kappa)))
+
+
+def _variances(values: Vector, kappa: float) -> Vector:
+    """Return kappa / lambda_k along each eigenvector of J' W J, of its eigenvalues, (n,), ascending."""
+    return np.asarray(kappa / np.maximum(values, NOTHING * max(1.0, float(values[-1]))))
 
 
 def _kappa(residuals: Vector) -> float:

@@ -12,6 +12,7 @@ Simulated from measured pressure, the pressure path's effects are left out, and 
 of the measurements at its ends. A measured load acts as the pressure load / A besides.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from sim.karnopp import SLIP, Vector, read, write
-from sim.open_loop import at_rest, follow
+from sim.open_loop import INDICATED, PATH_ROWS, at_rest, checked_commands, checked_periods, checked_step
 from workbench.data.record import Record
 
 
@@ -43,6 +44,8 @@ FINE = Accuracy(1.0, 3e-4)
 """Within 0.5 um rms of steps and a tolerance a hundredth of it: a hundredth of a transmitter's noise."""
 ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um, in half the time."""
+MOST_CORRECTIONS = 3
+"""Of the stem at the start, until the model indicates what was measured there."""
 STILL = 4.0
 """Standard deviations of the noise within which the stem stands still."""
 LONGEST_START = 50
@@ -75,7 +78,11 @@ class Segment(NamedTuple):
     first: int
     end: int
     begin: InitialState
-    periods_s: Column
+    drive_pa: Vector
+    """Held from each of its samples to the next, Pa."""
+    load_n: Vector | None
+    """The same of a measured load, N."""
+    periods_s: Vector
     """Between its samples, s."""
     step_s: float
     """Longest of the integration, s."""
@@ -97,44 +104,57 @@ class FreeRun:
         self.from_pressure = from_pressure
         everything = (composition, list(range(len(composition.names))))
         self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
-        self._drive_pa = _measured(record) if from_pressure else record.command_pa
+        drive_pa = _measured(record) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
         longest_s = accuracy.steps * self._composition.step_s
-        self._segments = [_segment(record, first, end, longest_s) for first, end in record.segments]
+        self._segments = [_segment(record, drive_pa, first, end, longest_s) for first, end in record.segments]
 
     def run(self, theta: Vector) -> Run:
         """Simulate; theta, (parameters,), as `composition.names`."""
-        vector = np.array(theta[self._kept])
-        load_n = self.record.load_n
-        drive_pa = self._drive_pa if load_n is None else self._drive_pa + load_n / vector[AREA]
         rows = np.full((4, len(self.record)), np.nan)
-        for first, end, begin, periods_s, step_s in self._segments:
-            state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[first]))
-            held_pa = drive_pa[first : end - 1]
-            path = follow(self._composition, vector, state, held_pa, periods_s, step_s, self._tolerance)
-            rows[:, first:end] = path.indicated_m, path.position_m, path.velocity_m_per_s, path.pressure_pa
+        for first, end, (_, pressure_pa, stem_m, velocity_m_per_s, indicated_m) in self._paths(theta):
+            rows[:, first:end] = indicated_m, stem_m, velocity_m_per_s, pressure_pa
         return Run(*rows)
 
     def position_m(self, theta: Vector) -> Column:
         """Return the indicated position, m, (n,)."""
-        return self.run(theta).indicated_m
+        indicated_m = np.full(len(self.record), np.nan)
+        for first, end, path in self._paths(theta):
+            indicated_m[first:end] = path[INDICATED]
+        return indicated_m
+
+    def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
+        """Simulate each segment: its rows and what the kernel writes, (5, rows)."""
+        vector = np.array(theta[self._kept])
+        for first, end, begin, held_pa, load_n, periods_s, step_s in self._segments:
+            drive_pa = held_pa if load_n is None else held_pa + load_n / vector[AREA]
+            state = self._begin(vector, begin, float(self.record.time_s[first]), float(drive_pa[0]))
+            path = np.empty((PATH_ROWS, end - first))
+            self._composition.kernel.respond(vector, state, drive_pa, periods_s, step_s, self._tolerance, path)
+            yield first, end, path
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         stem_m = begin.position_m
-        for _ in range(3):
+        for _ in range(MOST_CORRECTIONS):
             held_pa = equilibrium_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
             state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
-            stem_m += begin.position_m - read(state).indicated
+            off_m = begin.position_m - read(state).indicated
+            if off_m == 0.0:
+                break
+            stem_m += off_m
         if begin.velocity_m_per_s:
             direction = float(np.sign(begin.velocity_m_per_s))
             write(state, read(state)._replace(v=begin.velocity_m_per_s, mode=SLIP, sigma=direction))
         return state
 
 
-def _segment(record: Record, first: int, end: int, longest_s: float) -> Segment:
-    periods_s = np.diff(record.time_s[first:end])
-    return Segment(first, end, initial_state(record, first, end), periods_s, min(float(periods_s.max()), longest_s))
+def _segment(record: Record, drive_pa: Column, first: int, end: int, longest_s: float) -> Segment:
+    held_pa = checked_commands(drive_pa[first : end - 1])
+    load_n = None if record.load_n is None else checked_commands(record.load_n[first : end - 1])
+    periods_s = checked_periods(np.diff(record.time_s[first:end]), held_pa)
+    step_s = checked_step(min(float(periods_s.max()), longest_s))
+    return Segment(first, end, initial_state(record, first, end), held_pa, load_n, periods_s, step_s)
 
 
 def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:

@@ -118,7 +118,7 @@ def diagnose(
     search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell)
 
     base = search.base(valve)
-    scores = preview(base.fit, parts, library)
+    scores = preview(base.fit, parts, library, threads)
     if on_preview:
         on_preview(scores)
     steps = search.steps(base)

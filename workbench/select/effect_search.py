@@ -118,7 +118,7 @@ class EffectSearch:
         # No effect makes a valve worse: what the base has left behind is refitted from it.
         fitted = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
         behind = [name for name, each in fitted.items() if log_likelihood_difference(before.fit, each) > LEFT_BEHIND]
-        models |= self._refitted(number, before, behind)
+        models |= self._refitted(number, before, behind, landed=False)
         return self._judged_in_full(judged_step(before, models, number, self._library), models, number)
 
     def _judged_in_full(self, step: EffectStep, models: dict[str, EvaluatedModel | str], number: int) -> EffectStep:
@@ -169,7 +169,7 @@ class EffectSearch:
         return error.cost(descended(error, error.coordinates(composition.theta), NARROW))
 
     def _refitted(
-        self, number: int, before: EvaluatedModel, names: Sequence[str], *, racing: bool = True
+        self, number: int, before: EvaluatedModel, names: Sequence[str], *, racing: bool = True, landed: bool = True
     ) -> dict[str, EvaluatedModel | str]:
         """Refit the named effects, each on one thread; where that is not possible, say why.
 
@@ -178,13 +178,14 @@ class EffectSearch:
             before: the model they are added to.
             names: of the effects.
             racing: leave it at one search where another effect's comes to a cost `OUT_OF_RACE` times lower.
+            landed: search from landings too; where that was done and has come to nothing better than the base, without.
         """
         train, here = self._split.train.recording, before.fit
         known = ValveFile(valve=self._known, effect=here.valve.effect)
 
         def begun(name: str) -> BegunFit | str:
             try:
-                return begun_fit(train, known, (name,), here)
+                return begun_fit(train, known, (name,), here, landed=landed)
             except InputError as error:
                 return error.problem
 

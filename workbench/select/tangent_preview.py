@@ -20,6 +20,7 @@ from workbench.data.record import Record
 from workbench.fit.descent import NARROW
 from workbench.fit.fitting import Fit
 from workbench.fit.objective import FINAL, SimulationError, root_weights
+from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 
@@ -37,8 +38,10 @@ class TangentScore:
     score: float
 
 
-def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[TangentScore, ...]:
-    """Rank the effects by their tangents on the fitted part, best first."""
+def preview(
+    base: Fit, split: Split, library: Mapping[str, Effect], workers: int | None = None
+) -> tuple[TangentScore, ...]:
+    """Rank the effects by their tangents on the fitted part, best first, on so many threads, by default one a core."""
     record = split.train.record
     composition = Composition.from_file(base.valve)
     run = FreeRun(composition, record, from_pressure=base.from_pressure)
@@ -50,17 +53,17 @@ def preview(base: Fit, split: Split, library: Mapping[str, Effect]) -> tuple[Tan
     basis, _ = np.linalg.qr(weights[:, None] * error.jacobian(z, residual, NARROW.difference))
     bare = run.position_m(composition.theta)
     rows = record.valid & np.isfinite(bare)
+    r = _without(basis, weights * residual)
 
     def score(tangent_m: Series) -> float:
-        r, t = (_without(basis, weights * each) for each in (residual, tangent_m[rows]))
+        t = _without(basis, weights * tangent_m[rows])
         energy = float(r @ r) * float(t @ t)
         return float(r @ t) ** 2 / energy if energy > 0.0 else 0.0
 
-    found = [
-        TangentScore(name, max(score(each) for each in _tangents(base, effect, name, record, bare)))
-        for name, effect in library.items()
-    ]
-    return tuple(sorted(found, key=lambda each: -each.score))
+    def scored(name: str) -> TangentScore:
+        return TangentScore(name, max(score(each) for each in _tangents(base, library[name], name, record, bare)))
+
+    return tuple(sorted(on_threads(scored, tuple(library), workers), key=lambda each: -each.score))
 
 
 def _without(basis: Series, series: Series) -> Series:
