@@ -89,7 +89,7 @@ def effect_starts(error: SimulationError, added: Sequence[Parameter], seeds: Seq
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
     rounds = any(each.guess == "quantum" for each in added)
     starts = [
-        *landed_starts(error, (seeds[-2],), (rounds and guesses[:1]) or points, added, LANDED_EFFECT),
+        *landed_starts(error, seeds[-2:][:1], (rounds and guesses[:1]) or points, added, LANDED_EFFECT),
         Place(weakest, "base fit 1"),
     ]
     for number, theta in enumerate(seeds, 1):
