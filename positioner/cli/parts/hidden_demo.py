@@ -99,6 +99,7 @@ def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
 
 def _steps(recordings: str, folder: Path, setup: BusSetup, slave: str, law: str = "") -> list[float]:
     """Let a daemon make the steps; return their errors, of the stroke. Where it has no law yet it identifies first."""
+    from config.codes import Fault
     from config.errors import CommandFailed
     from positioner.dcs import Dcs
 
@@ -121,6 +122,8 @@ def _steps(recordings: str, folder: Path, setup: BusSetup, slave: str, law: str 
             dcs.set("reference", reference)
             _wait(dcs, STEP_S - SETTLED_S)
             errors.append(fmean(_wait(dcs, SETTLED_S)) - reference)
+        if fault := int(dcs.get("fault")):
+            raise CommandFailed(f"the daemon has let go of the valve: {Fault(fault).text}; see {recordings}.log")
     print(f"{len(STEPS)} steps, {recordings}: {100 * rms(errors):.3f} % of stroke rms")
     return errors
 

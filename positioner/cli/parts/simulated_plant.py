@@ -124,7 +124,9 @@ def daemon_running(
         tables: more of its file.
         lockstep: whether the slave goes in lockstep with it.
     """
-    cycle = 'pace = "device"' if lockstep else f"period_s = {setup.period_s}"
+    cycle = f"[cycle]\nperiod_s = {setup.period_s}"
+    if lockstep:  # nobody waits for the clock, so a reply may take as long as a busy machine needs
+        cycle = 'reply_timeout_s = 1.0\n[cycle]\npace = "device"'
     with running("run", _write(path, _daemon_toml(setup, slave, cycle, tables))) as daemon:
         yield daemon
 
@@ -155,8 +157,7 @@ def _daemon_toml(setup: BusSetup, ready: str, cycle: str, tables: str) -> str:
 name = "demo"
 stroke_m = {STROKE_M}
 [device]
-{setup.device(ready)}[cycle]
-{cycle}
+{setup.device(ready)}{cycle}
 [identification]
 window_s = {setup.window_s}
 [supervisory]
