@@ -88,8 +88,8 @@ class Loop:
         pace = DevicePace()
         link = Link(MemoryDriver(Late(device)), pace)
         held_pa, _ = link.open()
-        controller = Controller(Settings.of(file, extended), held_pa)
-        self.cycle = Cycle(link, controller, pace, Requests(mode=Mode.AUTOMATIC, mode_writes=1), recorder=None)
+        self.controller = Controller(Settings.of(file, extended), held_pa)
+        self.cycle = Cycle(link, self.controller, pace, Requests(mode=Mode.AUTOMATIC, mode_writes=1), recorder=None)
         if extended is None:
             self._ask(eta=(0, 0, 0))
             while self.cycle.snapshot.decision.estimates.progress < 1:

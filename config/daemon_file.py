@@ -246,6 +246,14 @@ class DaemonFile(Schema):
     memory: MemoryTable = MemoryTable()
     log: LogTable = LogTable()
 
+    @model_validator(mode="after")
+    def _extended_or_kept(self) -> Self:
+        if self.law is not None and self.law.valve is not None and self.memory.folder is not None:
+            raise ValueError(
+                "memory.folder must not be given with law.valve: the valve file itself outlives the daemon"
+            )
+        return self
+
     @property
     def by_slides(self) -> bool:
         """Whether S3 excites by a staircase of slides: where nobody says, the law of slides does."""

@@ -66,3 +66,9 @@ def test_another_valve_is_refused(
 def test_the_law_has_one_source(law: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         DaemonFile.model_validate({"valve": {"stroke_m": 0.1}, "law": law})
+
+
+def test_what_is_kept_over_a_restart_and_a_valve_file_exclude_each_other() -> None:
+    file = {"valve": {"stroke_m": 0.1}, "law": {"valve": "better.toml"}, "memory": {"folder": "kept"}}
+    with pytest.raises(ValueError, match=r"memory\.folder must not be given with law\.valve"):
+        DaemonFile.model_validate(file)

@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 
 from config.extended_valve import ExtendedValve, Inverse
-from positioner.estimation.landings.extended_balance import extended_landing_pa, straight_law
+from positioner.estimation.landings.extended_balance import contradicted, extended_landing_pa, straight_law
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_law import static_law
 
 L, SLOPE, BEND, F_C, OFFSET = 0.1, 8e5, 3e6, 2e4, 5e3
 GRID = tuple(L * i / 200 for i in range(201))
@@ -73,6 +74,21 @@ def test_what_one_place_alone_says_stays_there() -> None:
     near, far = (extended_landing_pa(x, 1, VALVE, landings, 0.0) - VALVE.landing_pa(x, 1) for x in (0.05, 0.08))
     assert near == pytest.approx(2e3, rel=0.1)
     assert abs(far) < 0.5e3
+
+
+@pytest.mark.parametrize("slope", [1.0, 0.6])
+def test_landings_on_a_straight_line_that_the_table_does_not_have_say_that_it_is_another_valve(slope: float) -> None:
+    """With slope 0.6 as with another area: all pressures by one factor, the level followed."""
+    ratios = straight_law(VALVE)
+    straight = [
+        SlideOutcome(0.0, s, x - s * 0.02, ratios.balance_pa(0.05 + slope * (x - 0.05), s), x, 1e-6, True, True)
+        for x in (0.02, 0.035, 0.05, 0.065, 0.08)
+        for s in (1, -1)
+    ]
+    own = [landing(x, s, 3e3) for x in (0.02, 0.035, 0.05, 0.065, 0.08) for s in (1, -1)]
+    assert contradicted(VALVE, static_law(straight, L))
+    assert not contradicted(VALVE, static_law(own, L))
+    assert not contradicted(VALVE, static_law(own[:3], L))
 
 
 def test_the_straight_law_is_the_secant() -> None:

@@ -6,7 +6,6 @@ A command imports from here what it needs when it runs.
     flow_demo, flow_cases, flow_on_bus          `demo --loop flow`: what it says, its cases, one of them on wires
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
-    daemon_address                              where a daemon is
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
     diagnose_forces                             `diagnose` on a bench's recording
     extended_valves                             `[law] valve` of a daemon's file, worked out

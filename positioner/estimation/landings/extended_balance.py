@@ -11,13 +11,17 @@ has the shape; the landings keep its level true.
 """
 
 from collections.abc import Iterable
-from math import inf
+from math import inf, sqrt
+from statistics import fmean
 
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.local_balance import WIDTH, missed_pa
+from positioner.estimation.landings.static_law import StaticLaw
 
+WORSE, LEAST_OFF = 2.0, 5e-3
+"""Times as far off as off a straight law, and of the stroke: landings that scatter more are another valve's."""
 LARGEST_DRIFT = 0.1
 """Share of friction that a known drift is followed since a landing: a straight line goes on for no longer."""
 
@@ -52,6 +56,22 @@ def _today(each: SlideOutcome, valve: ExtendedValve, now_s: float) -> SlideOutco
     share = min(max(share, -LARGEST_DRIFT), LARGEST_DRIFT)
     friction_pa = 0.5 * (valve.landing_pa(each.position_m, 1) - valve.landing_pa(each.position_m, -1))
     return each._replace(command_pa=each.command_pa + each.direction * share * friction_pa)
+
+
+def contradicted(valve: ExtendedValve, law: StaticLaw) -> bool:
+    """Whether landings say that this is another valve: they lie off its pressures, but not off a straight law.
+
+    What is the same for all landings in a direction does not count: that is followed.
+    """
+    if not law.valid:
+        return False
+    off_m2, free = 0.0, -3
+    for s in (1, -1):
+        off_m = [each.position_m - valve.lands_m(each.command_pa, s) for each in law.slides if each.direction == s]
+        middle_m = fmean(off_m)
+        off_m2 += sum((each - middle_m) ** 2 for each in off_m)
+        free += len(off_m)
+    return sqrt(off_m2 / max(1, free)) > max(WORSE * law.residual_m, LEAST_OFF * valve.stroke_m)
 
 
 def straight_law(valve: ExtendedValve) -> Ratios:
