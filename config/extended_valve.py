@@ -39,6 +39,8 @@ class Inverse(NamedTuple):
     """The indication stays behind the stem by half of this, whichever way it went last."""
     sensor_lag_s: float = 0.0
     """The indication follows the stem with this time constant."""
+    quantum_m: float = 0.0
+    """The indication is rounded to multiples of this."""
     drift_per_s: float = 0.0
     """Friction changes by this share each second."""
     yielding_n_per_m: float = inf
@@ -60,6 +62,7 @@ class Inverse(NamedTuple):
             most_pa=min(self.most_pa, other.most_pa),
             play_m=self.play_m + other.play_m,
             sensor_lag_s=self.sensor_lag_s + other.sensor_lag_s,
+            quantum_m=max(self.quantum_m, other.quantum_m),
             drift_per_s=self.drift_per_s + other.drift_per_s,
             yielding_n_per_m=min(self.yielding_n_per_m, other.yielding_n_per_m),
         )
@@ -98,10 +101,6 @@ class ExtendedValve:
         """Return p_s(x), Pa."""
         return _value(self._landing(direction), stem_m / self.stroke_m)
 
-    def landing_m(self, pressure_pa: float, direction: int) -> float:
-        """Return where the stem is, m, that a slide under a pressure lands: the inverse of p_s(x)."""
-        return _share(self._landing(direction), pressure_pa) * self.stroke_m
-
     def breakaway_pa(self, stem_m: float, direction: int) -> float:
         """Return p'_s(x), Pa."""
         table = self.breakaway_up_pa if direction > 0 else self.breakaway_down_pa
@@ -109,8 +108,11 @@ class ExtendedValve:
 
     def margin_m(self, stem_m: float, direction: int) -> float:
         """Return m_s(x), m."""
-        lands_m = self.landing_m(self.breakaway_pa(stem_m, direction), direction)
-        return max(0.0, direction * (lands_m - stem_m))
+        return max(0.0, direction * (self.lands_m(self.breakaway_pa(stem_m, direction), direction) - stem_m))
+
+    def lands_m(self, pressure_pa: float, direction: int) -> float:
+        """Return where a slide in a direction lands under a pressure, m."""
+        return _share(self._landing(direction), pressure_pa) * self.stroke_m
 
     def stem_m(self, indicated_m: float, direction: int) -> float:
         """Return where the stem is, m, that is indicated at a position after moving in a direction (0: unknown)."""

@@ -329,9 +329,7 @@ def _inverse(path: Path, namespace: dict[str, Any]) -> Callable[[Sequence[float]
     if "INVERSE" in namespace:
         raise InputError(str(path), f'either INVERSE = "{BALANCE}" or the function inverse undoes it, not both')
     inverse, parameters = namespace["inverse"], namespace["Parameters"]
-    if "q" not in inspect.signature(inverse).parameters:
-        return lambda _: inverse()
-    return lambda values: inverse(q=parameters(*values))
+    return lambda values: inverse(parameters(*values))
 
 
 def _check_places(effect: Effect) -> None:

@@ -5,6 +5,9 @@ A simulated slave and the daemon run as processes of their own, on the bus that 
 of the packing by 30 %, the same steps once more, identification anew, and the steps again. What the daemon identified
 is compared with the truth here, where it is known; the daemon never has it.
 
+`--hidden` gives the valve an effect that nobody has told the daemon, finds it in the daemon's own recording, gives the
+daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
+
 `--loop flow` is another one: what the laws make of a flow loop, in virtual time (`parts.flow_demo`).
 """
 
@@ -95,6 +98,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("--bus", choices=tuple(BUSES), help="the fieldbus (modbus; of a loop: none, in virtual time)")
     parser.add_argument("--loop", choices=("flow",), help="in place of steps: does the positioner calm a flow loop?")
+    parser.add_argument(
+        "--hidden",
+        action="store_true",
+        help="in place of ageing: a valve with an effect that the daemon finds in its own recording and then knows",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="keep picture, recording, configs and logs there")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the outcome there")
 
@@ -105,6 +113,11 @@ def run(arguments: argparse.Namespace) -> int:
         from positioner.cli.parts.flow_demo import run_flow
 
         return run_flow(arguments)
+    if arguments.hidden:
+        from positioner.cli.parts.hidden_demo import run_hidden
+
+        with _folder(arguments.out) as folder:
+            return run_hidden(arguments.bus or "modbus", folder.resolve(), arguments.json)
     return _run_steps(arguments)
 
 

@@ -38,13 +38,17 @@ def run(arguments: argparse.Namespace) -> int:
     for file in files:
         print(f"{'config':12} ok    {arguments.config}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
     checks: list[tuple[str, Check, DaemonFile]] = [
-        *((name, check, file) for file in files for name, check in (("bus", _bus), ("recorder", _recorder))),
+        *(
+            (name, check, file)
+            for file in files
+            for name, check in (("law", _law), ("bus", _bus), ("recorder", _recorder))
+        ),
         *((name, check, files[0]) for name, check in (("supervisory", _supervisory), ("timing", _timing))),
         ("priority", _priority, files[0]),
         *(("certificates", _certificates, file) for file in files),
     ]
     for name, check, file in checks:
-        valve = f"{file.valve.name}: " if len(files) > 1 and check in (_bus, _recorder) else ""
+        valve = f"{file.valve.name}: " if len(files) > 1 and check in (_law, _bus, _recorder) else ""
         well = _passes(name, valve, partial(check, file, arguments.config)) and well
     return 0 if well else 1
 
@@ -65,6 +69,20 @@ def _packages() -> str:
     if said := in_the_way() or sharing():
         raise FailedCheck(said)
     return f"{', '.join(OWN)} are positioner's own, in {HOME}"
+
+
+def _law(file: "DaemonFile", config: Path) -> str:
+    from config.errors import InputError
+    from positioner.cli.parts.extended_valves import extended_valve_of
+
+    try:
+        valve = extended_valve_of(file, str(config))
+    except InputError as error:
+        raise FailedCheck(str(error)) from None
+    if valve is None:
+        return f"{file.control.law}, {'nothing known yet' if file.law is None else 'ratios typed in'}"
+    assert file.law is not None
+    return f"{file.control.law}, with the inverse of {file.law.valve}"
 
 
 def _bus(file: "DaemonFile", _config: Path) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, Refusal, Restored, State
+from config.extended_valve import ExtendedValve
 from positioner.control import pressure_path
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
@@ -245,7 +246,9 @@ def step(
         asked_pa = requests.manual_pa
     else:
         exciting = experiment if experiment.commands else excitation
-        asked_pa = _pressure_pa(state, held_pa, exciting, sample.now_s, reference, applied, settings, law_memory)
+        asked_pa = _pressure_pa(
+            state, held_pa, exciting, sample.now_s, reference, applied, settings, law_memory, statics.valve
+        )
     limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
     wanted_pa = settings.delivered_pa(limited_pa)
     follows = supervision.fault is Fault.NONE and state in (State.S1_UP, State.S2_DOWN)
@@ -428,6 +431,7 @@ def _pressure_pa(
     applied: Applied,
     settings: Settings,
     law_memory: LawMemory | None,
+    extended: ExtendedValve | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
     if state is State.S3_IDENTIFY and exciting is not None:
@@ -435,5 +439,8 @@ def _pressure_pa(
     if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
         if law_memory is not None:
             return law_memory.level_pa
-        return settings.law(reference.value_m, 1 if state is State.S1_UP else -1, applied.ratios)
+        s = 1 if state is State.S1_UP else -1
+        if extended is not None:
+            return extended.landing_pa(reference.value_m, s)
+        return settings.law(reference.value_m, s, applied.ratios)
     return held_pa

@@ -98,7 +98,9 @@ def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) 
     if seen.valve is not None:
         observation = stem_observed(observation, seen.valve, statics.way)
         memory = with_margins_at(memory, seen.reference_m, seen.valve)
-    balance = slides.Balance(seen.ratios, statics.landings, statics.held, seen.stroke_m, seen.valve)
+    balance = slides.Balance(
+        seen.ratios, statics.landings, statics.held, seen.stroke_m, statics.valve, seen.sample.now_s
+    )
     return slides.step(memory, observation, seen.reference_m, balance, settings)
 
 

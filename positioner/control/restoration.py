@@ -116,7 +116,7 @@ def _landing_m(
         lands_m = knowledge.landing_m(command_pa, direction)
         should_pa = landing_pa(lands_m, direction, ratios, landings, stroke_m)
     else:
-        lands_m = valve.landing_m(command_pa, direction)
+        lands_m = valve.lands_m(command_pa, direction)
         should_pa = extended_landing_pa(lands_m, direction, valve, landings)
     return lands_m - (should_pa - command_pa) / -ratios.b_over_c
 

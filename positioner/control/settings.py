@@ -85,7 +85,7 @@ class Settings:
                 derivative_window_s=identification.derivative_window_s,
             ),
             applied=Applied(_ratios(file.law) if valve is None else straight_law(valve)),
-            law=LAWS.get(file.control.law, balance_pa) if valve is None else _inverse(valve),
+            law=LAWS.get(file.control.law, balance_pa),
             law_with_memory=WITH_MEMORY[file.control.law](_within_supply(file, valve))
             if file.control.law in WITH_MEMORY
             else None,
@@ -173,8 +173,3 @@ def _ratios(law: LawTable | None) -> Ratios | None:
     if law is None or law.b_over_c_pa_per_m is None or law.k_over_c_pa is None:
         return None
     return Ratios(law.b_over_c_pa_per_m, law.k_over_c_pa, law.offset_pa)
-
-
-def _inverse(valve: ExtendedValve) -> Callable[[float, int, Ratios], float]:
-    """Return the law without a memory that gives the pressure of the extended valve."""
-    return lambda reference_m, direction, _: valve.landing_pa(reference_m, direction)

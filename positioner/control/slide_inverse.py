@@ -23,6 +23,7 @@ def stem_observed(observation: StemObservation, valve: ExtendedValve, direction:
     rest = observation.rest
     return replace(
         observation,
+        quantum_m=max(observation.quantum_m, valve.inverse.quantum_m),
         position_m=valve.stem_m(observation.position_m, direction),
         rest=None if rest is None else replace(rest, position_m=valve.stem_m(rest.position_m, direction)),
     )

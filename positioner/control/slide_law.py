@@ -71,17 +71,21 @@ class Balance:
     stroke_m: float
     valve: ExtendedValve | None = None
     """In place of the straight law, where its effects are known."""
+    now_s: float = 0.0
 
     def pressure_pa(self, position_m: float, direction: int) -> float:
         """Return B(x, s), Pa."""
         if self.valve is not None:
-            return extended_landing_pa(position_m, direction, self.valve, self.landings)
+            return extended_landing_pa(position_m, direction, self.valve, self.landings, self.now_s)
         return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
 
     def way_m(self, each: SlideOutcome) -> float:
         """Return how far a slide would have gone, m, by the balance at the place it starts from."""
-        ahead_pa = each.command_pa - self.pressure_pa(each.from_m, each.direction)
-        return each.direction * ahead_pa / -self.ratios.b_over_c
+        s, from_pa = each.direction, self.pressure_pa(each.from_m, each.direction)
+        if self.valve is not None:
+            followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
+            return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
+        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c
 
     @property
     def friction_m(self) -> float:

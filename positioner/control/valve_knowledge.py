@@ -131,7 +131,7 @@ def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None) -> LawM
 
 def _missed_m(landings: Sequence[SlideOutcome], valve: ExtendedValve) -> float:
     """Return the standard deviation, m, of where slides landed about where the valve says."""
-    off_m = [each.position_m - valve.landing_m(each.command_pa, each.direction) for each in landings]
+    off_m = [each.position_m - valve.lands_m(each.command_pa, each.direction) for each in landings]
     return sqrt(sum(each**2 for each in off_m) / len(off_m)) if off_m else 0.0
 
 

@@ -34,6 +34,6 @@ def sensor(y: float, q: Parameters) -> float:
     return float(q.quantum_m * np.floor(y / q.quantum_m + 0.5)) if q.quantum_m > 0.0 else y
 
 
-def inverse() -> Inverse:
-    """Undo nothing: the law of slides finds a quantum by itself, and what it has rounded off is lost."""
-    return Inverse()
+def inverse(q: Parameters) -> Inverse:
+    """Believe no difference smaller than a rounding; what it has rounded off is lost."""
+    return Inverse(quantum_m=q.quantum_m)

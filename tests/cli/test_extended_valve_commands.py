@@ -47,6 +47,10 @@ def test_the_daemon_does_not_start_with_another_valve(
     written(tmp_path / "better.toml", more, stroke)
     daemon = tmp_path / "daemon.toml"
     daemon.write_text(DAEMON)
+    assert main(["doctor", str(daemon)]) == 1
+    (line,) = (each for each in capsys.readouterr().out.splitlines() if each.startswith("law"))
+    assert "FAILS" in line
+    assert said.format(folder=tmp_path) in line
     assert main(["run", str(daemon)]) == 2
     line = capsys.readouterr().err
     assert said.format(folder=tmp_path) in line

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
-from config.extended_valve import ExtendedValve
+from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
 from positioner.control.slide_inverse import with_margins_at
 from positioner.control.slide_memory import SlideMemory
@@ -49,3 +49,23 @@ def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:
     assert there.up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1))
     assert there.down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
     assert with_margins_at(there, 0.8 * STROKE_M, extended) is there
+
+
+def test_lead_makes_a_slow_pressure_fast_enough() -> None:
+    composition, extended = switched_on("ip_lag")
+    assert COURSE.outcome(composition, extended).rms < 1e-3
+    unled = replace(extended, inverse=Inverse())
+    assert COURSE.outcome(composition, unled).rms > 1e-2
+
+
+def test_what_is_held_when_the_daemon_leaves_is_no_lead() -> None:
+    composition, extended = switched_on("ip_lag")
+    loop = Loop(composition, extended, COURSE.period_s, seed=0)
+    loop.step_to(0.6 * STROKE_M)
+    for _ in range(50):
+        loop.cycle.once()
+        controller = loop.controller
+        if controller.command_pa != controller.left_pa:
+            break
+    assert controller.command_pa > controller.left_pa + 1e3
+    assert controller.left_pa == pytest.approx(extended.landing_pa(0.6 * STROKE_M, 1), rel=1e-3)

@@ -1,5 +1,6 @@
 """Which rests are landings: on a stem made by hand that answers each command at once, or not."""
 
+import math
 from collections.abc import Callable
 
 import pytest
@@ -70,3 +71,20 @@ def test_what_something_else_has_moved_is_no_landing() -> None:
     assert not any(found)
     assert detector.rest is not None
     assert detector.rest.position_m == pytest.approx(0.06)
+
+
+def test_a_stem_rests_for_nobody_before_the_pressure_has_arrived() -> None:
+    detector, period_s, waits_s = LandingDetector(0.1), 0.02, 3.0
+    for i in range(100):
+        detector.update(i * period_s, 0.05, 50e3, math.nan)
+    assert detector.rest is not None
+    begins_s = 100 * period_s
+    for i in range(round(waits_s / period_s)):
+        assert detector.update(begins_s + i * period_s, 0.05, 55e3, math.nan, arrived=False) is None
+        assert detector.rest is None
+    outcomes = [
+        detector.update(begins_s + waits_s + i * period_s, 0.05, 55e3, math.nan, arrived=True) for i in range(120)
+    ]
+    (held,) = (each for each in outcomes if each is not None)
+    assert not held.moved
+    assert held.time_s - begins_s - waits_s >= 1.0, "a stem that has never answered may yet"

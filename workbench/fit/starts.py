@@ -89,7 +89,7 @@ def effect_starts(
     rounds = any(each.guess == "quantum" for each in added)
     solved = (rounds and guesses[:1]) or points
     starts = [
-        *(landed_starts(error, (seeds[-2],), solved, added, LANDED_EFFECT) if landed else ()),
+        *(landed_starts(error, seeds[-2:][:1], solved, added, LANDED_EFFECT) if landed else ()),
         weakest_start(error, added, seeds[0]),
     ]
     for number, theta in enumerate(seeds, 1):

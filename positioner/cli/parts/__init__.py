@@ -5,6 +5,7 @@ A command imports from here what it needs when it runs.
     children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
     flow_demo, flow_cases, flow_on_bus          `demo --loop flow`: what it says, its cases, one of them on wires
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
+    hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
     diagnose_forces                             `diagnose` on a bench's recording
     extended_valves                             `[law] valve` of a daemon's file, worked out

@@ -25,6 +25,9 @@ RTU_PERIOD_S = 5e-3
 """On a pseudo-terminal, an exchange takes two silences of 1.75 ms; at 115200 baud a real line adds 4.2 ms."""
 RTU_WINDOW_S = 1.2
 """A fifth of the samples in a second: a longer window, within the rise of the sine, brings k/c back within 1 %."""
+STROKE_M = 0.1016
+"""Of the seed's valve."""
+RECORDER = '[recorder]\nfolder = "recordings"\n'
 NOISE_PU = 1e-4
 """Standard deviation of the position, share of the stroke."""
 
@@ -82,23 +85,65 @@ class RunningPair:
 @contextmanager
 def started(bus: str, folder: Path, valve: "ValveParameters") -> Iterator[RunningPair]:
     """Run a slave and a daemon on a bus as processes, their files and logs in a folder."""
+    with slave_running(bus, folder, "seed", _ageing(valve)) as (setup, slave):
+        powered_s = time.monotonic()
+        with daemon_running(folder / "daemon.toml", setup, slave) as daemon:
+            yield RunningPair(slave, daemon, powered_s)
+
+
+@contextmanager
+def slave_running(
+    bus: str, folder: Path, valve: str, tables: str = "", lockstep_s: float | None = None
+) -> Iterator[tuple[BusSetup, str]]:
+    """Run a slave on a bus as a process; give what the bus puts into the daemon's file, and the slave's ready line.
+
+    Args:
+        bus: its name.
+        folder: of its file and log.
+        valve: its valve file, as a slave's file names it.
+        tables: more of its file.
+        lockstep_s: the period of one that goes in lockstep with its daemon; None: real time.
+    """
     with BUSES[bus]() as setup:
-        slave_path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave))
-        with running("sim", slave_path, *setup.options) as slave:
-            powered_s = time.monotonic()
-            daemon_path = _write(folder / "daemon.toml", _daemon_toml(valve, setup, slave))
-            with running("run", daemon_path) as daemon:
-                yield RunningPair(slave, daemon, powered_s)
+        clock = f"period_s = {PERIOD_S}" if lockstep_s is None else f'mode = "lockstep"\nperiod_s = {lockstep_s}'
+        path = _write(folder / "slave.toml", _slave_toml(valve, setup.slave, clock, tables))
+        with running("sim", path, *setup.options) as slave:
+            yield setup, slave
 
 
-def _slave_toml(valve: "ValveParameters", bus: str) -> str:
-    return f"""# The simulated valve of the demo; its packing ages {AGES_AT_S:g} s after power-up.
-valve = "seed"
+@contextmanager
+def daemon_running(
+    path: Path, setup: BusSetup, slave: str, tables: str = RECORDER, *, lockstep: bool = False
+) -> Iterator[str]:
+    """Run a daemon on a slave's bus as a process; give its ready line.
+
+    Args:
+        path: of its file, beside which its log lies.
+        setup: what the bus puts into it.
+        slave: the slave's ready line.
+        tables: more of its file.
+        lockstep: whether the slave goes in lockstep with it.
+    """
+    cycle = f"[cycle]\nperiod_s = {setup.period_s}"
+    if lockstep:  # nobody waits for the clock, so a reply may take as long as a busy machine needs
+        cycle = 'reply_timeout_s = 1.0\n[cycle]\npace = "device"'
+    with running("run", _write(path, _daemon_toml(setup, slave, cycle, tables))) as daemon:
+        yield daemon
+
+
+def _slave_toml(valve: str, bus: str, clock: str, tables: str) -> str:
+    return f"""# The simulated valve of the demo.
+valve = "{valve}"
 {bus}[clock]
-period_s = {PERIOD_S}
+{clock}
 [sensor]
-noise_std_m = {NOISE_PU * valve.stroke_m}
+noise_std_m = {NOISE_PU * STROKE_M}
 seed = 1
+{tables}"""
+
+
+def _ageing(valve: "ValveParameters") -> str:
+    return f"""# Its packing ages.
 [[change]]
 at_s = {AGES_AT_S}
 coulomb_n = {AGEING * valve.coulomb_n}
@@ -106,21 +151,18 @@ static_n = {AGEING * valve.static_n}
 """
 
 
-def _daemon_toml(valve: "ValveParameters", setup: BusSetup, ready: str) -> str:
+def _daemon_toml(setup: BusSetup, ready: str, cycle: str, tables: str) -> str:
     return f"""# The daemon of the demo. It knows the stroke; all else it identifies.
 [valve]
 name = "demo"
-stroke_m = {valve.stroke_m}
+stroke_m = {STROKE_M}
 [device]
-{setup.device(ready)}[cycle]
-period_s = {setup.period_s}
+{setup.device(ready)}{cycle}
 [identification]
 window_s = {setup.window_s}
 [supervisory]
 port = 0
-[recorder]
-folder = "recordings"
-"""
+{tables}"""
 
 
 def _write(path: Path, text: str) -> Path:

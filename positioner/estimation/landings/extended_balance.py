@@ -4,19 +4,31 @@
     d_s     = mean of p_j - p_s(x_j)         over the latest landings in direction s: friction and spring that drift
     n_s(x)  = the same of what is left       over those near x, as of the straight law (local_balance.py)
 
-Both means fade from landing to landing. The table has the shape; the landings keep its level true.
+with p_j + s r (t - t_j) (p_+(x_j) - p_-(x_j))/2 in place of p_j where friction is known to drift by r a second.
+
+Both means fade from landing to landing; of a rounded indication only what is more than half a quantum counts. The table
+has the shape; the landings keep its level true.
 """
 
 from collections.abc import Iterable
-from math import inf
+from math import inf, sqrt
+from statistics import fmean
 
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.local_balance import WIDTH, missed_pa
+from positioner.estimation.landings.static_law import StaticLaw
+
+WORSE, LEAST_OFF = 2.0, 5e-3
+"""Times as far off as off a straight law, and of the stroke: landings that scatter more are another valve's."""
+LARGEST_DRIFT = 0.1
+"""Share of friction that a known drift is followed since a landing: a straight line goes on for no longer."""
 
 
-def extended_landing_pa(stem_m: float, direction: int, valve: ExtendedValve, landings: Iterable[SlideOutcome]) -> float:
+def extended_landing_pa(
+    stem_m: float, direction: int, valve: ExtendedValve, landings: Iterable[SlideOutcome], now_s: float
+) -> float:
     """Return the pressure, Pa, under which a slide up (+1) or down (-1) lands at a position, m.
 
     Args:
@@ -24,14 +36,42 @@ def extended_landing_pa(stem_m: float, direction: int, valve: ExtendedValve, lan
         direction: of the slide.
         valve: the extended valve.
         landings: the latest first; positions of the stem.
+        now_s: time, as of the landings.
     """
-    landed = [each for each in landings if each.direction == direction]
-    drifted_pa = missed_pa(stem_m, landed, valve.landing_pa, inf)
+    landed = [_today(each, valve, now_s) for each in landings if each.direction == direction]
+    believed_pa = 0.5 * valve.inverse.quantum_m * -straight_law(valve).b_over_c
+    drifted_pa = missed_pa(stem_m, landed, valve.landing_pa, inf, believed_pa)
 
     def followed_pa(position_m: float, direction: int) -> float:
         return valve.landing_pa(position_m, direction) + drifted_pa
 
-    return followed_pa(stem_m, direction) + missed_pa(stem_m, landed, followed_pa, WIDTH * valve.stroke_m)
+    return followed_pa(stem_m, direction) + missed_pa(stem_m, landed, followed_pa, WIDTH * valve.stroke_m, believed_pa)
+
+
+def _today(each: SlideOutcome, valve: ExtendedValve, now_s: float) -> SlideOutcome:
+    """Return a landing under the pressure that it would take now, its friction having drifted as is known."""
+    share = valve.inverse.drift_per_s * (now_s - each.time_s)
+    if share == 0.0:
+        return each
+    share = min(max(share, -LARGEST_DRIFT), LARGEST_DRIFT)
+    friction_pa = 0.5 * (valve.landing_pa(each.position_m, 1) - valve.landing_pa(each.position_m, -1))
+    return each._replace(command_pa=each.command_pa + each.direction * share * friction_pa)
+
+
+def contradicted(valve: ExtendedValve, law: StaticLaw) -> bool:
+    """Whether landings say that this is another valve: they lie off its pressures, but not off a straight law.
+
+    What is the same for all landings in a direction does not count: that is followed.
+    """
+    if not law.valid:
+        return False
+    off_m2, free = 0.0, -3
+    for s in (1, -1):
+        off_m = [each.position_m - valve.lands_m(each.command_pa, s) for each in law.slides if each.direction == s]
+        middle_m = fmean(off_m)
+        off_m2 += sum((each - middle_m) ** 2 for each in off_m)
+        free += len(off_m)
+    return sqrt(off_m2 / max(1, free)) > max(WORSE * law.residual_m, LEAST_OFF * valve.stroke_m)
 
 
 def straight_law(valve: ExtendedValve) -> Ratios:

@@ -8,7 +8,7 @@ missing there: the next one lands. w_0 holds the correction back where there is 
 """
 
 from collections.abc import Callable, Iterable
-from math import exp
+from math import copysign, exp
 
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -50,7 +50,11 @@ def landing_pa(
 
 
 def missed_pa(
-    position_m: float, landed: Iterable[SlideOutcome], law: Callable[[float, int], float], width_m: float
+    position_m: float,
+    landed: Iterable[SlideOutcome],
+    law: Callable[[float, int], float],
+    width_m: float,
+    least_pa: float = 0.0,
 ) -> float:
     """Return by what a law misses landings near a position, Pa: the mean of e_j, weighted.
 
@@ -59,11 +63,13 @@ def missed_pa(
         landed: all in one direction, the latest first.
         law: the pressure, Pa, at a position, m, in a direction.
         width_m: h.
+        least_pa: by which each e_j is brought nearer to 0: less says nothing.
     """
     weighted_pa, weights, age = 0.0, HELD_BACK, 1.0
     for each in landed:
         weight = age * exp(-(((each.position_m - position_m) / width_m) ** 2) / 2)
-        weighted_pa += weight * (each.command_pa - law(each.position_m, each.direction))
+        missed = each.command_pa - law(each.position_m, each.direction)
+        weighted_pa += weight * copysign(max(0.0, abs(missed) - least_pa), missed)
         weights += weight
         age *= FADING
     return weighted_pa / weights

@@ -12,6 +12,7 @@ from config.codes import Refusal
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.extended_balance import contradicted
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
 from positioner.estimation.landings.landing_shift import shifted
 from positioner.estimation.landings.local_balance import ahead_m
@@ -38,6 +39,7 @@ class StaticIdentification:
         landings: the latest first.
         held: changes of the command that did not move the stem, the latest first.
         law: from the landings.
+        valve: the extended valve, as long as the landings do not say that it is another.
         way: direction in which the stem moved last, 0 if it has not.
     """
 
@@ -49,7 +51,7 @@ class StaticIdentification:
         valve: ExtendedValve | None = None,
     ) -> None:
         self._stroke_m = stroke_m
-        self._valve = valve
+        self._valve = self.valve = valve
         self.way = 0
         self._each = each
         self.detector = LandingDetector(stroke_m, stops_m)
@@ -114,6 +116,8 @@ class StaticIdentification:
         both = (*self._in_direction[1], *self._in_direction[-1])
         landings = tuple(sorted(both, key=lambda each: -each.time_s))
         self.law = static_law(landings, self._stroke_m)
+        if self._valve is not None:
+            self.valve = None if contradicted(self._valve, self.law) else self._valve
         self.landings = self.law.slides if self.law.valid else landings
 
     def _gave_way(self, outcome: SlideOutcome) -> bool:
@@ -154,7 +158,7 @@ class StaticIdentification:
 
     def corrected(self, applied: Applied) -> Applied:
         """Return what is applied after a landing: the law's own numbers in place of such as it contradicts."""
-        if applied.ratios is None or not self.law.contradicts(applied.ratios, self._stroke_m):
+        if applied.ratios is None or self.valve is not None or not self.law.contradicts(applied.ratios, self._stroke_m):
             return applied
         return Applied(self.law.ratios, applied.count + 1, applied.refusals, Refusal.CONTRADICTED_BY_LANDINGS)
 
