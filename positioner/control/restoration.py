@@ -82,7 +82,7 @@ def _agrees(
 ) -> bool | None:
     """Return whether what a change of the command did agrees with what was restored; None: it does not say."""
     s, at_m = outcome.direction, outcome.position_m
-    should_m = _landing_m(outcome.command_pa, s, knowledge, valve, stroke_m)
+    should_m = _landing_m(outcome, s, knowledge, valve, stroke_m)
     within_m = _within_m(outcome, should_m, s, knowledge, stroke_m)
     if outcome.landing:
         return abs(at_m - should_m) <= within_m
@@ -104,21 +104,21 @@ def _held_against_m(
     outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
 ) -> float:
     """Return how far a slide from where the stem rests would go in a direction, m."""
-    return direction * (_landing_m(outcome.command_pa, direction, knowledge, valve, stroke_m) - outcome.position_m)
+    return direction * (_landing_m(outcome, direction, knowledge, valve, stroke_m) - outcome.position_m)
 
 
 def _landing_m(
-    command_pa: float, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
+    outcome: SlideOutcome, direction: int, knowledge: ValveKnowledge, valve: ExtendedValve | None, stroke_m: float
 ) -> float:
     """Return where a slide lands: by the law, corrected by what landings near there missed it by."""
     ratios, landings = knowledge.ratios, knowledge.landings
     if valve is None:
-        lands_m = knowledge.landing_m(command_pa, direction)
+        lands_m = knowledge.landing_m(outcome.command_pa, direction)
         should_pa = landing_pa(lands_m, direction, ratios, landings, stroke_m)
     else:
-        lands_m = valve.lands_m(command_pa, direction)
-        should_pa = extended_landing_pa(lands_m, direction, valve, landings)
-    return lands_m - (should_pa - command_pa) / -ratios.b_over_c
+        lands_m = valve.lands_m(outcome.command_pa, direction)
+        should_pa = extended_landing_pa(lands_m, direction, valve, landings, outcome.time_s)
+    return lands_m - (should_pa - outcome.command_pa) / -ratios.b_over_c
 
 
 def _within_m(
