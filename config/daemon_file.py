@@ -167,6 +167,8 @@ class ControlTable(Schema):
     """How far the law of slides may take the stem beyond a small move, as a share of the stroke."""
     excursion_interval_s: NonNegative = 0.0
     """Least time between two such excursions."""
+    excursion_budget_strokes_per_day: NonNegative = 0.0
+    """Travel of the packing that such excursions may cost, beyond that of the moves themselves; 0: no limit."""
 
 
 class SupervisoryTable(Schema):

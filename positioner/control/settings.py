@@ -10,7 +10,7 @@ from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.conventional_law import ConventionalSettings
 from positioner.control.played_experiment import ExperimentLimits
-from positioner.control.slide_memory import SlideSettings
+from positioner.control.slide_memory import DAY_S, SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
@@ -131,6 +131,7 @@ def _slides(file: DaemonFile) -> SlideSettings:
         breakaway_pa=file.valve.breakaway_pa,
         excursion_limit_m=file.control.excursion_limit * file.valve.stroke_m,
         excursion_interval_s=file.control.excursion_interval_s,
+        budget_m_per_s=file.control.excursion_budget_strokes_per_day * file.valve.stroke_m / DAY_S,
         command_step_pa=file.device.command_step_pa,
     )
 

@@ -29,7 +29,7 @@ from math import isnan
 
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
+from positioner.control.slide_memory import DAY_S, Margin, SlideMemory, SlideSettings, StemObservation
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -238,9 +238,13 @@ def _excursion(
         if not settings.minimum_pa <= balance.pressure_pa(by_m, direction) <= settings.maximum_pa:
             why = InhibitReason.LAW_BEYOND_LIMITS
             continue
+        spent_m = memory.spent_at_m(now_s, settings) + 2 * abs(by_m - target_m)
+        if 0.0 < settings.budget_m_per_s * DAY_S < spent_m:
+            why = InhibitReason.EXCURSION_BUDGET_SPENT
+            continue
         return_pa = balance.pressure_pa(target_m, -direction)
         return_pa = min(max(return_pa, settings.minimum_pa), settings.maximum_pa)
-        memory = replace(memory, excursion_s=now_s, return_pa=return_pa)
+        memory = replace(memory, excursion_s=now_s, spent_m=spent_m, return_pa=return_pa)
         return _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
     return replace(memory, inhibit_reason=why)
 

@@ -13,6 +13,7 @@ MARGIN_CLIMB, MARGIN_DESCEND = 1.3, 0.85
 """The same as long as no slide has done either."""
 MARGIN_LENGTHEN, SHORT = 1.2, 2.0
 """Factor after a short slide that missed its aim; margins up to which a slide is short."""
+DAY_S = 86400.0
 NEAR = 1.1
 """Margins: a slide longer than this says nothing of the margin."""
 
@@ -30,6 +31,8 @@ class SlideSettings:
     excursion_limit_m: float
     excursion_interval_s: float
     """Least time between two excursions."""
+    budget_m_per_s: float = 0.0
+    """Travel that excursions may cost, of which a day's may be spent at once; 0: no limit."""
     command_step_pa: float = 0.0
     """The least difference of two commands that the device is told."""
 
@@ -98,7 +101,9 @@ class SlideMemory:
     margins_at_m: float = nan
     """Where the margins are those of the extended valve; nan: none is known."""
     excursion_s: float = -inf
-    """When the last excursion began."""
+    """When the last excursion began ..."""
+    spent_m: float = 0.0
+    """... and what was spent then of a day's travel."""
     inhibit_reason: InhibitReason = InhibitReason.NOTHING
 
     def held_pa(self, command_pa: float) -> float:
@@ -108,6 +113,11 @@ class SlideMemory:
     def margin(self, direction: int) -> Margin:
         """Return the margin in a direction."""
         return self.up if direction > 0 else self.down
+
+    def spent_at_m(self, now_s: float, settings: SlideSettings) -> float:
+        """Return what is spent now of a day's travel, m: what has come back since is taken off."""
+        back_m = settings.budget_m_per_s * (now_s - self.excursion_s) if self.spent_m else 0.0
+        return max(0.0, self.spent_m - back_m)
 
     def with_margin(self, direction: int, margin: Margin) -> "SlideMemory":
         """Return the memory with another margin in a direction."""

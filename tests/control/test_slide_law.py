@@ -13,7 +13,7 @@ from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller import Decision
 from positioner.control.requests import Requests
 from positioner.control.slide_law import Balance, step
-from positioner.control.slide_memory import Margin, SlideMemory, SlideSettings, StemObservation
+from positioner.control.slide_memory import DAY_S, Margin, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -142,6 +142,24 @@ def test_excursions_keep_their_interval() -> None:
     assert loop.decision.inhibit_reason is InhibitReason.EXCURSION_WAITS
     assert np.ptp(waiting) < 1e-3
     assert abs(loop.step_to(0.61, cycles=500)[-1] - 0.61) < 1e-3
+
+
+def test_excursions_cost_no_more_than_the_budget_of_a_day() -> None:
+    """A day's travel may be spent at once: after two excursions there is nothing left for a third."""
+    loop = Loop(0.2, excursion_budget_strokes_per_day=0.35)
+    loop.step_to(0.6)
+    moved = [np.ptp(loop.step_to(at)) > LEAST for at in (0.604, 0.608, 0.612, 0.616)]
+    assert moved == [True, True, False, False]
+    assert loop.decision.inhibit_reason is InhibitReason.EXCURSION_BUDGET_SPENT
+    assert abs(loop.step_to(0.7)[-1] - 0.7) < 1e-3, "a move that needs no excursion costs nothing"
+
+
+def test_a_budget_comes_back_with_time() -> None:
+    settings = SlideSettings(STROKE_M, 5e-5, 0.0, 420e3, None, 0.5 * STROKE_M, 0.0, budget_m_per_s=STROKE_M / DAY_S)
+    memory = SlideMemory(excursion_s=100.0, spent_m=STROKE_M)
+    assert memory.spent_at_m(100.0, settings) == STROKE_M
+    assert memory.spent_at_m(100.0 + DAY_S / 4, settings) == pytest.approx(0.75 * STROKE_M)
+    assert memory.spent_at_m(100.0 + 2 * DAY_S, settings) == 0.0
 
 
 def test_a_loop_left_alone_does_nothing() -> None:
