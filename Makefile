@@ -44,6 +44,8 @@ docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/python -m docs.code_tables
 	$(BIN)/python -m sim.effects docs/effects.md
 	$(BIN)/python docs/notebook.py docs/tutorial/source.md docs/tutorial.md
+	$(BIN)/python docs/notebook.py docs/tutorial/recordings_source.md docs/recordings.md
+	$(BIN)/python docs/notebook.py docs/tutorial/valve_file_source.md docs/valve-file.md
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache demo-out build dist

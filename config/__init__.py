@@ -12,6 +12,7 @@ Its files:
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
     recording, historian_export, noise            the recording format; others' exports; the noise of a position
+    exports                                       each step from a file of another program to a recording
     results                                       what results have in common in a notebook
     errors                                        InputError (exit status 2), CommandFailed (1): each one line
 """

@@ -156,6 +156,7 @@ class Refusal(Code):
         27,
         "landings before and after a moment disagree: the sensor jumped, or something shifted the stem; try again",
     )
+    PRELOAD_EXPLAINS_AS_WELL = 28, "a preload would explain the motion as well, with another b/c"
 
 
 class Ne107Status(Code):

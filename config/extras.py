@@ -9,6 +9,7 @@ EXTRAS = {
     "matplotlib": "sim,plot",
     "pandas": "frame",
     "pyarrow": "parquet",
+    "openpyxl": "xlsx",
     "plotly": "report",
     "canopen": "canopen",
     "can": "canopen",

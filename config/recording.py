@@ -3,7 +3,8 @@
 `time_s, command_pa, position_m` are required; `pressure_pa` (measured), `load_n` (external force on the stem, positive
 in the opening direction), `reference_m`, `state` and further columns are optional. A row's command is the one in force
 from its time to the next row's. Lines that begin with `#` at the top carry metadata, `# key: value`. A last line torn
-by a crash is left out and told as `torn`. A file named `.parquet` holds the same columns.
+by a crash is left out and told as `torn`. A byte order mark before it all is no part of it. A file named
+`.parquet` holds the same columns.
 """
 
 import csv
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 REQUIRED = ("time_s", "command_pa", "position_m")
 CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
+
+LONGEST_NAMED = 300
+"""Characters of the names there are that a message shows."""
 
 Column = NDArray[np.float64]
 
@@ -163,12 +167,13 @@ def _read(path: Path, required: tuple[str, ...], clock_steps: float) -> tuple[di
             first_line = 0
             _require(path, required, list(columns), "the file has")
         else:
-            with path.open(newline="", encoding="utf-8") as file:
+            with path.open(newline="", encoding="utf-8-sig") as file:
                 columns, metadata, first_line = _table(path, file, required)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(str(path), f"is not a CSV file: {error}") from None
+        hint = f"; `positioner import {path}` says how to read another program's export"
+        raise InputError(str(path), f"is not a CSV file of ours: {error}{hint}") from None
     if not columns["time_s"].size:
         raise InputError(str(path), "holds no samples")
     _require_increasing_time(path, columns["time_s"], first_line, clock_steps)
@@ -178,7 +183,10 @@ def _read(path: Path, required: tuple[str, ...], clock_steps: float) -> tuple[di
 def _require(path: Path, required: tuple[str, ...], names: list[str], where: str) -> None:
     missing = [name for name in required if name not in names]
     if missing:
-        raise InputError(str(path), f"column {missing[0]} is missing; {where}: {', '.join(names)}")
+        named = ", ".join(names)
+        named = named if len(named) <= LONGEST_NAMED else f"{named[:LONGEST_NAMED]}.."
+        hint = f"; of another program's export, `positioner import {path}` says how to read it"
+        raise InputError(str(path), f"column {missing[0]} is missing; {where}: {named}{hint}")
     for name in names:
         if names.count(name) > 1:
             raise InputError(str(path), f"column {name} stands {names.count(name)} times; once is allowed")

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.output_files import write_json
+from positioner.cli.parts.output_files import writable, write_json
 
 HELP = "hold a model against a recording in free run and say where it fails; exit status 1 if it is not adequate"
 EXAMPLE = "positioner compare rec.csv --valve seed --report compared.html"
@@ -26,6 +26,8 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.naming import naming
     from workbench.compare.comparison import as_json, compare
 
+    writable(arguments.json, "--json")
+    writable(arguments.report, "--report")
     valve = load_valve(find_valve(arguments.valve))
     recording = read_any(arguments.recording, arguments, valve.valve.stroke_m)
     with naming({"recording": str(arguments.recording), "valve file": arguments.valve}):

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.output_files import write_json
+from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
     from workbench.select.tangent_preview import TangentScore
@@ -52,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.select.diagnosis import diagnose
     from workbench.select.diagnosis_json import as_json
 
+    for option in ("json", "report", "experiment"):
+        writable(getattr(arguments, option), f"--{option}")
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
 

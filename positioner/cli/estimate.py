@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from positioner.cli.parts.output_files import write_json
+from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
     from positioner.estimation.recording_estimates import RecordingEstimates
@@ -23,16 +24,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pressure", choices=("held", "linear"), help="how the pressure goes between the samples (else the likelier)"
     )
+    add_export_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Estimate and print; 0 if the ratios that the law needs are valid, else 1."""
-    from config.recording import Recording
     from positioner.cli.parts.naming import naming
     from positioner.estimation.recording_estimates import estimate
 
+    writable(arguments.json, "--json")
     held = None if arguments.pressure is None else arguments.pressure == "held"
-    recording = Recording.read(arguments.recording)
+    recording = read_any(arguments.recording, arguments, None)
     with naming({"noise_std_m": "--noise-m"}):
         estimated = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held)
     print(f"{arguments.recording}: {estimated.summary()}")

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
-from positioner.cli.parts.output_files import write_json
+from positioner.cli.parts.output_files import writable, write_json
 
 HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -42,6 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.select.extension_journal import Journal
     from workbench.select.extension_json import as_json
 
+    writable(arguments.out, "-o")
+    writable(arguments.json, "--json")
+    writable(arguments.report, "--report")
     if arguments.report is not None:
         require_plotly(arguments.report)
     began_s = time.monotonic()

@@ -22,6 +22,8 @@ COMMANDS = (
     "identify",
     "discriminate",
     "map",
+    "import",
+    "valve",
     "simulate",
     "play",
     "estimate",
@@ -33,6 +35,9 @@ COMMANDS = (
     "hide",
     "certificates",
 )
+
+MODULES = {"import": "import_recording", "valve": "valve_from_data_sheet"}
+"""Files of commands whose name is taken: by the language, by another file."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -86,14 +91,17 @@ def _unread() -> bool:
 
 def command_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands, which are imported for it."""
+    from positioner import __version__
+
     parser = argparse.ArgumentParser(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",
         epilog="exit status: 0 done, 1 the thing asked about does not hold, 2 bad input",
     )
+    parser.add_argument("--version", action="version", version=f"positioner {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        module = importlib.import_module(f"positioner.cli.{name}")
+        module = importlib.import_module(f"positioner.cli.{MODULES.get(name, name)}")
         command = commands.add_parser(
             name, help=module.HELP, description=module.HELP, epilog=f"example: {module.EXAMPLE}"
         )

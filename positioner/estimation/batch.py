@@ -10,10 +10,16 @@ The daemon's refinement and `positioner estimate` are this one function. What is
   than three quarters of what is known of it hangs on a single sample, the mass is not identifiable: a, b, c, k are
   refused singly, b/c = -1/g and k/c = q/g stand on their own;
 - a fit whose residuals are more than white noise of the sensor's size is no model of the motion: nothing is valid. An
-  actuator that lags behind a command taken for its pressure shows here. Correlated residuals of whatever size widen
-  every standard deviation by sqrt((1 + ρ) / (1 - ρ)), ρ the correlation of neighbours, when ρ is significant;
+  actuator that lags behind a command taken for its pressure shows here. So does sampling that leaves out how the stem
+  moves: the noise, measured from sample to sample, then comes out as large as the moves, and no residual may pass half
+  a per cent of them. Correlated residuals of whatever size widen every standard deviation by sqrt((1 + ρ) / (1 - ρ)),
+  ρ the correlation of neighbours, when ρ is significant;
 - where no jump of the pressure begins a motion, its first milliseconds are the drop from F_s to F_c, whose course the
   model leaves out. The mass must then be identifiable from what follows after five of the stem's time constants.
+
+A preload is no part of the model, and yet a motion both ways under one can be fitted to the noise: with an absurd mass,
+and b/c off by half. So the motions are fitted again with a force of one direction beside friction. Where that explains
+them as well, and with another b/c, beyond both standard deviations, nothing is valid.
 
 Break-away: F_s/A lies between the largest force at which the stem rested and the force at which it left,
 both u + (b/c) x in the direction of the motion. A held pressure jumps from one to the other; several events leave what
@@ -53,6 +59,12 @@ LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
 """Of time stamps about an even grid, shares of the period, between which they may be those of samples taken evenly."""
 DETECTED_WITHIN = 3
 """Samples after which a stem that left its rest has measurably done so."""
+LARGEST_RESIDUAL = 5e-3
+"""Share of the travel above which residuals are a misfit, whatever noise was measured: no transmitter is as bad."""
+AS_WELL = 1.1
+"""Ratio of the residuals up to which another model explains a motion as well."""
+APART = 3.0
+"""Standard deviations beyond which two values of b/c are different ones."""
 LEAST_MISFIT = 2e-4
 """Share of the travel below which residuals are no misfit worth the name."""
 
@@ -201,12 +213,32 @@ def _residual_m(each: _Hypothesis) -> float:
     return each.fit.residual_std_m if each.fit is not None else float("inf")
 
 
-def _does_not_fit(each: _Hypothesis, noise_std_m: float) -> bool:
+def _does_not_fit(each: _Hypothesis, noise_std_m: float, settings: BatchSettings) -> bool:
     """Return whether the residuals are more than the sensor's noise."""
-    if each.fit is None:
-        return False
+    return each.fit is not None and each.fit.residual_std_m > _allowed_m(each, noise_std_m, settings)
+
+
+def _allowed_m(each: _Hypothesis, noise_std_m: float, settings: BatchSettings) -> float:
+    """Return how large residuals may be, m: as the sensor's noise; where that was measured, as any sensor's."""
     travel_m = max(float(np.ptp(segment.position_m)) for segment in each.chosen)
-    return each.fit.residual_std_m > max(MISFIT * noise_std_m, LEAST_MISFIT * travel_m)
+    allowed_m = max(MISFIT * noise_std_m, LEAST_MISFIT * travel_m)
+    if settings.noise_std_m is None:
+        allowed_m = min(allowed_m, LARGEST_RESIDUAL * travel_m)
+    return allowed_m
+
+
+def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float, settings: BatchSettings) -> bool:
+    """Return whether a force of one direction beside friction explains motions both ways as well, with another b/c."""
+    if best.fit is None or len({each.direction for each in best.chosen}) < 2:
+        return False
+    again = fit_motions(list(best.chosen), held=best.interpolation != "linear", lopsided=True)
+    if again is None or again.residual_std_m > max(
+        AS_WELL * best.fit.residual_std_m, _allowed_m(best, noise_std_m, settings)
+    ):
+        return False
+    std = sqrt(float(best.fit.covariance[2, 2]) + float(again.covariance[2, 2]))
+    apart = abs(float(again.p[2] - best.fit.p[2]))
+    return apart > max(APART * std, settings.largest_relative_std * abs(float(best.fit.p[2])))
 
 
 def _fitted(
@@ -250,7 +282,11 @@ def _estimates(best: _Hypothesis, noise_std_m: float, settings: BatchSettings, t
     fit = _widened(best.fit, settings)
     values, std = fit.theta.tolist(), np.sqrt(np.abs(np.diag(fit.theta_covariance))).tolist()
     singly = _refusal_of_each(best, fit, settings.largest_relative_std)
-    together = Refusal.MODEL_DOES_NOT_FIT if _does_not_fit(best, noise_std_m) else Refusal.VALID
+    together = Refusal.VALID
+    if _does_not_fit(best, noise_std_m, settings):
+        together = Refusal.MODEL_DOES_NOT_FIT
+    elif _preload_explains_as_well(best, noise_std_m, settings):
+        together = Refusal.PRELOAD_EXPLAINS_AS_WELL
     unphysical = (
         values[0] > 0 and Refusal.A_POSITIVE,
         values[1] >= 0 and Refusal.B_NOT_NEGATIVE,

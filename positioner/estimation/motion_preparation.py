@@ -37,6 +37,7 @@ class PreparedMotion:
         free_velocity: whether position and velocity at the start are unknown.
         held: how the pressure goes between the rows.
         start_interval: where the start is unknown; None: `time_s[0]`.
+        lopsided: whether a force that has one direction, as a preload has, may act beside friction.
     """
 
     direction: int
@@ -49,6 +50,7 @@ class PreparedMotion:
     free_velocity: bool
     held: bool
     start_interval: "StartInterval | None" = None
+    lopsided: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ class StartInterval:
         return replace(motion, time_s=time_s)
 
 
-def prepared(segment: MotionSegment, *, held: bool) -> PreparedMotion:
+def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> PreparedMotion:
     """Return the rows of a motion, from the jump of a held pressure that began it, or from where it surely moves."""
     jump = _initial_jump(segment, held)
     from_rest = jump is not None
@@ -102,6 +104,7 @@ def prepared(segment: MotionSegment, *, held: bool) -> PreparedMotion:
         rest_count=count,
         free_velocity=not from_rest,
         held=held,
+        lopsided=lopsided,
     )
 
 

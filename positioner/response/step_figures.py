@@ -11,7 +11,9 @@ With x_0 where the stem rests before the step, x_1 where it rests at the end, y 
     final error      x_1 less the reference, where the input is one
 
 Times cannot be determined of a move below 25 σ (T86 then drowns in noise), of a stem that was not at rest before or at
-the end, or across a gap of the recording.
+the end, or across a gap of the recording; nor T63 or T86 of which fewer than 5 samples lie within it: half a sample is
+what a passage between two samples is known to, a tenth of such a time. Where T63 is not resolved, the dead time and
+the overshoot are not.
 """
 
 from dataclasses import dataclass
@@ -31,6 +33,9 @@ OBSERVABLE_PERCENT = 0.5
 SMALLEST_SIGMA = 25.0
 DRIFT = 0.01
 """A stem that still moves by this part of the move has not settled."""
+FEWEST_WITHIN = 5
+"""Samples that a response time must span."""
+TOO_FAR_APART = "the samples are too far apart"
 GAP_PERIODS = 3.0
 """A gap between samples wider than this many of their median periods is a gap."""
 
@@ -116,9 +121,11 @@ def _timed(
     period_s = float(np.median(np.diff(t)))
     observable = max(OBSERVABLE_SIGMA * noise, OBSERVABLE_PERCENT / 100)
     times = {
-        name: _time(level_crossing(t, y, level, noise), period_s)
+        name: _time(level_crossing(t, y, level, noise), period_s, 0 if name == "dead_time_s" else FEWEST_WITHIN)
         for name, level in (("dead_time_s", observable), ("t63_s", T63), ("t86_s", T86))
     }
+    if (reason := times["t63_s"].reason or "").startswith(TOO_FAR_APART):
+        return times | _all(("dead_time_s", "overshoot_percent"), reason)
     return times | {"overshoot_percent": _overshoot(t, y, noise)}
 
 
@@ -137,12 +144,15 @@ def _reason_untimed(time_s: Column, step: StepChange, before: RestLevel, after: 
     return None
 
 
-def _time(crossing: LevelCrossing | None, period_s: float) -> Figure:
+def _time(crossing: LevelCrossing | None, period_s: float, fewest_within: int) -> Figure:
+    """Return when a level was passed, or why that is not known; `fewest_within` samples must lie within that time."""
     if crossing is None:
-        return undetermined("the samples are too far apart: the stem was past it at the first")
+        return undetermined(f"{TOO_FAR_APART}: the stem was past it at the first")
     early_s, late_s = max(crossing.time_s - crossing.gap_s, 0.0), crossing.time_s + crossing.gap_s
     if crossing.gap_s > GAP_PERIODS * period_s and crossing.plus_minus_s > 0.1 * crossing.time_s:
         return undetermined(f"a gap of {crossing.gap_s:.3g} s in the samples: between {early_s:.3g} and {late_s:.3g} s")
+    if crossing.time_s < fewest_within * period_s:
+        return undetermined(f"{TOO_FAR_APART}, {period_s:.3g} s: T63 and T86 must take {fewest_within} of them")
     return Figure(crossing.time_s, crossing.plus_minus_s)
 
 

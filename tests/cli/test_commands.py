@@ -60,6 +60,13 @@ def test_help_of_each_command_ends_with_an_example(command: str, capsys: Capture
     assert f"example: positioner {command}" in " ".join(capsys.readouterr().out.split())
 
 
+def test_the_version_is_said(capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out.startswith("positioner 0.")
+
+
 def test_help_needs_nothing_but_the_standard_library() -> None:
     """Instant help, and a gateway without the model side still has it."""
     parsing = "import sys; from positioner.cli.main import command_parser; command_parser(); print(*sys.modules)"

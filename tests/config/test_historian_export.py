@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.historian_export import read_export, read_mapping
+from config.exports.column_mapping import read_mapping
+from config.historian_export import read_export
 from config.recording import Recording
 
 MAPPING = ("time_s=Zeit", "position_m=PV:%", "command_pa=OUT:bar")
@@ -39,7 +40,10 @@ def test_per_cent_of_a_pressure_range_and_seconds(tmp_path: Path) -> None:
     [
         (MAPPING[:2], "command_pa is given 0 times"),
         ((*MAPPING, "position_m=SP"), "position_m is given 2 times"),
-        ((*MAPPING[:2], "command_pa=OUT:furlong"), "unknown unit 'furlong'; allowed: Pa, kPa, MPa, mbar, bar, psi, %"),
+        (
+            (*MAPPING[:2], "command_pa=OUT:furlong"),
+            "unknown unit 'furlong'; allowed: Pa, hPa, kPa, MPa, mbar, bar, psi",
+        ),
         (("position=PV",), "must be OURS=THEIRS:UNIT"),
     ],
 )

@@ -79,8 +79,16 @@ def test_a_command_that_cannot_do_its_work_ends_the_run(command: str, tmp_path: 
     assert not (tmp_path / "page.md").exists()
 
 
-def test_the_tutorial_is_its_source_run() -> None:
-    source, page = (DOCS / name for name in ("tutorial/source.md", "tutorial.md"))
+@pytest.mark.parametrize(
+    ("source_name", "page_name"),
+    [
+        ("source.md", "tutorial.md"),
+        ("recordings_source.md", "recordings.md"),
+        ("valve_file_source.md", "valve-file.md"),
+    ],
+)
+def test_a_page_is_its_source_run(source_name: str, page_name: str) -> None:
+    source, page = DOCS / "tutorial" / source_name, DOCS / page_name
     text = page.read_text(encoding="utf-8")
     at = 0
     for part in BLOCK.split(source.read_text(encoding="utf-8"))[::4]:
@@ -88,5 +96,16 @@ def test_the_tutorial_is_its_source_run() -> None:
         at = text.index(part, at)
     for block in BLOCK.finditer(source.read_text(encoding="utf-8")):
         assert block[0] in text, f"{page} lacks {block[0]}: run `make docs`"
+
+
+def test_the_tutorial_has_its_figures() -> None:
     for name in ("compared", "race", "fall"):
         assert (DOCS / "img" / f"tutorial-{name}.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("source_name", "page_name"), [("recordings_source.md", "recordings.md"), ("valve_file_source.md", "valve-file.md")]
+)
+def test_a_quick_page_prints_today_what_it_shows(source_name: str, page_name: str, tmp_path: Path) -> None:
+    run(DOCS / "tutorial" / source_name, tmp_path / page_name)
+    assert (tmp_path / page_name).read_text(encoding="utf-8") == (DOCS / page_name).read_text(encoding="utf-8")

@@ -132,6 +132,25 @@ def test_the_overshoot_of_a_second_order_answer(noise_m: float) -> None:
         assert overshoot.value == pytest.approx(true, rel=0.02)
 
 
+@pytest.mark.parametrize(("period_s", "resolved"), [(1.0, False), (0.05, False), (0.01, False), (0.002, True)])
+def test_times_that_the_sampling_cannot_carry_are_refused(period_s: float, resolved: bool) -> None:
+    """A valve of 30 ms: sampled once a second it would seem to take 0.632 s, wherever straight lines are drawn."""
+    time_s = np.arange(0.0, 60.0 * max(period_s, 0.1), period_s)
+    at_s = float(time_s[len(time_s) // 2])
+    dead, t63, t86, overshoot = the_step(
+        respond(noisy(first_order(time_s, at_s, 0.0, 0.03, 0.01), np.random.default_rng(1), 1e-6))
+    )
+    assert (t63.value is not None) == resolved
+    if resolved:
+        assert close(t63, 0.03, 2e-4)
+        assert close(t86, 0.06, 2e-4)
+    else:
+        for each in (dead, t63, overshoot):
+            assert each.value is None
+            assert each.reason is not None
+            assert "the samples are too far apart" in each.reason
+
+
 def test_a_gap_over_the_answer_makes_its_times_untold_and_keeps_the_others() -> None:
     recording = first_order(np.arange(0, 8, 0.005), 3.0, 0.1, 0.3, 0.01)
     t63_s = 3.0 + 0.1 + 0.3

@@ -1,44 +1,106 @@
-"""The arguments with which a command takes a historian's exports in place of recordings."""
+"""The arguments with which a command takes other programs' exports in place of recordings."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from config.exports.column_mapping import ExportOptions
     from config.recording import Recording
+
+BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet")
+"""Options that say how mapped columns are read."""
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare them."""
-    export = parser.add_argument_group("historian's exports in place of recordings")
+    export = parser.add_argument_group(
+        "exports in place of recordings", "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these words"
+    )
     export.add_argument(
         "--column",
         action="append",
         default=[],
         metavar="OURS=THEIRS:UNIT",
-        help="where a column comes from, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar",
+        help="where a column comes from, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar; -%% from the "
+        "other end; #2 is the second column, Date+Time two",
     )
     export.add_argument("--stroke-m", type=float, metavar="M", help="100 %% of a position (the valve file's stroke)")
     export.add_argument(
         "--range-pa", type=float, nargs=2, metavar=("AT0", "AT100"), help="0 %% and 100 %% of a pressure (20e3 100e3)"
     )
+    export.add_argument("--decimal", choices=(".", ","), help="the decimal sign (else as the numbers show)")
+    export.add_argument(
+        "--time-format",
+        metavar="FORMAT",
+        help='how dates are written, "%%d.%%m.%%Y %%H:%%M:%%S" (else ISO, or seconds)',
+    )
+    export.add_argument(
+        "--status",
+        action="append",
+        default=[],
+        metavar="THEIRS=GOOD,..",
+        help="a column of words; rows of others than these hold no values",
+    )
+    export.add_argument("--sheet", metavar="NAME", help="of a workbook (else the one that has the columns)")
 
 
-def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float) -> "Recording":
-    """Read a recording, or an export if columns are mapped: all of a command's by the same mapping.
+def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":
+    """Read a recording, or an export if columns are mapped, all of a command's by the same mapping.
+
+    What was left out or put right, and what is odd about an export, is told on standard error, a line each.
 
     Raises:
-        InputError: as `Recording.read` and `read_export`; a range without columns to apply it to.
+        InputError: as `Recording.read` and `read_export`; an option that goes with columns without any.
     """
     from config.errors import InputError
-    from config.historian_export import RANGE_PA, read_export, read_mapping
     from config.recording import Recording
 
-    if not arguments.column:
-        for name in ("stroke_m", "range_pa"):
-            if getattr(arguments, name) is not None:
-                raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
-        return Recording.read(path)
+    if arguments.column:
+        recording = read_mapped(path, arguments, stroke_m)
+        tell(f"positioner {arguments.command}: {path}", recording, arguments.stroke_m or stroke_m)
+        return recording
+    for name in BESIDES:
+        if getattr(arguments, name):
+            raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
+    return Recording.read(path)
+
+
+def read_mapped(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":
+    """Read an export by the mapping of a command line.
+
+    Raises:
+        InputError: as `read_export`; a stroke that is not positive.
+    """
+    from config.errors import InputError
+    from config.exports.column_mapping import RANGE_PA, read_mapping
+    from config.historian_export import read_export
+
+    if arguments.stroke_m is not None and not arguments.stroke_m > 0.0:
+        raise InputError("--stroke-m", f"must be positive, it is {arguments.stroke_m:g}")
     sources = read_mapping(arguments.column)
-    range_pa = RANGE_PA if arguments.range_pa is None else tuple(arguments.range_pa)
-    return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa)
+    range_pa = RANGE_PA if arguments.range_pa is None else (arguments.range_pa[0], arguments.range_pa[1])
+    return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa, export_options(arguments))
+
+
+def export_options(arguments: argparse.Namespace) -> "ExportOptions":
+    """Return how an export is read beyond its columns.
+
+    Raises:
+        InputError: a status that says nothing.
+    """
+    from config.exports.column_mapping import ExportOptions, read_status
+
+    return ExportOptions(arguments.decimal, arguments.time_format, read_status(arguments.status), arguments.sheet)
+
+
+def tell(who: str, recording: "Recording", stroke_m: float | None) -> None:
+    """Say on standard error what was done to an export, and what is odd about it."""
+    from config.exports.plausibility import oddities
+
+    for key, value in recording.metadata.items():
+        if key != "imported":
+            print(f"{who}: {key}: {value}", file=sys.stderr)
+    for said in oddities(recording, stroke_m):
+        print(f"{who}: {said}", file=sys.stderr)

@@ -1,9 +1,12 @@
 """What a command writes because an option asks for it: `--out` a folder, `--json` a file.
 
-A path that cannot be written is bad input: one line that names the option.
+A path that cannot be written is bad input: one line that names the option, before the work begins (`writable`) where it
+can be known.
 """
 
+import errno
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,6 +23,22 @@ def make_folder(folder: Path, option: str = "--out") -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _unwritable(option, folder, error) from None
+
+
+def writable(path: Path | None, option: str) -> None:
+    """Check that a file can be written where an option says, without touching it; None is no option.
+
+    Raises:
+        InputError: its folder is not there, it is a folder itself, or may not be written.
+    """
+    if path is None:
+        return
+    if path.is_dir():
+        raise _unwritable(option, path, OSError(errno.EISDIR, os.strerror(errno.EISDIR)))
+    if not path.parent.is_dir():
+        raise _unwritable(option, path, OSError(errno.ENOENT, f"there is no folder {path.parent}"))
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise _unwritable(option, path, OSError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
 def write_json(path: Path, values: Mapping[str, object], indent: int | None = None) -> None:

@@ -1,0 +1,16 @@
+"""Tables of other programs made recordings: whatever file it is, each thing is read right, or refused in one line.
+
+From the file to the recording:
+
+    raw_table                               rows of cells before anything is understood; which kind of file it is
+    text_table                              encodings, separators, quotation marks
+    typed_tables                            Excel workbooks, MATLAB files, Parquet
+    export_units                            units, by all the names people give them
+    column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read
+    header_search                           the line that names the columns, and the units about it
+    number_notation                         decimal signs and thousands separators
+    time_stamps                             dates and times as seconds
+    time_order                              newest first, disorder, repeated rows and hours
+    plausibility                            what is odd about a recording, before anything is fitted to it
+    export_preview                          what a file holds, and the words that would read it
+"""

@@ -1,0 +1,96 @@
+"""What a person says of an export: which column is which, which rows are good, how numbers and dates are written."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from config.errors import InputError
+from config.exports.export_units import SHARES, allowed_units
+from config.recording import REQUIRED
+
+RANGE_PA = (0.2e5, 1.0e5)
+"""The pressures of 0 % and 100 %: the field's usual 0.2 to 1 bar, unless another range is given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where one of our columns comes from; the unit None is what the file says, or else SI."""
+
+    name: str
+    theirs: str
+    unit: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """A column that says which rows are good."""
+
+    theirs: str
+    good: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ExportOptions:
+    """How an export is read beyond its columns.
+
+    Attributes:
+        decimal: the decimal sign, "." or ","; None: as the numbers themselves show.
+        time_format: of `datetime.strptime`; None: seconds or ISO 8601.
+        status: rows of other words hold no values.
+        sheet: of a workbook; None: the one that has the columns.
+    """
+
+    decimal: str | None = None
+    time_format: str | None = None
+    status: tuple[Status, ...] = ()
+    sheet: str | None = None
+
+
+def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
+    """Read `OURS=THEIRS` or `OURS=THEIRS:UNIT`, one a column.
+
+    Raises:
+        InputError: no such form, an unknown unit (names those there are), or a column that stands twice.
+    """
+    sources = tuple(_source(word) for word in words)
+    names = [each.name for each in sources]
+    for name in (*REQUIRED, *names):
+        if names.count(name) != 1:
+            raise InputError("--column", f"{name} is given {names.count(name)} times; once is required")
+    return sources
+
+
+def _source(word: str) -> Source:
+    match = re.fullmatch(r"(\w+?(_s|_pa|_m|_n))=(.+?)(?::([^:]*))?", word)
+    if match is None:
+        raise InputError(
+            "--column", f"{word!r}: must be OURS=THEIRS:UNIT, OURS ending in _s, _pa, _m or _n (position_m=PV:%)"
+        )
+    name, ending, theirs, unit = match.groups()
+    allowed = allowed_units(ending)
+    plain = (unit or "").removeprefix("-")
+    turned = unit is not None and unit != plain
+    if unit is not None and (plain not in allowed or (turned and not _can_be_turned(ending, plain))):
+        also = {"_m": "; with - before it, as in -%, from the other end", "_pa": "; or -%, -mA, -p.u."}.get(ending, "")
+        raise InputError("--column", f"{word!r}: unknown unit {unit!r}; allowed: {', '.join(allowed)}{also}")
+    return Source(name, theirs, unit)
+
+
+def _can_be_turned(ending: str, unit: str) -> bool:
+    return ending == "_m" or (ending == "_pa" and unit in SHARES)
+
+
+def read_status(words: Sequence[str]) -> tuple[Status, ...]:
+    """Read `THEIRS=GOOD,...`, one a status column.
+
+    Raises:
+        InputError: no such form.
+    """
+    found = []
+    for word in words:
+        theirs, _, good = word.rpartition("=")
+        allowed = tuple(each.strip() for each in good.split(",") if each.strip())
+        if not theirs or not allowed:
+            raise InputError("--status", f"{word!r}: must be THEIRS=GOOD, or THEIRS=GOOD,FAIR for several")
+        found.append(Status(theirs, allowed))
+    return tuple(found)

@@ -1,0 +1,206 @@
+"""What a file holds, for a person who has not said yet what its columns are: names, first values, units, a proposal.
+
+The proposal goes by what columns are commonly called and by what is in them. It is printed, never used.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from config.errors import InputError
+from config.exports.export_units import allowed_units, ending_of, unit_named
+from config.exports.header_search import begins_number, guess_header
+from config.exports.number_notation import decimal_sign, is_numeral
+from config.exports.raw_table import Cell, raw_tables
+from config.exports.time_stamps import proposed_formats
+from config.results.block import Block, Table, as_text
+
+LOOKED_AT = 200
+FIRST = 3
+WIDEST = 24
+COMMON = {
+    "time_s": r"time|zeit|stamp|date|datum|^t$|uhr",
+    "position_m": r"position|^pos|travel|stroke|hub|lift|stem|\bpv\b|ist|zt|feedback|^x$|_pv$|\.pv$|rückm",
+    "command_pa": r"command|^cmd|\bout\b|\bop\b|\bmv\b|output|stell|signal|demand|^u$|drive|pressure|druck|soll|\bsp\b",
+}
+"""What columns are called, by ours."""
+_STATUS = re.compile(r"status|quality|qualität|güte", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnPreview:
+    """A column of a file: its name, the unit the file says, and its first cells."""
+
+    name: str
+    unit: str | None
+    cells: tuple[Cell, ...]
+
+    @property
+    def numbers(self) -> bool:
+        """Whether its cells are numbers, but for some words."""
+        found = [cell for cell in self.cells if cell != ""]
+        return bool(found) and sum(isinstance(cell, float) or is_numeral(cell) for cell in found) > len(found) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPreview:
+    """What a file holds.
+
+    Attributes:
+        what: how it was taken.
+        header: where its columns are named, or that they are not.
+        columns: in their order.
+        words: what would read it, words of the command line.
+        open: what a person must say or look at.
+    """
+
+    what: str
+    header: str
+    columns: tuple[ColumnPreview, ...]
+    words: tuple[str, ...]
+    open: tuple[str, ...]
+
+    def summary(self) -> str:
+        """Say the columns, the proposal and what is open."""
+        return as_text(self._blocks())
+
+    def _blocks(self) -> list[Block]:
+        rows = [
+            (each.name, each.unit or "", *(_short(cell) for cell in (*each.cells, "", "", "")[:FIRST]))
+            for each in self.columns
+        ]
+        proposed = " ".join(map(_quoted, self.words))
+        return [
+            f"{self.what}; {self.header}",
+            Table(("column", "unit", "first", "values", ""), rows),
+            *self.open,
+            f"proposed, look at it: {proposed}" if proposed else "no column looks like time, position or command",
+        ]
+
+
+def preview(path: Path, sheet: str | None = None) -> ExportPreview:
+    """Return what a file holds, and the words of a command line that may read it.
+
+    Raises:
+        InputError: it cannot be read or holds no table.
+    """
+    tables = raw_tables(path, sheet)
+    header = guess_header(tables)
+    if header is None:
+        raise InputError(str(path), "holds no table: no two of its first lines have the same columns")
+    after = (
+        row for line, row in header.table.rows() if line > header.samples_after and any(cell != "" for cell in row)
+    )
+    rows = list(islice(after, LOOKED_AT))
+    named = [(index, name) for index, name in enumerate(header.names) if name]
+    columns = tuple(
+        ColumnPreview(
+            name,
+            header.units[name][0] if name in header.units else None,
+            tuple(row[index] for row in rows if index < len(row)),
+        )
+        for index, name in named
+    )
+    what = header.table.what
+    if header.table.sheet and len(tables) > 1:
+        what += f" of {', '.join(repr(each.sheet) for each in tables)}"
+    place = f"{header.table.place} {header.line} names the columns" if header.line else "no line names the columns"
+    words, open_ = _proposal(columns, header.table.separator)
+    return ExportPreview(what, place, columns, words, open_)
+
+
+def _proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    words: list[str] = []
+    open_: list[str] = []
+    left = list(columns)
+    for ours in COMMON:
+        chosen = next((each for each in left if _looks_like(ours, each)), None)
+        if chosen is None:
+            open_.append(f"{ours} is open: no column is called like it")
+            continue
+        left.remove(chosen)
+        if ours == "time_s" and (joined := _with_time_of_day(chosen, left)):
+            left.remove(joined)
+            chosen = ColumnPreview(
+                f"{chosen.name}+{joined.name}",
+                None,
+                tuple(f"{day} {time}" for day, time in zip(chosen.cells, joined.cells, strict=True)),
+            )
+        unit, doubt = _unit_of(ours, chosen)
+        words += ["--column", f"{ours}={chosen.name}{unit}"]
+        open_ += doubt
+        if ours == "time_s" and not chosen.numbers:
+            words += _time_words(chosen, open_)
+    for each in left:
+        if _STATUS.search(each.name) and not each.numbers:
+            held = ", ".join(sorted({str(cell) for cell in each.cells if cell != ""})[:5])
+            open_.append(
+                f"{each.name!r} holds {held}: --status {_quoted(each.name + '=GOOD')} leaves the other rows out"
+            )
+    texts = [cell for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
+    try:
+        decimal_sign("", texts, separator)
+    except InputError as error:
+        open_.append(error.problem)
+    if any(word.endswith(":%") and word.startswith("position") for word in words):
+        words += ["--stroke-m", "M"]
+    return tuple(words), tuple(open_)
+
+
+def _with_time_of_day(day: ColumnPreview, others: Sequence[ColumnPreview]) -> ColumnPreview | None:
+    """Return the column of the time of day that goes with one of days; None if it needs none."""
+    if day.numbers or any(":" in str(cell) for cell in day.cells):
+        return None
+    times = (each for each in others if _most_are(each.cells, r"\d{1,2}:\d\d"))
+    return next((each for each in times if len(each.cells) == len(day.cells)), None)
+
+
+def _most_are(cells: Sequence[Cell], pattern: str) -> bool:
+    return 2 * sum(re.match(pattern, str(cell)) is not None for cell in cells) > len(cells)
+
+
+def _looks_like(ours: str, column: ColumnPreview) -> bool:
+    if not re.search(COMMON[ours], column.name, re.IGNORECASE) or _STATUS.search(column.name):
+        return False
+    if ours == "time_s":
+        return any(begins_number(cell) and cell != "" for cell in column.cells)
+    return column.numbers and (column.unit is None or column.unit in allowed_units(ending_of(ours)))
+
+
+def _unit_of(ours: str, column: ColumnPreview) -> tuple[str, list[str]]:
+    """Return `:UNIT` and what is open about it; nothing where the file says it or SI stands in the name."""
+    if column.unit is not None:
+        return f":{column.unit}", []
+    if column.name == ours or not column.numbers:
+        return "", []
+    behind = [str(cell).lstrip("+-0123456789.,eE ") for cell in column.cells if isinstance(cell, str) and cell]
+    if behind and (unit := unit_named(behind[0])):
+        return f":{unit}", []
+    if ours == "time_s":
+        return "", [f"the unit of {column.name!r} is open: s is taken; :ms, :min, :d are others"]
+    return ":%", [f"the unit of {column.name!r} is open: % is a guess"]
+
+
+def _time_words(column: ColumnPreview, open_: list[str]) -> list[str]:
+    texts = [str(cell) for cell in column.cells if cell != "" and begins_number(cell)]
+    if not texts or all(re.match(r"\d{4}-\d\d-\d\d", text) for text in texts):
+        return []
+    formats = proposed_formats(texts)
+    if not formats:
+        open_.append(f"how {texts[0]!r} is to be read is open: --time-format")
+        return []
+    if len(formats) > 1:
+        open_.append(f"{texts[0]!r} may be read as {' or '.join(formats)}: the first is proposed")
+    return ["--time-format", formats[0]]
+
+
+def _short(cell: Cell) -> str:
+    text = f"{cell:.10g}" if isinstance(cell, float) else cell.replace("\n", " ")
+    return text if len(text) <= WIDEST else text[: WIDEST - 2] + ".."
+
+
+def _quoted(word: str) -> str:
+    plain = " ".join(word.split())
+    return plain if re.fullmatch(r"[\w=:.%+/@,#-]+", plain) else f'"{plain}"'

@@ -1,0 +1,103 @@
+"""Units of exports, by all the names that people give them, and what they are in SI.
+
+    SI = factor raw + offset
+
+A unit may stand in the mapping, in the header (`PV [%]`), in a row under it, or behind each number. `%`, `p.u.` and
+`mA` (4 to 20) are shares: of the stroke for a position, of a range for a pressure. A unit with a minus before it
+counts from the other end, as of a valve that air closes: `-%`, `-mm`.
+"""
+
+import re
+from collections.abc import Mapping
+
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0, "iso": 1.0},
+    "_pa": {
+        "Pa": 1.0,
+        "hPa": 100.0,
+        "kPa": 1e3,
+        "MPa": 1e6,
+        "mbar": 100.0,
+        "bar": 1e5,
+        "psi": 6894.757293168,
+        "kg/cm2": 98066.5,
+        "bara": 1e5,
+        "kPaa": 1e3,
+        "psia": 6894.757293168,
+    },
+    "_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "_n": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+}
+"""By the ending of our name: their unit in ours."""
+ATMOSPHERE_PA = 101_325.0
+ABSOLUTE = frozenset({"bara", "kPaa", "psia"})
+"""Pressures from a vacuum up; ours are from the atmosphere up."""
+SHARES: Mapping[str, tuple[float, float]] = {"%": (0.01, 0.0), "p.u.": (1.0, 0.0), "mA": (1 / 16, -0.25)}
+"""Share = factor raw + offset."""
+SI = {"_s": "s", "_pa": "Pa", "_m": "m", "_n": "N"}
+_ALIASES = {
+    "sec secs second seconds sek sekunde sekunden": "s",
+    "msec millisec milliseconds millisekunden": "ms",
+    "µs μs usec": "us",
+    "minute minutes minuten": "min",
+    "hr hrs hour hours std": "h",
+    "day days tage": "d",
+    "pascal": "Pa",
+    "barg bar(g) bar_g bar(ü) barü": "bar",
+    "bar(a) bar_a": "bara",
+    "kpag kpa(g) kpa_g": "kPa",
+    "kpa(a)": "kPaa",
+    "mbarg mbar(g)": "mbar",
+    "psig psi(g) lb/in2 lbf/in2": "psi",
+    "psi(a)": "psia",
+    "kg/cm² kgf/cm2 kgf/cm² kp/cm2": "kg/cm2",
+    "meter metre meters metres": "m",
+    "millimeter millimetre": "mm",
+    "µm μm micron": "um",
+    'inch inches "': "in",
+    "newton": "N",
+    "percent pct prozent %open %offen": "%",
+    "pu p.u": "p.u.",
+    "milliampere ma(dc)": "mA",
+}
+_BY_ALIAS = {alias: unit for aliases, unit in _ALIASES.items() for alias in aliases.split()} | {
+    unit.casefold(): unit for units in (*UNITS.values(), SHARES) for unit in units if unit != "iso"
+}
+
+
+def allowed_units(ending: str) -> list[str]:
+    """Return the units of a column of ours, by the ending of its name."""
+    shares = list(SHARES) if ending in ("_pa", "_m") else []
+    return [*UNITS[ending], *shares]
+
+
+def unit_named(text: str) -> str | None:
+    """Return the unit that a text names, in our spelling; None if it names none that is known.
+
+    >>> unit_named("[bar(g)]"), unit_named("µm"), unit_named("% open"), unit_named("Good")
+    ('bar', 'um', '%', None)
+    """
+    plain = re.sub(r"\s", "", text).casefold()
+    if match := re.fullmatch(r"[\[(<](.*)[\])>]", plain):
+        plain = match[1]
+    return _BY_ALIAS.get(plain)
+
+
+def unit_in_header(name: str) -> tuple[str, str | None]:
+    """Return a header's name without the unit at its end, and the unit.
+
+    >>> unit_in_header("Hub [mm]"), unit_in_header("P1, bar"), unit_in_header("PV (Ist)")
+    (('Hub', 'mm'), ('P1', 'bar'), ('PV (Ist)', None))
+    """
+    match = re.fullmatch(
+        r"(.*\S)\s*(?:[\[(<]\s*([^\[\]()<>]+(?:\([^()]*\))?)\s*[\])>]|[,/]\s*(\S+)|\s(%))", name, re.DOTALL
+    )
+    unit = unit_named(match[2] or match[3] or match[4]) if match else None
+    return (match[1].rstrip(), unit) if match and unit else (name, None)
+
+
+def ending_of(name: str) -> str:
+    """Return the ending of a column's name that says its unit: _s, _pa, _m or _n."""
+    match = re.search(r"_(s|pa|m|n)$", name)
+    assert match is not None
+    return match[0]

@@ -1,0 +1,76 @@
+"""Rows of cells before anything is understood: what every kind of file is made into first.
+
+A text is a cell's words, a number what a typed file holds as one; dates of a typed file are ISO texts. The same bytes
+may be several tables: a text by each separator, a workbook by each sheet. The header decides which it is.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from config.errors import InputError
+
+Cell = str | float
+
+
+@dataclass(frozen=True, slots=True)
+class RawTable:
+    """One reading of a file.
+
+    Attributes:
+        what: how it was taken, for people: "fields separated by ;", "sheet 'Trend'".
+        place: what a row is called in messages: "line" or "row".
+        rows: begins anew at the first row; each with its number, blank ones too.
+        separator: between fields of a text.
+        sheet: name of a workbook's sheet.
+        ended: whether the last line of a text has its end.
+        notes: what is to be told about it, by key.
+    """
+
+    what: str
+    place: str
+    rows: Callable[[], Iterator[tuple[int, list[Cell]]]]
+    separator: str = ""
+    sheet: str = ""
+    ended: bool = True
+    notes: tuple[tuple[str, str], ...] = ()
+
+
+def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
+    """Return the tables that a file may be, by what its first bytes say, whatever it is named.
+
+    Raises:
+        InputError: it cannot be read or is of no kind that holds a table; says what to do with it.
+    """
+    try:
+        with path.open("rb") as file:
+            begin = file.read(128)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
+    for magic, problem in REFUSED.items():
+        if begin.startswith(magic):
+            raise InputError(str(path), problem)
+    from config.exports import text_table, typed_tables
+
+    if begin.startswith(b"PK\x03\x04"):
+        return typed_tables.workbook(path, sheet)
+    if sheet is not None:
+        raise InputError("--sheet", f"goes with an Excel workbook, and {path} is none")
+    if begin.startswith(b"MATLAB 5.0 MAT-file"):
+        return typed_tables.matlab(path)
+    if begin.startswith(b"PAR1"):
+        return typed_tables.parquet(path)
+    return text_table.text_tables(path)
+
+
+REFUSED = {
+    b"\xd0\xcf\x11\xe0": "is a workbook of old Excel (.xls): save it as .xlsx or CSV",
+    b"MATLAB 7.3 MAT-file": "is a MATLAB 7.3 file: save it with the option -v7",
+    b"\x89HDF": "is an HDF5 file: save it as CSV, or from MATLAB with the option -v7",
+    b"\x1f\x8b": "is compressed with gzip: unpack it first",
+    b"%PDF": "is a PDF: export the numbers as CSV",
+    b"<!DOCTYPE": "is a web page: export the numbers as CSV",
+    b"<html": "is a web page: export the numbers as CSV",
+    b"<?xml": "is XML: export the numbers as CSV or .xlsx",
+}
+"""By its first bytes: a file that holds no table that could be read, and what to do."""

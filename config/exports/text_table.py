@@ -1,0 +1,114 @@
+"""Tables as text: UTF-8 with or without a byte order mark, UTF-16, else Windows-1252; any ends of lines.
+
+Separators are tried, tab, semicolon, bar, comma: the header says which it is, for it must hold all names that are asked
+for. Quotation marks are read strictly, so that one that is never closed is found and not swallowed to the end.
+"""
+
+import csv
+import io
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from config.errors import InputError
+from config.exports.raw_table import Cell, RawTable
+
+SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma"}
+MARKS = {
+    b"\xef\xbb\xbf": "utf-8-sig",
+    b"\xff\xfe\x00\x00": "utf-32",
+    b"\x00\x00\xfe\xff": "utf-32",
+    b"\xff\xfe": "utf-16",
+    b"\xfe\xff": "utf-16",
+}
+"""Byte order marks, and the encodings they announce."""
+
+
+def text_tables(path: Path) -> list[RawTable]:
+    """Return the tables that a text may be, one a separator that occurs in it.
+
+    Raises:
+        InputError: it is no text, or empty.
+    """
+    text, encoding = decoded(path)
+    if not text.strip():
+        raise InputError(str(path), "holds no samples: it is empty")
+    notes = () if encoding.startswith("utf-8") else (("encoding", encoding),)
+    ended = text.endswith(("\n", "\r"))
+    found = [each for each in SEPARATORS if each in text] or [","]
+    return [
+        RawTable(
+            f"fields separated by {SEPARATORS[each]}",
+            "line",
+            partial(_rows, path, text, each),
+            separator=each,
+            ended=ended,
+            notes=notes,
+        )
+        for each in found
+    ]
+
+
+def decoded(path: Path) -> tuple[str, str]:
+    """Return the text of a file and its encoding.
+
+    Raises:
+        InputError: it cannot be read, or is no text; names the line of a NUL character.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
+    encoding = _encoding(data)
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), f"is no text: byte {error.start + 1} is not {encoding}; save it as UTF-8") from None
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise InputError(
+            str(path), f"line {line}: a NUL character: the file is damaged there, or no text; cut it before"
+        )
+    return text, encoding
+
+
+def _encoding(data: bytes) -> str:
+    for mark, encoding in MARKS.items():
+        if data.startswith(mark):
+            return encoding
+    if guessed := _utf_16_without_mark(data[:1000]):
+        return guessed
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _utf_16_without_mark(data: bytes) -> str | None:
+    """Return which UTF-16 it is, by the NUL that is half of each of its Latin characters; None if it is none."""
+    even, odd = data[::2].count(0), data[1::2].count(0)
+    if max(even, odd) < 0.2 * len(data) or min(even, odd) > 0.1 * max(even, odd):
+        return None
+    return "utf-16-be" if even > odd else "utf-16-le"
+
+
+def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[Cell]]]:
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True, skipinitialspace=True)
+    while True:
+        begin = reader.line_num + 1
+        try:
+            row = next(reader, None)
+        except csv.Error as error:
+            raise InputError(str(path), f"line {begin}: {_said(error)}") from None
+        if row is None:
+            return
+        yield reader.line_num, [cell.strip() for cell in row]
+
+
+def _said(error: csv.Error) -> str:
+    if "field larger" in str(error):
+        return f"a field of more than {csv.field_size_limit()} characters; is a quotation mark not closed?"
+    if "unexpected end" in str(error):
+        return "a quotation mark is not closed before the file ends"
+    return f"quotation marks that no field separator follows ({error})"

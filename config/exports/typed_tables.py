@@ -1,0 +1,134 @@
+"""Tables that know numbers from words: Excel workbooks (openpyxl), MATLAB files (scipy), Parquet (pyarrow)."""
+
+import datetime
+import warnings
+import zipfile
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from config.errors import InputError
+from config.exports.raw_table import Cell, RawTable
+from config.extras import needed
+
+
+def workbook(path: Path, sheet: str | None = None) -> list[RawTable]:
+    """Return the sheets of an Excel workbook, or the one that is named.
+
+    Raises:
+        InputError: it is a damaged one or another kind of archive, or has no sheet of that name.
+        ModuleNotFoundError: openpyxl is not installed; names the extra.
+    """
+    if not zipfile.is_zipfile(path):
+        raise InputError(str(path), "begins as a workbook and is not whole: copy it again")
+    with zipfile.ZipFile(path) as archive:
+        if "xl/workbook.xml" not in archive.namelist():
+            raise InputError(str(path), "is an archive and no Excel workbook: unpack it, or save it as .xlsx or CSV")
+    openpyxl = needed("openpyxl", str(path))
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+            names = [each.title for each in book.worksheets]
+            book.close()
+    except Exception as error:  # whatever a damaged archive makes of XML, zip and openpyxl
+        raise InputError(str(path), f"is a damaged workbook: {_first_line(error)}") from None
+    if sheet is not None and sheet not in names:
+        raise InputError("--sheet", f"{path} has no sheet {sheet!r}; it has: {', '.join(names)}")
+    return [
+        RawTable(f"sheet {each!r}", "row", partial(_sheet_rows, path, openpyxl, each), sheet=each)
+        for each in names
+        if sheet in (None, each)
+    ]
+
+
+def _sheet_rows(path: Path, openpyxl: Any, sheet: str) -> Iterator[tuple[int, list[Cell]]]:
+    with warnings.catch_warnings(action="ignore"):
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        try:
+            page = book[sheet]
+            page.reset_dimensions()  # other programs write wrong ones
+            for number, row in enumerate(page.iter_rows(values_only=True), start=1):
+                yield number, [_cell(value) for value in row]
+        except (zipfile.BadZipFile, KeyError, ValueError, SyntaxError, EOFError, OSError) as error:
+            raise InputError(str(path), f"is a damaged workbook: {_first_line(error)}") from None
+        finally:
+            book.close()
+
+
+def _cell(value: object) -> Cell:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, int | float | np.number):
+        return float(value)
+    if isinstance(value, datetime.datetime | datetime.date | datetime.time):
+        return value.isoformat()
+    if isinstance(value, datetime.timedelta):
+        return value.total_seconds()
+    return str(value).strip()
+
+
+def matlab(path: Path) -> list[RawTable]:
+    """Return the table that the vectors of a MATLAB file make, those of one length; structs by `name.field`.
+
+    Raises:
+        InputError: it is damaged, or holds no vectors.
+        ModuleNotFoundError: scipy is not installed; names the extra.
+    """
+    io = needed("scipy.io", str(path))
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            found = io.loadmat(path, simplify_cells=True)
+    except Exception as error:  # a damaged file fails anywhere in scipy's reader
+        raise InputError(str(path), f"is a damaged MATLAB file: {_first_line(error)}") from None
+    columns = dict(_vectors({name: value for name, value in found.items() if not name.startswith("__")}))
+    lengths = sorted({len(each) for each in columns.values()}, reverse=True)
+    if not lengths:
+        raise InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
+    tables = []
+    for length in lengths:
+        chosen = {name: each for name, each in columns.items() if len(each) == length}
+        tables.append(RawTable(f"vectors of {length}", "row", partial(_column_rows, chosen)))
+    return tables
+
+
+def _vectors(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _vectors(value, f"{prefix}{name}.")
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1:
+            if value.ndim == 1:
+                yield prefix + name, value.astype(np.float64)
+            elif value.ndim == 2:
+                for index in range(value.shape[1]):
+                    yield f"{prefix}{name}(:,{index + 1})", value[:, index].astype(np.float64)
+
+
+def parquet(path: Path) -> list[RawTable]:
+    """Return the table of a Parquet file.
+
+    Raises:
+        InputError: it is damaged.
+        ModuleNotFoundError: pyarrow is not installed; names the extra.
+    """
+    reader = needed("pyarrow.parquet", str(path))
+    try:
+        table = reader.read_table(path)
+    except Exception as error:  # a damaged file fails in any of Arrow's ways
+        raise InputError(str(path), f"is a damaged Parquet file: {_first_line(error)}") from None
+    columns = {name: [_cell(value) for value in table[name].to_pylist()] for name in table.column_names}
+    return [RawTable("Parquet", "row", partial(_column_rows, columns))]
+
+
+def _column_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, list[Cell]]]:
+    yield 0, list(columns)
+    for number, row in enumerate(zip(*columns.values(), strict=True), start=1):
+        yield number, list(row)
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

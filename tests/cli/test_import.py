@@ -1,0 +1,181 @@
+"""`positioner import` and `valve`, and exports in the other commands: from a file of another program to figures."""
+
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from config.valve_file import load_valve, valve
+from positioner.cli.main import main
+from sim.simulation import simulate
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def measured() -> Recording:
+    """Steps of the shipped valve `ordinary`, 20 ms apart."""
+    time_s = np.arange(0.0, 40.0, 0.02)
+    levels_pa = np.random.default_rng(2).uniform(3e4, 9e4, 10)
+    return simulate(valve("ordinary"), time_s, np.repeat(levels_pa, 200), noise_std_m=4e-6)
+
+
+def german_csv(path: Path, recording: Recording) -> None:
+    import pandas
+
+    stamps = pandas.Timestamp("2026-01-31 12:00") + pandas.to_timedelta(recording.time_s, unit="s")
+    frame = pandas.DataFrame(
+        {
+            "Zeit": stamps.strftime("%d.%m.%Y %H:%M:%S.%f"),
+            "Hub [mm]": 1e3 * recording.position_m,
+            "Stellsignal [mbar]": 1e-2 * recording.command_pa,
+        }
+    )
+    frame.to_csv(path, sep=";", decimal=",", index=False, encoding="utf-16")
+
+
+def workbook(path: Path, recording: Recording) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(["time (s)", "travel (%)", "output (bar)"])
+    for t, x, u in zip(recording.time_s, recording.position_m, recording.command_pa, strict=True):
+        book.active.append([float(t), float(100.0 * x / 0.04), float(1e-5 * u)])
+    book.save(path)
+
+
+def matlab(path: Path, recording: Recording) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"time": recording.time_s, "stem": recording.position_m, "cmd": 1e-3 * recording.command_pa})
+
+
+@pytest.mark.parametrize(
+    ("write", "name", "mended"),
+    [
+        (german_csv, "a.txt", {}),
+        (workbook, "a.xlsx", {"M": "0.04"}),
+        (
+            matlab,
+            "a.mat",
+            {"position_m=stem:%": "position_m=stem:m", "command_pa=cmd:%": "command_pa=cmd:kPa", "M": "0.04"},
+        ),
+    ],
+)
+def test_the_words_that_import_proposes_lead_to_a_verdict(
+    write: Callable[[Path, Recording], None],
+    name: str,
+    mended: dict[str, str],
+    tmp_path: Path,
+    measured: Recording,
+    capsys: Capture,
+) -> None:
+    path = tmp_path / name
+    write(path, measured)
+    assert main(["import", str(path)]) == 0
+    proposed = re.search(r"proposed, look at it: (.*)", capsys.readouterr().out)
+    assert proposed is not None
+    words = [mended.get(word, word) for word in shlex.split(proposed[1])]
+    out = tmp_path / "rec.csv"
+    assert main(["import", str(path), *words, "-o", str(out)]) == 0
+    assert "look:" not in capsys.readouterr().out
+    read = Recording.read(out)
+    np.testing.assert_allclose(read.position_m, measured.position_m, atol=1e-9)
+    np.testing.assert_allclose(read.command_pa, measured.command_pa, rtol=1e-9)
+    assert main(["response", str(path), *words]) == 0
+    assert main(["estimate", str(path), *words]) in (0, 1)
+    assert main(["compare", str(path), *words, "--valve", "ordinary"]) in (0, 1)
+    assert "adequate" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["-o", "rec.csv"], "-o: needs to know the columns: --column"),
+        (["--column", "time_s=t"], "command_pa is given 0 times"),
+        (
+            ["--column", "time_s=t", "--column", "position_m=x:mm", "--column", "command_pa=u:bar", "--stroke-m", "-1"],
+            "--stroke-m",
+        ),
+        (
+            ["--column", "time_s=t", "--column", "position_m=x:mm", "--column", "command_pa=u:bar", "--status", "Q"],
+            "--status",
+        ),
+        (
+            ["--column", "time_s=t", "--column", "position_m=x:mm", "--column", "command_pa=u:bar", "-o", "none/r.csv"],
+            "-o none",
+        ),
+    ],
+)
+def test_what_it_cannot_do_is_one_line(
+    words: list[str], said: str, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_text("t,x,u\n0,1,1\n1,2,1\n")
+    assert main(["import", "a.csv", *words]) == 2
+    printed = capsys.readouterr()
+    assert said in printed.err
+    assert printed.err.count("\n") == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_an_option_of_exports_without_columns_is_refused(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("time_s,command_pa,position_m\n0,1,2\n1,1,3\n")
+    assert main(["estimate", str(path), "--decimal", ","]) == 2
+    assert "--decimal: goes with --column" in capsys.readouterr().err
+
+
+def test_outputs_are_checked_before_the_work(tmp_path: Path, measured: Recording, capsys: Capture) -> None:
+    path = tmp_path / "r.csv"
+    measured.write(path)
+    for words in (
+        ["compare", str(path), "--valve", "ordinary", "--json", str(tmp_path / "no" / "a.json")],
+        ["diagnose", str(path), "--valve", "ordinary", "--report", str(tmp_path / "no" / "a.html")],
+        ["extend", "ordinary", "--effect", "backlash", "--fit", str(path), "-o", str(tmp_path)],
+    ):
+        assert main(words) == 2
+        printed = capsys.readouterr()
+        assert "cannot be written" in printed.err
+        assert not printed.out
+
+
+def test_a_valve_from_a_data_sheet(tmp_path: Path, capsys: Capture) -> None:
+    out = tmp_path / "v.toml"
+    words = ["valve", "--area-cm2", "700", "--range-bar", "0.2", "1.0", "--stroke-mm", "40", "-o", str(out)]
+    assert main([*words, "--friction-percent", "6.4286", "--breakaway-ratio", "1.3"]) == 0
+    made, shipped = load_valve(out).valve, valve("ordinary").valve
+    assert made.spring_n_per_m == pytest.approx(shipped.spring_n_per_m)
+    assert made.coulomb_n == pytest.approx(shipped.coulomb_n, rel=1e-3)
+    assert made.static_n == pytest.approx(shipped.static_n, rel=0.01)
+    assert [each.parameters for each in load_valve(out).effect] == [{"force_n": 1400.0}]
+    printed = capsys.readouterr().out
+    assert "assumed: mass 8 kg" in printed
+    assert "from the data sheet: sliding friction" in printed
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"--area-cm2": ["0"]}, "--area-cm2: must be above 0, at most 100000, it is 0"),
+        ({"--range-bar": ["1", "0.2"]}, "--range-bar: must be two gauge pressures, the lower first"),
+        ({"--stroke-mm": ["nan"]}, "--stroke-mm: must be above 0"),
+    ],
+)
+def test_a_data_sheet_that_cannot_be_is_one_line(
+    changed: dict[str, list[str]], said: str, tmp_path: Path, capsys: Capture
+) -> None:
+    sheet = {
+        "--area-cm2": ["700"],
+        "--range-bar": ["0.2", "1.0"],
+        "--stroke-mm": ["40"],
+        "-o": [str(tmp_path / "v.toml")],
+    }
+    words = [word for key, values in (sheet | changed).items() for word in (key, *values)]
+    assert main(["valve", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "v.toml").exists()

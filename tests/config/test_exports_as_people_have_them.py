@@ -1,0 +1,533 @@
+"""Files as people have them: each ends in a right reading, or in one line that says what to type instead.
+
+Every file below holds the same sixty samples, as some program would have written them.
+"""
+
+import csv
+import datetime
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.exports.column_mapping import ExportOptions, Status, read_mapping
+from config.historian_export import PLAIN, read_export
+from config.recording import Recording
+
+N = 60
+T = 0.5 * np.arange(N)
+PV = np.round(50.0 + 21.37 * np.sin(T / 3.0), 2)
+OUT = np.round(0.6 + 0.2 * np.sin(T / 3.0 + 0.3), 3)
+STROKE_M = 0.04
+ISO = [f"2026-01-31T12:{int(t // 60):02d}:{t % 60:04.1f}" for t in T]
+WORDS = ("time_s=t", "position_m=PV:%", "command_pa=OUT:bar")
+GERMAN = "%d.%m.%Y %H:%M:%S"
+
+
+def day(start: datetime.datetime, form: str, step_s: float = 0.5) -> list[str]:
+    return [(start + datetime.timedelta(seconds=step_s * i)).strftime(form) for i in range(N)]
+
+
+def rows(
+    separator: str = ",",
+    decimal: str = ".",
+    *,
+    time: list[str] | None = None,
+    pv: list[str] | None = None,
+    out: list[str] | None = None,
+    header: str = "t,PV,OUT",
+) -> list[str]:
+    """Return the lines of a text file; cells that hold the separator are quoted."""
+    columns = [
+        time or [f"{t:.1f}".replace(".", decimal) for t in T],
+        pv or [f"{x:.2f}".replace(".", decimal) for x in PV],
+        out or [f"{u:.3f}".replace(".", decimal) for u in OUT],
+    ]
+    cells = [[f'"{cell}"' if separator in cell else cell for cell in row] for row in zip(*columns, strict=True)]
+    return [header.replace(",", separator), *(separator.join(row) for row in cells)]
+
+
+def text(lines: list[str], end: str = "\n", encoding: str = "utf-8") -> bytes:
+    return (end.join(lines) + end).encode(encoding)
+
+
+def shuffled(lines: list[str], order: list[int]) -> list[str]:
+    return [lines[0], *(lines[1 + each] for each in order)]
+
+
+SWAPPED = [*range(10), 11, 10, *range(12, N)]
+ZEIT = tuple(word.replace("=t", "=Zeit") for word in WORDS)
+GROUPED_PA = [f"{1e5 * u:,.1f}" for u in OUT]
+AUTUMN = datetime.datetime(2026, 10, 25, 2, 59, 45)
+REPEATED = [
+    (AUTUMN + datetime.timedelta(seconds=0.5 * i - (3600 if i >= 30 else 0))).isoformat(timespec="milliseconds")
+    for i in range(N)
+]
+PA = (*WORDS[:2], "command_pa=OUT:Pa")
+PREAMBLE = ["Plant 7", "", "Exported: 31.01.2026; user: op", ""]
+
+
+@dataclass(frozen=True)
+class Good:
+    """A file that is read, with what must be said about it."""
+
+    data: bytes
+    words: tuple[str, ...] = WORDS
+    options: ExportOptions = PLAIN
+    said: str = ""
+    name: str = "export.csv"
+    missing: tuple[int, ...] = ()
+
+
+READ = {
+    "plain commas": Good(text(rows())),
+    "byte order mark": Good(text(rows(), encoding="utf-8-sig")),
+    "UTF-16 little-endian": Good(b"\xff\xfe" + text(rows("\t"), encoding="utf-16-le"), said="encoding: utf-16"),
+    "UTF-16 big-endian": Good(b"\xfe\xff" + text(rows("\t"), encoding="utf-16-be"), said="encoding: utf-16"),
+    "UTF-16 without a mark": Good(text(rows(";"), encoding="utf-16-le"), said="encoding: utf-16-le"),
+    "Windows-1252 names": Good(
+        text(rows(";", header="Zeit,Öffnung,Stellgröße"), encoding="cp1252"),
+        ("time_s=Zeit", "position_m=Öffnung:%", "command_pa=Stellgröße:bar"),
+        said="encoding: cp1252",
+    ),
+    "semicolons and decimal commas": Good(text(rows(";", ","))),
+    "tabs and decimal commas": Good(text(rows("\t", ","))),
+    "bars": Good(text(rows("|"))),
+    "commas, decimal commas in quotation marks": Good(text(rows(",", ","))),
+    "spaces behind commas": Good(text([line.replace(",", ", ") for line in rows()])),
+    "CR LF": Good(text(rows(), "\r\n")),
+    "lone CR": Good(text(rows(";", ","), "\r")),
+    "no end of the last line": Good(text(rows())[:-1]),
+    "blank lines between": Good(text(rows(), "\n\n")),
+    "separators at the ends of lines": Good(text([line + ";" for line in rows(";")])),
+    "sep= line of Excel": Good(text(["sep=;", *rows(";", ",")])),
+    "preamble": Good(text([*PREAMBLE, *rows(";", ",")])),
+    "preamble with as many columns": Good(text(["Tag;FV-101;V101", *rows(";", ",")])),
+    "comments before the header": Good(text(["# made by a logger", *rows()])),
+    "units in a row": Good(
+        text([rows(";")[0], "s;%;bar", *rows(";")[1:]]), ("time_s=t", "position_m=PV", "command_pa=OUT")
+    ),
+    "units in a row of brackets": Good(
+        text([rows(";")[0], "[s];[%];[bar(g)]", *rows(";")[1:]]), said="rows under the header that are no samples: 1"
+    ),
+    "units and types in rows": Good(text([rows(";")[0], "s;%;bar", "REAL;REAL;REAL", *rows(";")[1:]])),
+    "units in the header": Good(
+        text(rows(header="Time (s),PV [%],OUT / bar")), ("time_s=Time", "position_m=PV", "command_pa=OUT")
+    ),
+    "units behind the numbers": Good(
+        text(rows(pv=[f"{x:.2f} %" for x in PV], out=[f"{u:.3f} bar" for u in OUT])),
+        ("time_s=t", "position_m=PV", "command_pa=OUT"),
+    ),
+    "a unit of the file's own": Good(
+        text([rows()[0], "s,%,bar", *rows(time=[f"{t:.1f}" for t in T])[1:]]),
+        ("time_s=t", "position_m=PV", "command_pa=OUT"),
+    ),
+    "other case and spacing": Good(
+        text(rows(header="T,pv  ,Out")), ("time_s=t", "position_m=PV:%", "command_pa=OUT:bar")
+    ),
+    "thousands with commas": Good(text(rows(";", out=GROUPED_PA)), PA),
+    "thousands with points": Good(
+        text(rows(";", ",", out=[each.translate({44: ".", 46: ","}) for each in GROUPED_PA])), PA
+    ),
+    "thousands with spaces": Good(
+        text(rows(";", ",", out=[each.replace(",", " ").replace(".", ",") for each in GROUPED_PA])), PA
+    ),
+    "thousands with narrow spaces": Good(text(rows(";", out=[each.replace(",", "\u202f") for each in GROUPED_PA])), PA),
+    "thousands with apostrophes": Good(text(rows(";", out=[each.replace(",", "'") for each in GROUPED_PA])), PA),
+    "whole thousands, and the sign said": Good(
+        text(
+            rows(
+                time=[str(i) for i in range(N)], pv=[f"{x:.0f}" for x in 100 * PV], out=[f"{1e5 * u:,.0f}" for u in OUT]
+            )
+        ),
+        ("time_s=t:ms", "position_m=PV:%", "command_pa=OUT:Pa"),
+        ExportOptions(decimal="."),
+        said="scaled",
+    ),
+    "exponents": Good(text(rows(out=[f"{1e5 * u:.5E}" for u in OUT])), PA),
+    "exponents with decimal commas": Good(
+        text(rows(";", ",", out=[f"{1e5 * u:.5E}".replace(".", ",") for u in OUT])), PA
+    ),
+    "plus signs": Good(text(rows(pv=[f"+{x:.2f}" for x in PV]))),
+    "words for what is not there": Good(
+        text(rows(pv=["Bad", "No Data", "", "#N/A", *(f"{x:.2f}" for x in PV[4:])])),
+        said="not numbers in PV: 3",
+        missing=(0, 1, 2, 3),
+    ),
+    "ISO time stamps": Good(text(rows(time=ISO))),
+    "ISO with a space and a comma": Good(
+        text(rows(";", time=[each.replace("T", " ").replace(".", ",") for each in ISO]))
+    ),
+    "ISO with a zone": Good(text(rows(time=[each + "+01:00" for each in ISO]))),
+    "ISO with seven digits and Z": Good(text(rows(time=[each + "000000Z" for each in ISO]))),
+    "German dates": Good(
+        text(rows(";", ",", time=day(datetime.datetime(2026, 1, 31, 12), GERMAN + ",%f"))),
+        options=ExportOptions(time_format=GERMAN + ",%f"),
+    ),
+    "American dates, noon and all": Good(
+        text(rows(time=day(datetime.datetime(2026, 1, 31, 11, 59, 50), "%m/%d/%Y %I:%M:%S.%f %p"))),
+        options=ExportOptions(time_format="%m/%d/%Y %I:%M:%S.%f %p"),
+    ),
+    "fractions left out at whole seconds": Good(
+        text(
+            rows(
+                time=[each.removesuffix(".000000") for each in day(datetime.datetime(2026, 1, 31, 12), GERMAN + ".%f")]
+            )
+        ),
+        options=ExportOptions(time_format=GERMAN + ".%f"),
+    ),
+    "times of day across midnight": Good(
+        text(rows(time=day(datetime.datetime(2026, 1, 31, 23, 59, 50), "%H:%M:%S.%f"))),
+        options=ExportOptions(time_format="%H:%M:%S.%f"),
+        said="midnight",
+    ),
+    "date and time in two columns": Good(
+        text(
+            [
+                "Date;Time;PV;OUT",
+                *(
+                    ";".join(["31.01.2026", f"12:00:{t:04.1f}", f"{x:.2f}", f"{u:.3f}"])
+                    for t, x, u in zip(T, PV, OUT, strict=True)
+                ),
+            ]
+        ),
+        ("time_s=Date+Time", *WORDS[1:]),
+        ExportOptions(time_format=GERMAN + ".%f"),
+    ),
+    "milliseconds": Good(text(rows(time=[f"{1e3 * t:.0f}" for t in T])), ("time_s=t:ms", *WORDS[1:])),
+    "newest first": Good(text(shuffled(rows(time=ISO), list(range(N))[::-1])), said="order: newest first"),
+    "newest first, with a zone": Good(
+        text(shuffled(rows(time=[each + "Z" for each in ISO]), list(range(N))[::-1])), said="order: newest first"
+    ),
+    "two rows swapped": Good(text(shuffled(rows(), SWAPPED)), said="order: 1 times out of order; sorted"),
+    "two halves the wrong way round": Good(
+        text(shuffled(rows(time=ISO), [*range(30, N), *range(30)])), said="order: 1 times out of order; sorted"
+    ),
+    "rows in no order": Good(
+        text(shuffled(rows(time=ISO), np.random.default_rng(1).permutation(N).tolist())),
+        said="times out of order; sorted",
+    ),
+    "rows twice": Good(text(shuffled(rows(), sorted([*range(N), 5, 6, 7]))), said="repeated rows: 3 left out"),
+    "rows twice and out of order": Good(text(shuffled(rows(), [*range(N), 5, 6, 7])), said="repeated rows: 3 left out"),
+    "the hour that the end of summer time repeats": Good(
+        text(rows(time=REPEATED)), said="clock change: the end of summer time"
+    ),
+    "the repeated hour, newest first": Good(
+        text(shuffled(rows(time=REPEATED), list(range(N))[::-1])), said="clock change"
+    ),
+    "a header again in the middle": Good(text([*rows()[:30], rows()[0], *rows()[30:]]), said="header lines again: 1"),
+    "averages under it": Good(
+        text([*rows(), "Average,50.00,0.600", "Maximum,71.37,0.800"]), said="rows without a time at the end"
+    ),
+    "torn": Good((text(rows()) + b"30.0,5"), said="torn"),
+    "a status column": Good(
+        text(["t,PV,OUT,Q", *(f"{line},{'Bad' if i in (3, 4) else 'Good'}" for i, line in enumerate(rows()[1:]))]),
+        options=ExportOptions(status=(Status("Q", ("Good",)),)),
+        said="rows not Good in Q, without values: 2",
+        missing=(3, 4),
+    ),
+    "a status of numbers": Good(
+        text(["t,PV,OUT,Q", *(f"{line},{0 if i == 3 else 192}" for i, line in enumerate(rows()[1:]))]),
+        options=ExportOptions(status=(Status("Q", ("192", "216")),)),
+        missing=(3,),
+    ),
+    "no header": Good(text(rows()[1:]), ("time_s=#1", "position_m=#2:%", "command_pa=#3:bar")),
+    "a closing valve's position": Good(
+        text(rows(pv=[f"{100 - x:.2f}" for x in PV])), ("time_s=t", "position_m=PV:-%", "command_pa=OUT:bar")
+    ),
+    "milliamperes": Good(
+        text(rows(out=[f"{4 + 16 * (u - 0.2) / 0.8:.5f}" for u in OUT])), (*WORDS[:2], "command_pa=OUT:mA")
+    ),
+    "absolute pressure": Good(text(rows(out=[f"{u + 1.01325:.5f}" for u in OUT])), (*WORDS[:2], "command_pa=OUT:bara")),
+    "a name with a line break": Good(
+        text(['t,"PV\n(FV-101)",OUT', *rows()[1:]]), ("time_s=t", "position_m=PV (FV-101):%", "command_pa=OUT:bar")
+    ),
+    "columns that are not asked for": Good(
+        text([f"{line},{'x' if i else 'Note'},{'äöü' if i else 'More'}" for i, line in enumerate(rows())])
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_it_is_read_right_and_told(kind: str, tmp_path: Path) -> None:
+    case = READ[kind]
+    path = tmp_path / case.name
+    path.write_bytes(case.data)
+    recording = read_export(path, read_mapping(case.words), STROKE_M, options=case.options)
+    if case.said == "scaled":
+        np.testing.assert_allclose(recording.command_pa, np.round(1e5 * OUT))
+        return
+    expected = {"time_s": T, "position_m": STROKE_M * PV / 100, "command_pa": 1e5 * OUT}
+    missing = list(case.missing)
+    for name, column in expected.items():
+        got = recording.columns[name]
+        whole = np.setdiff1d(np.arange(N), missing if name == "position_m" or "Q" in str(case.options) else [])
+        whole = whole if name != "time_s" else np.arange(N)
+        np.testing.assert_allclose(got[whole], column[whole], rtol=1e-6, atol=1e-9)
+    assert np.isnan(recording.position_m[missing]).all()
+    said = "; ".join(f"{key}: {value}" for key, value in recording.metadata.items())
+    assert case.said in said
+
+
+@dataclass(frozen=True)
+class Bad:
+    """A file that is refused, with what the line must say."""
+
+    data: bytes
+    said: str
+    words: tuple[str, ...] = WORDS
+    options: ExportOptions = PLAIN
+    stroke_m: float | None = STROKE_M
+
+
+OPEN = rows(";", time=[str(i) for i in range(N)], pv=[f"{x:.3f}" for x in PV + 0.001], out=["1,234"] * N)
+STANDSTILL = rows(time=[f"12:00:{int(t):02d}" for t in T])
+OVERLAP = shuffled(rows(time=[f"{t + (0 if i < 30 else -7.27):.2f}" for i, t in enumerate(T)]), list(range(N)))
+
+REFUSED = {
+    "nothing": Bad(b"", "holds no samples: it is empty"),
+    "blank lines": Bad(b"\n \n\n", "holds no samples"),
+    "a header alone": Bad(b"t,PV,OUT\n", "holds no samples under the names of line 1"),
+    "another name": Bad(text(rows(header="t,PV,MV")), "column 'OUT' is missing; line 1 names: t, PV, MV"),
+    "another name under a preamble": Bad(
+        text([*PREAMBLE, *rows(";", header="t,PV,MV")]), "column 'OUT' is missing; line 5 names: t, PV, MV"
+    ),
+    "a name twice": Bad(
+        text(rows(header="t,PV,PV")),
+        "column 'PV' stands 2 times in line 1",
+        ("time_s=t", "position_m=PV:%", "command_pa=PV:bar"),
+    ),
+    "no header": Bad(text(rows()[1:]), "no line names columns; call them #1 to #3"),
+    "no table": Bad(b"Trend\nof yesterday\n", "holds no table"),
+    "thousand or one and a bit": Bad(
+        text(rows(";", time=[str(i) for i in range(N)], pv=["50"] * N, out=["1,234"] * N)),
+        "'1,234' may be 1234 or 1.234: say which sign is the decimal one, --decimal . or --decimal ,",
+    ),
+    "thousand or one and a bit, with points": Bad(
+        text(rows(";", time=[str(i) for i in range(N)], pv=["50.123"] * N, out=["1.234"] * N)),
+        "--decimal . or --decimal ,",
+    ),
+    "both decimal signs": Bad(
+        text(rows(";", pv=[f"{x:.2f}".replace(".", ",") for x in PV])), "a decimal point and .* a decimal comma"
+    ),
+    "the wrong decimal sign": Bad(
+        text(rows(";", ",")), "is neither seconds|--decimal ,", options=ExportOptions(decimal=".")
+    ),
+    "decimal commas between commas": Bad(
+        text([rows()[0], *(line.replace(".", ",") for line in rows()[1:])]), "line 2: 6 fields, the header names 3"
+    ),
+    "a broken number": Bad(text([*rows(), "30.0,1.2.3,0.6"]), r"line 62: '1.2.3' in 'PV' is no number"),
+    "a unit row of another unit": Bad(
+        text([rows()[0], "s,mm,bar", *rows()[1:]]),
+        "'PV' is in mm by line 2, the mapping says %: type --column position_m=PV:mm",
+    ),
+    "a header of another unit": Bad(
+        text(rows(header="t,PV [mm],OUT")),
+        "'PV' is in mm by line 1, the mapping says %: type --column position_m=PV:mm",
+    ),
+    "the unit of another quantity": Bad(
+        text(rows(header="t,PV [kPa],OUT")), "'PV' is in kPa by line 1, and position_m takes m"
+    ),
+    "per cent without a stroke": Bad(text(rows()), "--stroke-m: is needed to read position_m in %", stroke_m=None),
+    "German dates": Bad(
+        text(rows(time=day(datetime.datetime(2026, 1, 31, 12), GERMAN + ".%f"))),
+        'it can be read with --time-format "%d.%m.%Y %H:%M:%S.%f"',
+    ),
+    "day or month": Bad(
+        text(rows(time=day(datetime.datetime(2026, 1, 2, 12), "%d/%m/%Y %H:%M:%S.%f"))),
+        '--time-format "%d/%m/%Y %H:%M:%S.%f", or --time-format "%m/%d/%Y %H:%M:%S.%f"',
+    ),
+    "another format than said": Bad(
+        text(rows(time=day(datetime.datetime(2026, 1, 31, 12), "%d/%m/%Y %H:%M:%S.%f"))),
+        'is not as --time-format .* says; it can be read with --time-format "%d/%m/%Y',
+        options=ExportOptions(time_format=GERMAN),
+    ),
+    "a word for a time": Bad(
+        text(rows(time=["now", *(f"{t:.1f}" for t in T[1:])])),
+        "sample 1: 'now' is neither seconds nor an ISO time stamp",
+    ),
+    "a time missing in the middle": Bad(
+        text(rows(time=[f"{t:.1f}" if i != 20 else "" for i, t in enumerate(T)])),
+        "sample 21 .line 22.: '' is neither seconds",
+    ),
+    "several samples of one second": Bad(
+        text(STANDSTILL),
+        "lines 2 and 3 are of one time and have different values, 30 of 60 rows are such: export fractions of seconds",
+        options=ExportOptions(time_format="%H:%M:%S"),
+    ),
+    "a clock set back again and again": Bad(
+        text(rows(time=[f"{t % 7.3:.2f}" for t in T])), "time goes back|different values"
+    ),
+    "a status that nothing has": Bad(
+        text(["t,PV,OUT,Q", *(f"{line},OK" for line in rows()[1:])]),
+        "no row's 'Q' is Good; it holds: OK .60.; say which are good",
+        options=ExportOptions(status=(Status("Q", ("Good",)),)),
+    ),
+    "a column without a number": Bad(
+        text(rows(pv=["Bad"] * N)), "column 'PV' holds no number, only 'Bad': map another"
+    ),
+    "an empty column": Bad(text(rows(pv=[" "] * N)), "column 'PV' holds no number"),
+    "a quotation mark that is never closed": Bad(
+        text([*rows()[:5], '2.0,"50,0.6', *rows()[6:]]), "line 6: a quotation mark is not closed"
+    ),
+    "a field of a megabyte": Bad(
+        text([*rows()[:5], f'2.0,"{"5" * 1_000_000}",0.6']), "line 6: a field of more than 131072 characters"
+    ),
+    "a NUL": Bad(text(rows()) + b"30.0,5\0,0.6\n", "line 62: a NUL character"),
+    "a block of NULs after a power failure": Bad(text(rows()) + b"\0" * 4096, "line 62: a NUL character"),
+    "gzip": Bad(b"\x1f\x8b\x08\x00", "compressed with gzip: unpack it"),
+    "old Excel": Bad(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old Excel .*: save it as .xlsx or CSV"),
+    "MATLAB 7.3": Bad(b"MATLAB 7.3 MAT-file, Platform: GLNXA64", "MATLAB 7.3 file: save it with the option -v7"),
+    "a PDF": Bad(b"%PDF-1.7\n", "is a PDF"),
+    "a truncated workbook": Bad(b"PK\x03\x04" + b"\x00" * 100, "begins as a workbook and is not whole"),
+    "a truncated Parquet file": Bad(b"PAR1" + b"\x15" * 100, "is a damaged Parquet file"),
+    "a truncated MATLAB file": Bad(
+        b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM\x0e\x00\x00", "damaged MATLAB file|no vectors"
+    ),
+    "a sheet of a text": Bad(
+        text(rows()), "--sheet: goes with an Excel workbook", options=ExportOptions(sheet="Trend")
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_it_is_refused_in_one_line_that_says_what_to_do(kind: str, tmp_path: Path) -> None:
+    case = REFUSED[kind]
+    path = tmp_path / "export.csv"
+    path.write_bytes(case.data)
+    with pytest.raises(InputError, match=case.said) as caught:
+        read_export(path, read_mapping(case.words), case.stroke_m, options=case.options)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 600
+
+
+def by_pandas(path: Path, write: Callable[["object"], None]) -> None:
+    import pandas
+
+    stamps = pandas.to_datetime([each.replace("T", " ") for each in ISO])
+    write(pandas.DataFrame({"t": stamps, "PV": PV, "OUT": OUT}))
+
+
+def write_pandas_csv(path: Path) -> None:
+    by_pandas(path, lambda frame: frame.to_csv(path, sep=";", decimal=",", index=False, encoding="utf-8-sig"))  # type: ignore[attr-defined]
+
+
+def write_pandas_excel(path: Path) -> None:
+    by_pandas(path, lambda frame: frame.to_excel(path, index=True, startrow=3, sheet_name="Trend"))  # type: ignore[attr-defined]
+
+
+def write_pandas_parquet(path: Path) -> None:
+    by_pandas(path, lambda frame: frame.to_parquet(path))  # type: ignore[attr-defined]
+
+
+def write_excel_dialect(path: Path) -> None:
+    buffer = io.StringIO(newline="")
+    writer = csv.writer(buffer, dialect="excel-tab")
+    writer.writerows([["t", "PV", "OUT"], *zip(ISO, PV.tolist(), OUT.tolist(), strict=True)])
+    path.write_text(buffer.getvalue(), encoding="utf-16", newline="")
+
+
+def write_openpyxl(path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.title = "Cover"
+    book.active["A1"] = "Trend of FV-101"
+    page = book.create_sheet("Data")
+    page.append(["t", "PV", "OUT"])
+    page.append([None, "%", "bar"])
+    for stamp, x, u in zip(ISO, PV.tolist(), OUT.tolist(), strict=True):
+        page.append([datetime.datetime.fromisoformat(stamp), x, u])
+    book.save(path)
+
+
+def write_savemat(path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"t": T, "PV": PV[:, None], "OUT": OUT, "fs": 2.0, "who": "rig 3"})
+
+
+def write_savemat_struct(path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"log": {"t": T, "signals": {"PV": PV, "OUT": OUT}}}, do_compression=True)
+
+
+OTHERS: dict[str, tuple[Callable[[Path], None], str, tuple[str, ...]]] = {
+    "pandas.to_csv": (write_pandas_csv, "a.csv", WORDS),
+    "pandas.to_excel": (write_pandas_excel, "a.xlsx", WORDS),
+    "pandas.to_parquet": (write_pandas_parquet, "a.parquet", WORDS),
+    "csv, excel-tab, UTF-16": (write_excel_dialect, "a.txt", WORDS),
+    "openpyxl": (write_openpyxl, "a.xlsx", ("time_s=t", "position_m=PV", "command_pa=OUT")),
+    "scipy.io.savemat": (write_savemat, "a.mat", WORDS),
+    "scipy.io.savemat, a struct": (
+        write_savemat_struct,
+        "a.mat",
+        ("time_s=log.t", "position_m=log.signals.PV:%", "command_pa=log.signals.OUT:bar"),
+    ),
+}
+
+
+@pytest.mark.parametrize("program", OTHERS)
+def test_what_other_programs_write_is_read(program: str, tmp_path: Path) -> None:
+    write, name, words = OTHERS[program]
+    write(tmp_path / name)
+    recording = read_export(tmp_path / name, read_mapping(words), STROKE_M)
+    np.testing.assert_allclose(recording.time_s, T, atol=1e-6)
+    np.testing.assert_allclose(recording.position_m, STROKE_M * PV / 100)
+    np.testing.assert_allclose(recording.command_pa, 1e5 * OUT)
+
+
+def test_sheets_that_both_have_the_columns_are_named_and_one_can_be_said(tmp_path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    for page in (book.active, book.create_sheet("Again")):
+        page.append(["t", "PV", "OUT"])
+        page.append([0.0, 50.0, 0.6])
+        page.append([0.5, 51.0, 0.7])
+    book.save(tmp_path / "a.xlsx")
+    mapping = read_mapping(WORDS)
+    with pytest.raises(
+        InputError, match=r"the sheets 'Sheet', 'Again' all have these columns: say which, --sheet NAME"
+    ):
+        read_export(tmp_path / "a.xlsx", mapping, STROKE_M)
+    again = ExportOptions(sheet="Again")
+    assert len(read_export(tmp_path / "a.xlsx", mapping, STROKE_M, options=again)) == 2
+    with pytest.raises(InputError, match="has no sheet 'None such'; it has: Sheet, Again"):
+        read_export(tmp_path / "a.xlsx", mapping, STROKE_M, options=ExportOptions(sheet="None such"))
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_few_rows_are_read(count: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(text(rows(time=ISO)[: count + 1]))
+    assert len(read_export(path, read_mapping(WORDS), STROKE_M)) == count
+
+
+def test_rows_of_one_time_and_a_step_back_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,PV,OUT\n5,1,1\n5,2,1\n5,3,1\n5,4,1\n3,1,1\n")
+    with pytest.raises(InputError, match="of one time and have different values"):
+        read_export(path, read_mapping(WORDS), STROKE_M)
+
+
+def test_a_clock_set_back_now_and_then_is_left_for_the_workbench(tmp_path: Path) -> None:
+    t = np.where(np.arange(400) < 200, 0.5 * np.arange(400), 0.5 * np.arange(400) - 7.27)
+    path = tmp_path / "a.csv"
+    path.write_text("t,PV,OUT\n" + "".join(f"{each:.2f},{50 + i % 7},0.6\n" for i, each in enumerate(t)))
+    recording = read_export(path, read_mapping(WORDS), STROKE_M)
+    np.testing.assert_allclose(recording.time_s, t)
+
+
+def test_our_own_recordings_may_have_a_byte_order_mark_and_name_the_way_out(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("time_s,command_pa,position_m\n0,1,2\n1,1,3\n", encoding="utf-8-sig")
+    assert len(Recording.read(path)) == 2
+    path.write_bytes(text(rows(";")))
+    with pytest.raises(InputError, match=r"column time_s is missing; .*`positioner import .*` says how to read it"):
+        Recording.read(path)
