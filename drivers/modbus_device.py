@@ -19,7 +19,7 @@ from pymodbus.pdu.register_message import (
 from config.device import ModbusDevice
 from config.modbus_map import ModbusMap, Place
 from config.quantities import CommunicationAction
-from drivers.boundary import BadReply, Capabilities, Reading, Refused
+from drivers.boundary import BadReply, Capabilities, NoNumber, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.layout import layout
 from fieldbus.modbus.pdu import encoded
@@ -146,7 +146,7 @@ class ModbusDriver(ABC):
         values = self._sample.values(data)
         if not all(map(math.isfinite, values)):
             said = ", ".join(f"{name} {value}" for name, value in zip(self._sample.names, values, strict=True))
-            raise BadReply(f"{self._who}: a measurement that is no number: {said}")
+            raise NoNumber(f"{self._who}: a measurement that is no number: {said}")
         return self._sample.reading(values)
 
     def _ask(self, request: bytes, head: bytes, length: int) -> bytes:

@@ -17,7 +17,7 @@ from canopen.objectdictionary import ObjectDictionary, ODVariable
 
 from config.canopen_device import CanopenDevice, Entry
 from config.errors import InputError
-from drivers.boundary import BadReply, NoReply
+from drivers.boundary import BadReply, NoNumber, NoReply
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import NodeBus
 from drivers.canopen.sdo import REALS, SdoTransfers, sheet_variable
@@ -162,7 +162,8 @@ class PdoExchange:
 
         Raises:
             NoReply: TPDOs are missing after the reply time-out, or heartbeats are.
-            BadReply: a TPDO too short or twice, or a number that is none.
+            BadReply: a TPDO too short or twice.
+            NoNumber: a quantity is none.
             NoConnection: the node is lost.
         """
         self._bus.put(self._sync)
@@ -170,7 +171,7 @@ class PdoExchange:
         self._watcher.require_heartbeat()
         if not all(map(math.isfinite, values.values())):
             said = ", ".join(f"{name} {value}" for name, value in values.items())
-            raise BadReply(f"{self._bus.who}: a measurement that is no number: {said}")
+            raise NoNumber(f"{self._bus.who}: a measurement that is no number: {said}")
         return values
 
     def _received(self) -> dict[str, float]:

@@ -127,7 +127,7 @@ def _assembled(
     refinement: RefinementProcess,
 ) -> ServedValve:
     settings = Settings.of(file, extended)
-    link = Link(driver_for(file.device), pace)
+    link = Link(driver_for(file.device), pace, file.longest_unattended_s)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
     unreachable_reason = None

@@ -84,6 +84,18 @@ def test_a_device_that_comes_back_with_another_command_was_restarted(held_pa: fl
     assert faults(watched([replace(good(0.0), held_pa=held_pa)], AUTOMATIC)) == [fault]
 
 
+def test_a_daemon_that_stood_still_is_a_fault_whatever_the_device_says() -> None:
+    late = replace(good(0.01), unattended_s=2.0, held_pa=0.0, status=DeviceStatus.COMMUNICATION_LOST)
+    watches = watched([good(0.0), late], AUTOMATIC)
+    assert faults(watches) == [Fault.NONE, Fault.STALLED]
+    assert watches[-1].mode is Mode.HOLD
+
+
+def test_a_measurement_that_is_no_number_is_implausible() -> None:
+    none = [replace(good(0.01 * n), quality=Quality.NO_NUMBER) for n in range(1, 4)]
+    assert faults(watched([good(0.0), *none], AUTOMATIC))[-2:] == [Fault.NONE, Fault.IMPLAUSIBLE]
+
+
 def after_a_new_command(lost: int) -> Fault:
     """Return the fault after replies were lost from a new command on, and the device comes back with the one before."""
     memory = supervise(SupervisionMemory(), good(0.0), 50e3, AUTOMATIC, LIMITS)

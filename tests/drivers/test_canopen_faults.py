@@ -17,7 +17,7 @@ from config.errors import InputError
 from config.quantities import DeviceStatus
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoReply, Refused
 from drivers.canopen import pdo, watcher
 from drivers.canopen.driver import CanopenDriver
 from drivers.canopen.events import NodeEvent
@@ -207,7 +207,7 @@ def test_a_measurement_that_is_no_number_is_refused_and_the_next_taken(driver: C
     node.fault = lambda identity, data: [
         (identity, struct.pack("<ff", float("nan"), 0) if identity == TPDO_1 else data)
     ]
-    with pytest.raises(BadReply, match="no number: position_m nan"):
+    with pytest.raises(NoNumber, match="no number: position_m nan"):
         driver.exchange(PUSH_PA)
     node.fault = honest
     assert driver.exchange(PUSH_PA).sample_counter == 3

@@ -21,7 +21,7 @@ from config.modbus_map import SIMULATED_MAP
 from config.serial_port import Baud, SerialPort
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoReply, Refused
 from drivers.modbus_rtu import ModbusRtuDriver
 from fieldbus.modbus.rtu import framed
 from fieldbus.modbus.serial_line import SerialLine
@@ -233,7 +233,7 @@ def test_a_number_that_is_none_is_no_measurement_but_the_line_stays(
     driver: ModbusRtuDriver, scripted: ScriptedDevice
 ) -> None:
     scripted.fault = lambda _, reply: framed(1, reply[1:3] + struct.pack(">f", float("nan")) + reply[7:-2])
-    assert "position_m nan" in refused_as(BadReply, lambda: driver.exchange(PUSH_PA))
+    assert "position_m nan" in refused_as(NoNumber, lambda: driver.exchange(PUSH_PA))
     scripted.fault = honest
     assert driver.exchange(PUSH_PA).sample_counter == 3
 
