@@ -72,6 +72,9 @@ def lone_slave(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
         (signal.SIGINT, "hold", 24000.0),
         (signal.SIGTERM, "vent", 0.0),
         (signal.SIGINT, "fill", 420e3),
+        (signal.SIGHUP, "vent", 0.0),
+        (signal.SIGQUIT, "fill", 420e3),
+        (signal.SIGUSR1, "vent", 0.0),
     ],
 )
 def test_the_end_leaves_the_valve_in_the_safe_state(
