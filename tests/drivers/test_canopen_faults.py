@@ -353,6 +353,17 @@ def test_a_node_that_another_master_resets_or_stops(
     if command == 2:
         node.node.send_message(HEARTBEAT, bytes((4,)))
     fails(NoConnection, event, lambda: driver.exchange(PUSH_PA))
+    if command == 2:
+        driver._sdo._timeout_s = 0.05
+        fails(NoConnection, NodeEvent.NO_NODE, driver.open)
+        assert node.node.state == 4, "it is left as the other master wants it"
+        driver._sdo._timeout_s = PATIENT_S
+        third.send(frame(0, bytes((128, NODE))))
+        in_time(lambda: node.node.state == 127)
+    driver.open()
+    statuses = [driver.read().status for _ in range(2)]
+    assert statuses == [DeviceStatus.NOT_READY, 0], "the first sample is a fault of the device, however quick it was"
+    driver.close()
     recovers(driver, node)
 
 
