@@ -248,6 +248,16 @@ class DaemonFile(Schema):
     memory: MemoryTable = MemoryTable()
     log: LogTable = LogTable()
 
+    @model_validator(mode="after")
+    def _device_waits_for_a_cycle(self) -> Self:
+        alone_s = self.device.acts_alone_after_s
+        if self.cycle.pace == "real_time" and alone_s <= self.cycle.period_s:
+            raise ValueError(
+                f"device.communication_timeout_s must be more than cycle.period_s ({self.cycle.period_s:g} s), "
+                f"or the device acts by itself between two cycles, it is {alone_s:g} s"
+            )
+        return self
+
     @property
     def longest_unattended_s(self) -> float:
         """For how long the device may be without a command before the daemon counts as having stood still.

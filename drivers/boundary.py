@@ -29,6 +29,8 @@ class Capabilities:
     """Each reading carries the device's own time stamp."""
     sample_counter: bool
     """Each reading says which sample it is, so that a repeated one is known."""
+    counter_range: int = 1 << 32
+    """How far that number counts before it begins at 0 again."""
 
 
 class DriverError(Exception):

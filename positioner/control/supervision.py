@@ -107,7 +107,10 @@ def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s
         return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE
     if sample.quality is not Quality.LOST and sample.status & UNFIT_STATUS:
         return Fault.DEVICE
-    return Fault.STALE if age_s > limits.stale_after_s else Fault.NONE
+    if age_s > limits.stale_after_s:  # on a slow line sooner than so many cycles
+        by_quality = {Quality.LOST: Fault.NO_REPLY, Quality.NO_NUMBER: Fault.IMPLAUSIBLE}
+        return by_quality.get(sample.quality, Fault.STALE)
+    return Fault.NONE
 
 
 def _mode(memory: SupervisionMemory, requests: Requests, fault: Fault) -> Mode:

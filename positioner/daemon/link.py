@@ -22,8 +22,6 @@ from positioner.daemon.pacing import Pace
 
 log = logging.getLogger(__name__)
 
-COUNTER_RANGE = 1 << 32
-"""The device's sample counter wraps here."""
 MOST_REFUSALS = 2
 """Exceptions in a row on a connection that stays; after more the device is looked at anew."""
 
@@ -186,7 +184,7 @@ class Link:
         if before is None:
             return False
         if reading.sample_counter is not None and before.sample_counter is not None:
-            passed = (reading.sample_counter - before.sample_counter) % COUNTER_RANGE
+            passed = (reading.sample_counter - before.sample_counter) % self._driver.capabilities.counter_range
             self.counts.lost_samples += max(passed - 1, 0)
             return passed == 0
         return _same_sample(before, reading)

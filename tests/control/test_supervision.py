@@ -58,6 +58,11 @@ def test_the_third_lost_reply_in_a_row_is_a_fault_and_the_mode_falls() -> None:
     assert watches[-1].mode is Mode.HOLD
 
 
+def test_a_dead_line_that_is_slower_than_staleness_is_no_reply() -> None:
+    lost = [replace(good(0.0), now_s=2.0 * n, quality=Quality.LOST) for n in range(1, 3)]
+    assert faults(watched([good(0.0), *lost], AUTOMATIC))[1] is Fault.NO_REPLY
+
+
 def test_two_lost_replies_with_a_good_one_between_are_none() -> None:
     lost = replace(good(0.01), quality=Quality.LOST)
     assert faults(watched([good(0.0), lost, lost, good(0.03), lost, lost], AUTOMATIC)) == [Fault.NONE] * 6

@@ -62,9 +62,14 @@ def test_a_new_sample_is_good_and_the_same_again_is_repeated() -> None:
     assert [link.exchange(5e4).quality for _ in range(3)] == [Quality.GOOD, Quality.REPEATED, Quality.GOOD]
 
 
-@pytest.mark.parametrize(("first", "second", "missed"), [(1, 2, 0), (1, 5, 3), (2**32 - 1, 0, 0), (2**32 - 2, 1, 2)])
-def test_missed_samples_are_counted_across_the_counters_wrap(first: int, second: int, missed: int) -> None:
-    link = opened(Scripted(reading(first), reading(second)))
+@pytest.mark.parametrize(
+    ("bits", "first", "second", "missed"),
+    [(32, 1, 2, 0), (32, 1, 5, 3), (32, 2**32 - 1, 0, 0), (32, 2**32 - 2, 1, 2), (16, 65535, 0, 0), (8, 254, 1, 2)],
+)
+def test_missed_samples_are_counted_across_the_counters_wrap(bits: int, first: int, second: int, missed: int) -> None:
+    driver = Scripted(reading(first), reading(second))
+    driver.capabilities = replace(driver.capabilities, counter_range=1 << bits)
+    link = opened(driver)
     link.exchange(5e4)
     link.exchange(5e4)
     assert link.counts.lost_samples == missed

@@ -377,6 +377,26 @@ def test_a_device_without_echo_refuses_it_and_that_will_do(driver: ModbusRtuDriv
     assert driver.exchange(PUSH_PA).sample_counter == 2
 
 
+def test_a_device_that_passes_over_the_echo_is_reached_by_reads_and_no_late_reply_is_taken(
+    scripted: ScriptedDevice,
+) -> None:
+    """As the slaves of libmodbus do."""
+    scripted.fault = lambda request, reply: b"" if request[1] == 8 else reply
+    driver = ModbusRtuDriver(ModbusRtuDevice(serial=port(scripted.driver_end), reply_timeout_s=REPLY_TIMEOUT_S))  # type: ignore[attr-defined]
+    assert driver.open() == scripted.device.command_pa
+    assert {request[1] for request in scripted.heard[1:]} <= {3, 16}, "after the echo only reads, and its time-out"
+    assert driver.exchange(PUSH_PA).sample_counter == 1
+    late = one_behind()
+    scripted.fault = lambda request, reply: b"" if request[1] == 8 else late(request, reply)
+    refused_as(NoReply, driver.read)
+    for _ in range(3):
+        refused_as(NoConnection, driver.open)
+    scripted.fault = lambda request, reply: b"" if request[1] == 8 else reply
+    driver.open()
+    assert driver.exchange(PUSH_PA).sample_counter == scripted.device.sample_counter
+    driver.close()
+
+
 def test_requests_keep_the_silence_between_frames(driver: ModbusRtuDriver, scripted: ScriptedDevice) -> None:
     """Of 1.75 ms above 19200 baud, after the last character of the reply; the device keeps as much before it."""
     start_s = time.monotonic()

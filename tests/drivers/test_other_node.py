@@ -30,6 +30,10 @@ CONFIGURATION = [
 ]
 
 
+def _local_node() -> Any:
+    return canopen.LocalNode(NODE, read_eds(SHIPPED_EDS, NODE))
+
+
 class OtherNode:
     """The node, and what is sent on its bus."""
 
@@ -37,7 +41,7 @@ class OtherNode:
         self.channel = channel
         self.network = canopen.Network()
         self.network.connect(interface="loopback", channel=channel, ignore_config=True)
-        self.node: Any = canopen.LocalNode(NODE, read_eds(SHIPPED_EDS, NODE))
+        self.node = _local_node()
         self.network.add_node(self.node)
         self.frames: list[tuple[int, bytes]] = []
         self.constant: set[int] = set()
