@@ -3,7 +3,9 @@
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
+from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from config.errors import InputError
 from config.loading import validated
