@@ -7,8 +7,8 @@ then counted.
 import math
 from collections.abc import Hashable
 
-AT_ONCE = 3
-"""Attempts before the first wait."""
+AT_ONCE = 4
+"""Failures before the first wait: a reply that was lost, and three attempts."""
 FIRST_S, LONGEST_S = 0.01, 1.0
 STEADY_S = 10.0
 """What has gone well for so long has recovered: the next failure is the first again."""

@@ -92,6 +92,7 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
     """
     endings = Endings()
     with ExitStack() as on_exit:
+        on_exit.callback(start_logging(files[0].log.level).stop)
         refinement = RefinementProcess()
         on_exit.callback(refinement.stop)
         paced = zip(files, extended, _paces(files), strict=True)
@@ -104,7 +105,6 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
         for recorder in [valve.recorder for valve in valves if valve.recorder is not None]:
             recorder.start()
             on_exit.callback(recorder.stop)
-        on_exit.callback(start_logging(files[0].log.level).stop)
         for valve in valves:
             _announce(valve, server.port)
             for keeper in valve.keepers:
