@@ -142,6 +142,16 @@ class CanopenDevice(CanBus, Device):
     """Read by SDO and nothing else: no NMT, no SYNC, nothing set."""
     map: ObjectMap = SIMULATED_OBJECTS
 
+    @property
+    def longest_exchange_s(self) -> float:
+        """The reply's time-out."""
+        return self.reply_timeout_s
+
+    @property
+    def acts_alone_after_s(self) -> float:
+        """The time-out that it is told, if it can be told one."""
+        return self.communication_timeout_s or math.inf if self.map.communication_timeout_s else math.inf
+
     def read_only(self) -> Self:
         """Return the same device for one who only watches."""
         return self.model_copy(update={"only_watch": True})

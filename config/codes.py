@@ -53,6 +53,7 @@ class Fault(Code):
     DEVICE = 4, "device"
     RESTARTED = 5, "device restarted"
     DCS_SILENT = 6, "DCS silent"
+    STALLED = 7, "the daemon stood still"
 
 
 class Quality(Code):
@@ -61,6 +62,7 @@ class Quality(Code):
     GOOD = 0, "good"
     REPEATED = 1, "repeated"
     LOST = 2, "lost"
+    NO_NUMBER = 3, "no number"
 
 
 class InhibitReason(Code):

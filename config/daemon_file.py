@@ -6,6 +6,7 @@ key by key (save a device on another bus, which has all its keys itself). They s
 where the unit tells them apart.
 """
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from itertools import combinations
@@ -59,6 +60,7 @@ class SafetyTable(Schema):
     """On a fault of the device or its bus, and when the daemon ends."""
     lost_after_cycles: Annotated[int, Field(ge=1)] = 3
     stale_after_s: Positive = 0.1
+    """Without a new measurement, or later than its cycle was due: then the daemon stood still."""
     travel_margin: Fraction = 0.1
     """A position farther than this fraction of the stroke outside the stroke is implausible."""
     heartbeat_timeout_s: NonNegative = 0.0
@@ -247,6 +249,28 @@ class DaemonFile(Schema):
     health: HealthTable = HealthTable()
     memory: MemoryTable = MemoryTable()
     log: LogTable = LogTable()
+
+    @model_validator(mode="after")
+    def _device_waits_for_a_cycle(self) -> Self:
+        alone_s = self.device.acts_alone_after_s
+        if self.cycle.pace == "real_time" and alone_s <= self.cycle.period_s:
+            raise ValueError(
+                f"device.communication_timeout_s must be more than cycle.period_s ({self.cycle.period_s:g} s), "
+                f"or the device acts by itself between two cycles, it is {alone_s:g} s"
+            )
+        return self
+
+    @property
+    def longest_unattended_s(self) -> float:
+        """For how long the device may be without a command before the daemon counts as having stood still.
+
+        That is a cycle with all that its exchange may take, late by `safety.stale_after_s`; or the time-out after which
+        the device acts by itself, where that is shorter. A device in lockstep waits for ever.
+        """
+        if self.cycle.pace == "device":
+            return math.inf
+        exchange_s = max(self.cycle.period_s, self.device.longest_exchange_s)
+        return min(exchange_s + self.safety.stale_after_s, self.device.acts_alone_after_s)
 
     @property
     def by_slides(self) -> bool:

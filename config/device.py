@@ -3,6 +3,7 @@
 `Device` is what a bus of another package builds on; `CanopenDevice` is in `config.canopen_device`.
 """
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -48,8 +49,13 @@ class Device(Schema):
 
     @property
     def longest_exchange_s(self) -> float:
-        """The longest that it may keep others from the line: until a reply that does not come is given up."""
+        """The longest that one exchange may take: until a reply that does not come is given up."""
         return 0.0
+
+    @property
+    def acts_alone_after_s(self) -> float:
+        """Silence after which the device acts by itself, where that is known."""
+        return math.inf
 
     @property
     def command_step_pa(self) -> float:
@@ -76,6 +82,16 @@ class ModbusDevice(Device):
     communication_timeout_s: Annotated[float, Field(ge=0)] = 1.0
     communication_action: ActionName = "hold"
     map: ModbusMap = SIMULATED_MAP
+
+    @property
+    def longest_exchange_s(self) -> float:
+        """The reply's time-out."""
+        return self.reply_timeout_s
+
+    @property
+    def acts_alone_after_s(self) -> float:
+        """The time-out that it is told, if it can be told one."""
+        return self.communication_timeout_s or math.inf if self.map.communication_timeout_s else math.inf
 
     @property
     def command_step_pa(self) -> float:

@@ -5,7 +5,7 @@
 
 import math
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -86,6 +86,14 @@ class ModbusMap(Schema):
     status: Place | None = None
     communication_timeout_s: Place | None = None
     communication_action: Place | None = None
+    sample_counter_bits: Annotated[int, Field(ge=2, le=64)] | None = None
+    """Of a counter that wraps before its registers are full; all of them where nobody says."""
+
+    @property
+    def sample_counter_range(self) -> int:
+        """How far the sample counter counts."""
+        bits = 32 if self.sample_counter is None else 16 * self.sample_counter.format.words
+        return 1 << (self.sample_counter_bits or bits)
 
     @property
     def places(self) -> dict[str, Place]:
@@ -126,7 +134,8 @@ class ModbusMap(Schema):
 
 def _simulated_map() -> ModbusMap:
     """Lay the quantities one after another from register 0."""
-    places, address = {}, 0
+    places: dict[str, Any] = {}
+    address = 0
     for quantity in QUANTITIES:
         places[quantity.name] = Place(address=address, type=quantity.type)
         address = places[quantity.name].end

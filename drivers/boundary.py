@@ -29,10 +29,17 @@ class Capabilities:
     """Each reading carries the device's own time stamp."""
     sample_counter: bool
     """Each reading says which sample it is, so that a repeated one is known."""
+    counter_range: int = 1 << 32
+    """How far that number counts before it begins at 0 again."""
 
 
 class DriverError(Exception):
-    """A transaction did not do what was asked. The text says with whom and why, in one line."""
+    """A transaction did not do what was asked. The text says with whom and why, in one line.
+
+    `kind` names what happened, the same word each time; empty: the name of the class says it.
+    """
+
+    kind: str = ""
 
 
 class NoConnection(DriverError):
@@ -44,14 +51,18 @@ class NoReply(DriverError):
 
 
 class BadReply(DriverError):
-    """The answer is not one to the question (wrong function, count, echo), or holds a number that is none.
+    """The answer is not one to the question (wrong function, count, echo): nothing on the connection can be trusted."""
 
-    The first kind ends the connection, since nothing on it can be trusted any more; the second does not.
-    """
+
+class NoNumber(DriverError):
+    """A measurement holds a number that is none (NaN, infinite). The device obeyed, and the connection stays."""
 
 
 class Refused(DriverError):
-    """The device answered with an exception, or was not asked because it could not be told that value."""
+    """The device answered with an exception, or was not asked because it could not be told that value.
+
+    The connection stays.
+    """
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)

@@ -1,7 +1,7 @@
 """A device on any Modbus: its quantities by the map of its registers, in requests and replies without frames.
 
-One transaction a cycle (function 23), or two where it must be (16, then 3 or 4). Checked here: function, byte count,
-length, echo, and that every number is one. How a request travels, a subclass knows.
+One transaction a cycle (function 23), or two where it must be (16, or 6 where that is refused; then 3 or 4). Checked
+here: function, byte count, length, echo, and that every number is one. How a request travels, a subclass knows.
 """
 
 import math
@@ -14,12 +14,13 @@ from pymodbus.pdu.register_message import (
     ReadInputRegistersRequest,
     ReadWriteMultipleRegistersRequest,
     WriteMultipleRegistersRequest,
+    WriteSingleRegisterRequest,
 )
 
 from config.device import ModbusDevice
 from config.modbus_map import ModbusMap, Place
 from config.quantities import CommunicationAction
-from drivers.boundary import BadReply, Capabilities, Reading, Refused
+from drivers.boundary import BadReply, Capabilities, NoNumber, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.layout import layout
 from fieldbus.modbus.pdu import encoded
@@ -39,6 +40,8 @@ class ModbusDriver(ABC):
         self._sample = _Sample(config.map)
         self._command = _Setting("command_pa", config.map.command_pa)
         self._exchange_head = _exchange_head(self._sample, config.map.command_pa)
+        self._one_register_at_a_time = False
+        """Whether the device knows function 6 and not 16; known by its first refusal."""
         self._one_transaction = self._sample.table == "holding"  # function 23 reads holding registers only
 
     @abstractmethod
@@ -68,6 +71,7 @@ class ModbusDriver(ABC):
             one_transaction=self._one_transaction,
             device_time=self._config.map.device_time_us is not None,
             sample_counter=self._config.map.sample_counter is not None,
+            counter_range=self._config.map.sample_counter_range,
         )
 
     def open(self) -> float:
@@ -133,8 +137,22 @@ class ModbusDriver(ABC):
         return self._reading(self._ask(request, sample.head_after, sample.length))
 
     def _tell(self, setting: "_Setting", value: float) -> None:
-        request = setting.head + self._data(setting, value)
-        self._ask(request, request[:5], 5)
+        data = self._data(setting, value)
+        if self._one_register_at_a_time and len(data) == 2:
+            self._tell_one_register(setting, data)
+            return
+        request = setting.head + data
+        try:
+            self._ask(request, request[:5], 5)
+        except Refused as refusal:
+            if refusal.code != ExcCodes.ILLEGAL_FUNCTION or len(data) != 2:
+                raise
+            self._tell_one_register(setting, data)
+            self._one_register_at_a_time = True
+
+    def _tell_one_register(self, setting: "_Setting", data: bytes) -> None:
+        request = setting.head_of_one + data
+        self._ask(request, request, len(request))
 
     def _data(self, setting: "_Setting", value: float) -> bytes:
         try:
@@ -146,7 +164,7 @@ class ModbusDriver(ABC):
         values = self._sample.values(data)
         if not all(map(math.isfinite, values)):
             said = ", ".join(f"{name} {value}" for name, value in zip(self._sample.names, values, strict=True))
-            raise BadReply(f"{self._who}: a measurement that is no number: {said}")
+            raise NoNumber(f"{self._who}: a measurement that is no number: {said}")
         return self._sample.reading(values)
 
     def _ask(self, request: bytes, head: bytes, length: int) -> bytes:
@@ -207,6 +225,8 @@ class _Setting:
         nothing = [0] * self._layout.words
         self.head = encoded(WriteMultipleRegistersRequest(address=place.address, registers=nothing))[:6]
         """The request up to its registers."""
+        self.head_of_one = encoded(WriteSingleRegisterRequest(address=place.address, registers=[0]))[:3]
+        """The same of function 6, which writes one register."""
 
     def data(self, value: float) -> bytes:
         """Return the registers that say a value.
@@ -229,4 +249,6 @@ def _question(request: bytes) -> str:
     if function == 23:
         to, words = struct.unpack(">HH", request[5:9])
         return f"function 23, write {words} at {to}, read {count} at {address}"
+    if function == 6:
+        return f"function 6, write 1 at {address}"
     return f"function {function}, {'write' if function == 16 else 'read'} {count} at {address}"

@@ -5,8 +5,13 @@ the next request, and every later one be shifted by one. So the line is closed a
 reply, and `open` first asks for an echo (function 8) of a number that changes each time. A device answers in order:
 once that echo is back, or is refused as an unknown function, everything asked before has been answered or never will
 be, however late it is. What comes before it is thrown away.
+
+Some devices pass over function 8 without a word. One that was never reached and says nothing at all to it is asked by
+two reads instead, of lengths drawn by lot: an answer to an earlier request would not fit both.
 """
 
+import random
+import struct
 import time
 
 from config.device import ModbusRtuDevice
@@ -17,6 +22,7 @@ from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
 
 EXCEPTION_FRAME = 5
+READ_COUNTS = (1, 2, 3, 4)
 ROUND_FRAME = 3
 """Bytes of a frame round its PDU: unit and check sum."""
 
@@ -34,6 +40,8 @@ class ModbusRtuDriver(ModbusDriver):
         self._reply_timeout_s = config.reply_timeout_s
         self._line = SerialLine(config.serial)
         self._echoes = 0
+        self._echoes_back: bool | None = None
+        """Whether the device answers function 8; None until it has answered anything."""
 
     def close(self) -> None:
         """Close the line; the device keeps its last command until its own time-out."""
@@ -42,13 +50,25 @@ class ModbusRtuDriver(ModbusDriver):
     def _connect(self) -> None:
         try:
             self._line.open()
-            self._await_echo()
+            self._await_answers()
         except OSError as error:
             self.close()
             raise NoConnection(f"{self._who}: {error.strerror}") from None
 
-    def _await_echo(self) -> None:
-        """Make sure that no earlier request is still to be answered."""
+    def _await_answers(self) -> None:
+        """Make sure that no earlier request is still to be answered, by what the device answers."""
+        if self._echoes_back is not False:
+            heard = self._await_echo()
+            if heard is None:
+                self._echoes_back = True
+                return
+            if heard or self._echoes_back:
+                raise self._silence(heard)
+        self._await_reads()
+        self._echoes_back = False
+
+    def _await_echo(self) -> bytes | None:
+        """Ask for the echo; return None when it is back or refused, else what was heard instead."""
         self._echoes = (self._echoes + 1) & 0xFFFF
         echo = framed(self._unit, ECHO + self._echoes.to_bytes(2))
         refusal = bytes((self._unit, ECHO[0] | EXCEPTION))
@@ -58,11 +78,25 @@ class ModbusRtuDriver(ModbusDriver):
             heard = (heard + data)[-2 * len(echo) :]
             last = heard[-EXCEPTION_FRAME:]
             if heard.endswith(echo) or (last.startswith(refusal) and is_whole(last)):
-                return
+                return None
             if time.monotonic() > until_s:  # somebody who never stops must not keep us
                 break
+        return heard
+
+    def _await_reads(self) -> None:
+        """Do the same by reads that move nothing, of a device that does not know the echo."""
+        place = self._config.map.position_m
+        function = 3 if place.table == "holding" else 4
+        for count in random.sample(READ_COUNTS, 2):
+            request = struct.pack(">BHH", function, place.address, count)
+            frame = self._answered(framed(self._unit, request), function, 2 + 2 * count + ROUND_FRAME)
+            head = bytes((self._unit, function, 2 * count)), bytes((self._unit, function | EXCEPTION))
+            if not (frame.startswith(head) and is_whole(frame)):
+                raise self._silence(frame)
+
+    def _silence(self, heard: bytes) -> NoConnection:
         said = f" (but {heard.hex(' ')})" if heard else ""
-        raise NoConnection(f"{self._who}: nobody answers within {1e3 * self._reply_timeout_s:g} ms{said}")
+        return NoConnection(f"{self._who}: nobody answers within {1e3 * self._reply_timeout_s:g} ms{said}")
 
     def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
         if not self._line.is_open:

@@ -1,32 +1,38 @@
 """Drives a device on CANopen, all in the thread that calls.
 
-`open` asks who the node is and what it holds, tells it by SDO what its data sheet allows (communication time-out,
-heartbeat, SYNC, PDO mapping), makes it ACTIVE and starts it by NMT (CiA 301, 7.3.2). One cycle is then
+`open` asks by SDO who the node is, what it holds and how it is configured (communication time-out, heartbeat, SYNC, PDO
+mapping), which changes nothing. What is not as wanted it sets in PRE-OPERATIONAL; where the node refuses, all is put
+back. Then it makes the node ACTIVE and starts it by NMT (CiA 301, 7.3.2). One cycle is then
 
     RPDO (command, control word), SYNC  ->  TPDOs (position, pressure, counter, time, status, status word)
 
 What else came since the last cycle (heartbeats, emergencies) is taken in by the next. Whatever cannot be trusted ends
 the connection; the reason begins with a `NodeEvent`. What does not end it is logged under that name. The readings of a
-node that is no actuator carry NOT_READY.
+node that is no actuator carry NOT_READY; so does the first of one that booted or was stopped by another master: that
+is more than a lost sample.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 
 from config.canopen_device import CanopenDevice
 from config.quantities import CommunicationAction, DeviceStatus
-from drivers.boundary import Capabilities, Driver, Reading, Refused
+from drivers.boundary import Capabilities, Driver, DriverError, Reading, Refused
 from drivers.canopen.activation import Activation
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER, NodeBus
 from drivers.canopen.only_watch import WatchingDriver
 from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.readings import capabilities_of, reading_of
-from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, sheet_variable
+from drivers.canopen.sdo import HEARTBEAT_MS, ILLEGAL_VALUE, SdoTransfers, Setting, sheet_variable
 from drivers.canopen.watcher import NodeWatcher
 from fieldbus.canopen.eds import read_eds
 
 START, ENTER_PRE_OPERATIONAL = 1, 128
-SYNC, HEARTBEAT_MS = 0x1005, 0x1017
+SYNC = 0x1005
+DEFAULT_SYNC_ID = 0x80
 
 
 def canopen_driver(config: CanopenDevice) -> Driver:
@@ -74,13 +80,11 @@ class CanopenDriver:
         try:
             own_ids = (first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
             self._bus.open((*own_ids, *self._pdos.tpdo_ids))
-            self._manage(ENTER_PRE_OPERATIONAL)
             self._sdo.open()
             held_pa = self._sdo.held_command_pa(self._config.map.command_pa)
-            self._configure()
-            self._pdos.configure(self._sdo)
-            self._activation.activate(self._sdo)
+            wanted = self._wanted()
             self._sdo.require_alone()
+            self._set(wanted)
             self._manage(START)
         except BaseException:
             self.close()
@@ -95,7 +99,11 @@ class CanopenDriver:
             DriverError: none came that can be trusted.
         """
         self._pdos.catch_up()
-        return self._reading(self._pdos.sample())
+        reading = self._reading(self._pdos.sample())
+        if self._watcher.was_interrupted:
+            self._watcher.was_interrupted = False
+            return replace(reading, status=reading.status | DeviceStatus.NOT_READY)
+        return reading
 
     def write(self, command_pa: float) -> None:
         """Command a pressure; raises as `exchange`."""
@@ -127,15 +135,42 @@ class CanopenDriver:
     def _manage(self, command: int) -> None:
         self._bus.send(NMT, bytes((command, self._config.node)))
 
-    def _configure(self) -> None:
+    def _wanted(self) -> list[Setting]:
+        """Return what must be set, in order: what the node has already is left alone."""
+        config, objects, sdo = self._config, self._config.map, self._sdo
+        wanted: list[Setting] = []
         # The action first: a time-out must never start with another's action.
-        config, objects = self._config, self._config.map
-        if objects.communication_action:
-            self._sdo.set(objects.communication_action, CommunicationAction[config.communication_action.upper()])
-        if objects.communication_timeout_s:
-            self._sdo.set(objects.communication_timeout_s, config.communication_timeout_s)
-        self._sdo.download(HEARTBEAT_MS, 0, round(1e3 * config.heartbeat_s))
-        self._sdo.download(SYNC, 0, config.sync_cob_id)
+        if entry := objects.communication_action:
+            action = CommunicationAction[config.communication_action.upper()]
+            wanted.append(Setting(entry.index, entry.subindex, entry.raw(action)))
+        if entry := objects.communication_timeout_s:
+            wanted.append(Setting(entry.index, entry.subindex, entry.raw(config.communication_timeout_s)))
+        self._watcher.heartbeat_timeout_s = config.heartbeat_timeout_s
+        if sdo.has(HEARTBEAT_MS):
+            wanted.append(Setting(HEARTBEAT_MS, 0, round(1e3 * config.heartbeat_s)))
+        else:  # that it lives, its TPDOs show
+            self._watcher.heartbeat_timeout_s = math.inf
+        if sdo.has(SYNC) or config.sync_cob_id != DEFAULT_SYNC_ID:
+            wanted.append(Setting(SYNC, 0, config.sync_cob_id))
+        return [each for each in wanted if not sdo.holds(each)] + self._pdos.wanted(sdo)
+
+    def _set(self, wanted: Sequence[Setting]) -> None:
+        """Set it and make the node ACTIVE, or put back what was set and raise as `SdoTransfers.download`."""
+        was_operational = bool(wanted) and self._sdo.hears_operational()
+        self._sdo.begin()
+        try:
+            if wanted:
+                self._manage(ENTER_PRE_OPERATIONAL)
+            for each in wanted:
+                self._sdo.download(*each)
+            self._activation.activate(self._sdo)
+            self._sdo.require_alone()
+        except BaseException:
+            self._sdo.put_back()
+            if was_operational:
+                with suppress(DriverError):
+                    self._manage(START)
+            raise
 
     def _reading(self, values: Mapping[str, float]) -> Reading:
         if "status_word" not in values:

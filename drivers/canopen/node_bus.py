@@ -110,7 +110,9 @@ class NodeBus:
 
     def fault(self, kind: type[DriverError], event: NodeEvent, text: str) -> DriverError:
         """Return an error that names the node, the event, and what is known of it."""
-        return kind(f"{self.who}: {event}: {text}")
+        error = kind(f"{self.who}: {event}: {text}")
+        error.kind = event
+        return error
 
     def closing_fault(self, kind: type[DriverError], event: NodeEvent, text: str) -> DriverError:
         """Leave the bus, on which nothing can be trusted any more; return the error."""

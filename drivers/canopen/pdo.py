@@ -17,10 +17,10 @@ from canopen.objectdictionary import ObjectDictionary, ODVariable
 
 from config.canopen_device import CanopenDevice, Entry
 from config.errors import InputError
-from drivers.boundary import BadReply, NoReply
+from drivers.boundary import BadReply, NoNumber, NoReply
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import NodeBus
-from drivers.canopen.sdo import REALS, SdoTransfers, sheet_variable
+from drivers.canopen.sdo import REALS, SdoTransfers, Setting, sheet_variable
 from drivers.canopen.watcher import NodeWatcher
 from fieldbus.canopen.objects import MOST_PDOS, Control, first_fit
 
@@ -72,15 +72,16 @@ class Pdo:
         except (struct.error, OverflowError):
             raise ValueError(f"{command_pa:g} does not fit") from None
 
-    def configure(self, sdo: SdoTransfers) -> None:
-        """Tell the node; raises as `SdoTransfers.download`."""
-        sdo.download(self.record, 1, self.cob_id | INVALID)
-        sdo.download(self.record, 2, EACH_SYNC)
-        sdo.download(self.record + MAPPING, 0, 0)
-        for n, mapped in enumerate(self.mapping, 1):
-            sdo.download(self.record + MAPPING, n, mapped)
-        sdo.download(self.record + MAPPING, 0, len(self.mapping))
-        sdo.download(self.record, 1, self.cob_id)
+    def wanted(self, sdo: SdoTransfers) -> list[Setting]:
+        """Return what to set, in order; nothing where the node's PDO is so already. Raises as `SdoTransfers.upload`."""
+        mapped = self.record + MAPPING
+        mapping = [Setting(mapped, n, each) for n, each in enumerate(self.mapping, 1)]
+        valid, kind = Setting(self.record, 1, self.cob_id), Setting(self.record, 2, EACH_SYNC)
+        whole = Setting(mapped, 0, len(mapping))
+        if all(map(sdo.holds, (valid, kind, whole, *mapping))):
+            return []
+        invalid, empty = Setting(self.record, 1, self.cob_id | INVALID), Setting(mapped, 0, 0)
+        return [invalid, kind, empty, *mapping, whole, valid]
 
 
 class PdoExchange:
@@ -117,13 +118,17 @@ class PdoExchange:
         """The arbitration ids of the TPDOs in use."""
         return tuple(self._tpdos)
 
-    def configure(self, sdo: SdoTransfers) -> None:
-        """Tell the node what its PDOs carry; those not needed become invalid. Raises as `SdoTransfers.download`."""
-        for pdo in (self._rpdo, *self._tpdos.values()):
-            pdo.configure(sdo)
+    def wanted(self, sdo: SdoTransfers) -> list[Setting]:
+        """Return what must be set, in order, for the PDOs to carry this; those not needed become invalid.
+
+        Raises:
+            DriverError: as `SdoTransfers.upload`.
+        """
+        wanted = [each for pdo in (self._rpdo, *self._tpdos.values()) for each in pdo.wanted(sdo)]
         for n in range(len(self._tpdos), MOST_PDOS):
-            if TPDO + n in self._sheet:
-                sdo.download(TPDO + n, 1, self._tpdo_id(n) | INVALID)
+            if TPDO + n in self._sheet and not int(sdo.upload(TPDO + n, 1)) & INVALID:
+                wanted.append(Setting(TPDO + n, 1, self._tpdo_id(n) | INVALID))
+        return wanted
 
     def prepare(self, command_pa: float, control: Control) -> None:
         """Set the command that `send` sends.
@@ -162,7 +167,8 @@ class PdoExchange:
 
         Raises:
             NoReply: TPDOs are missing after the reply time-out, or heartbeats are.
-            BadReply: a TPDO too short or twice, or a number that is none.
+            BadReply: a TPDO too short or twice.
+            NoNumber: a quantity is none.
             NoConnection: the node is lost.
         """
         self._bus.put(self._sync)
@@ -170,7 +176,7 @@ class PdoExchange:
         self._watcher.require_heartbeat()
         if not all(map(math.isfinite, values.values())):
             said = ", ".join(f"{name} {value}" for name, value in values.items())
-            raise BadReply(f"{self._bus.who}: a measurement that is no number: {said}")
+            raise NoNumber(f"{self._bus.who}: a measurement that is no number: {said}")
         return values
 
     def _received(self) -> dict[str, float]:

@@ -12,7 +12,8 @@ import math
 import random
 import struct
 import time
-from typing import Any
+from contextlib import suppress
+from typing import Any, NamedTuple
 
 from canopen.objectdictionary import ObjectDictionary, ODVariable
 from canopen.sdo.client import SdoClient
@@ -23,11 +24,15 @@ from config.errors import InputError
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, SDO_REQUEST, NodeBus
-from drivers.canopen.watcher import NodeWatcher
+from drivers.canopen.watcher import NMT_STATES, OPERATIONAL, PRE_OPERATIONAL, NodeWatcher
 
 ILLEGAL_VALUE = 3
 """The code of `Refused` for a value that the device cannot be told, as Modbus has it."""
 IDENTITY, VENDOR, PRODUCT = 0x1018, 1, 2
+HEARTBEAT_MS = 0x1017
+LONGEST_LISTENING_S = 1.0
+"""For a heartbeat."""
+NO_SUCH_OBJECT = 0x06020000
 RESERVED = range(0x0400, 0x1000)
 """Indices at which CiA 301 lets no node have an object."""
 UNNAMED = bytes(3)
@@ -53,6 +58,15 @@ def sheet_variable(sheet: ObjectDictionary, config: CanopenDevice, name: str, en
     return found
 
 
+class Setting(NamedTuple):
+    """A number for an object."""
+
+    at: int
+    """Index of the object."""
+    subindex: int
+    value: float
+
+
 class SdoTransfers:
     """Reads and writes a node's objects.
 
@@ -70,6 +84,8 @@ class SdoTransfers:
         self._request_id, self._answer_id = SDO_REQUEST + bus.node, SDO_ANSWER + bus.node
         self._client = _Client(self, self._request_id, self._answer_id, sheet)
         self._requests = self._answers = 0
+        self._before: list[tuple[int, int, bytes]] = []
+        """What objects held before they were written, in order."""
 
     def open(self) -> None:
         """Find the node, and hold it against its data sheet.
@@ -80,6 +96,7 @@ class SdoTransfers:
             DriverError: it did not say who it is.
         """
         self._requests = self._answers = 0
+        self._watcher.state = None
         self._pass_over_late_answers()
         self._identify()
 
@@ -110,18 +127,68 @@ class SdoTransfers:
             NoReply: no answer within the reply time-out.
             BadReply: the data sheet has no such object.
         """
+        data = self._encoded(index, subindex, value)
+        try:
+            before = self._client.upload(index, subindex)
+            self._client.download(index, subindex, data)
+        except (SdoAbortedError, SdoCommunicationError) as error:
+            raise self._fault(error, index, subindex) from None
+        self._before.append((index, subindex, bytes(before)))
+
+    def has(self, index: int) -> bool:
+        """Return whether data sheet and node have an object; raises as `upload`."""
+        if self._sheet.get_variable(index) is None:
+            return False
+        try:
+            self.upload(index)
+        except Refused as refusal:
+            if refusal.code != NO_SUCH_OBJECT:
+                raise
+            return False
+        return True
+
+    def holds(self, setting: Setting) -> bool:
+        """Return whether an object has a number already; raises as `upload` and `download`."""
+        index, subindex, value = setting
+        data = self._encoded(index, subindex, value)
+        try:
+            return bytes(self._client.upload(index, subindex)) == data
+        except SdoAbortedError:
+            return False  # some mappings cannot be read beyond their length
+        except SdoCommunicationError as error:
+            raise self._fault(error, index, subindex) from None
+
+    def begin(self) -> None:
+        """Note what `put_back` puts back from now on."""
+        self._before.clear()
+
+    def put_back(self) -> None:
+        """Write what was written back to what it was, as far as the node lets us. Never raises."""
+        while self._before:
+            with suppress(SdoAbortedError, SdoCommunicationError, DriverError):
+                self._client.download(*self._before.pop())
+
+    def hears_operational(self) -> bool:
+        """Return whether the node's heartbeat says OPERATIONAL; False of one that has none.
+
+        Raises:
+            DriverError: as `upload`.
+        """
+        period_s = 1e-3 * self.upload(HEARTBEAT_MS) if self.has(HEARTBEAT_MS) else 0.0
+        end_s = time.monotonic() + min(1.5 * period_s, LONGEST_LISTENING_S)
+        while self._watcher.state is None and (rest_s := end_s - time.monotonic()) > 0:
+            self._receive(rest_s)
+        return self._watcher.state == OPERATIONAL
+
+    def _encoded(self, index: int, subindex: int, value: float) -> bytes:
         variable = self._sheet.get_variable(index, subindex)
         if variable is None:
             raise self._bus.fault(BadReply, NodeEvent.WRONG_EDS, f"it has no object {index:#06x} sub {subindex}")
         try:
-            data = variable.encode_raw(value if variable.data_type in REALS else round(value))
+            return bytes(variable.encode_raw(value if variable.data_type in REALS else round(value)))
         except (ValueError, OverflowError):
             said = f"{self._bus.who}: {value} does not fit {index:#06x} sub {subindex}"
             raise Refused(said, ILLEGAL_VALUE) from None
-        try:
-            self._client.download(index, subindex, bytes(data))
-        except (SdoAbortedError, SdoCommunicationError) as error:
-            raise self._fault(error, index, subindex) from None
 
     def get(self, entry: Entry) -> float:
         """Return a quantity, in the map's unit; raises as `upload`."""
@@ -151,7 +218,7 @@ class SdoTransfers:
         """
         while (message := self._bus.receive(0.0)) is not None:
             self._answers += message.arbitration_id == self._answer_id
-            self._watcher.consume_emergency(message)
+            self._watcher.note(message)
         if self._answers > self._requests:
             said = f"{self._answers} answers to {self._requests} SDO requests"
             raise self._bus.fault(BadReply, NodeEvent.NODE_ID_TAKEN, said)
@@ -195,7 +262,7 @@ class SdoTransfers:
             return None
         if message.arbitration_id == self._answer_id and len(message.data) == 8:
             return bytes(message.data)
-        self._watcher.consume_emergency(message)
+        self._watcher.note(message)
         return None
 
     def _pass_over_late_answers(self) -> None:
@@ -211,6 +278,10 @@ class SdoTransfers:
             answer = self._receive(rest_s)
             if answer is not None and answer[0] == ABORT and answer[1:4] in (multiplexer, UNNAMED):
                 return
+        state = self._watcher.state
+        if state is not None and state not in (OPERATIONAL, PRE_OPERATIONAL):
+            said = f"its heartbeat says {NMT_STATES.get(state, str(state))}; it is left so, for another master to start"
+            raise self._bus.fault(NoConnection, NodeEvent.NOT_OPERATIONAL, said)
         raise NoConnection(f"{self._bus.who}: {NodeEvent.NO_NODE} within {1e3 * self._timeout_s:g} ms")
 
     def _identify(self) -> None:

@@ -19,7 +19,7 @@ from drivers.boundary import NoConnection, NoReply
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NodeBus
 
-OPERATIONAL, BOOT_UP = 5, 0
+OPERATIONAL, PRE_OPERATIONAL, BOOT_UP = 5, 127, 0
 NMT_STATES = {0: "booting", 4: "STOPPED", 5: "OPERATIONAL", 127: "PRE-OPERATIONAL"}
 COMMAND_OUT_OF_RANGE = 0x6320
 EMERGENCIES = {
@@ -67,10 +67,15 @@ class NodeWatcher:
 
     def __init__(self, config: CanopenDevice, bus: NodeBus) -> None:
         self._bus = bus
-        self._heartbeat_timeout_s = config.heartbeat_timeout_s
+        self.heartbeat_timeout_s = config.heartbeat_timeout_s
+        """Silence after which the node is gone; infinite of one that has no heartbeat."""
         self._heartbeat_id, self._emergency_id = HEARTBEAT + bus.node, EMERGENCY + bus.node
         self._heard_s = -math.inf
         self._was_operational = False
+        self.state: int | None = None
+        """What its heartbeat said last while it was being opened."""
+        self.was_interrupted = False
+        """Whether it booted or was stopped since this was last set to False."""
         self.refusal: str | None = None
         """Why the node refused a command since this was last set to None."""
 
@@ -82,7 +87,7 @@ class NodeWatcher:
     @property
     def is_silent(self) -> bool:
         """Whether heartbeats have been missing for longer than the time-out."""
-        return self.silence_s > self._heartbeat_timeout_s
+        return self.silence_s > self.heartbeat_timeout_s
 
     def begin(self) -> None:
         """The node was just started: its heartbeats count from now on."""
@@ -99,6 +104,11 @@ class NodeWatcher:
             self.refusal = cause_of(code) if code == COMMAND_OUT_OF_RANGE else self.refusal
         elif message.arbitration_id == self._heartbeat_id and len(message.data) == 1:
             self._consume_heartbeat(message.data[0] & 0x7F)
+
+    def note(self, message: can.Message) -> None:
+        """Take in a frame while the node is not driven yet, whatever its state."""
+        if self.consume_emergency(message) is None and message.arbitration_id == self._heartbeat_id and message.data:
+            self.state = message.data[0] & 0x7F
 
     def consume_emergency(self, message: can.Message) -> int | None:
         """Log an emergency with its cause; return its code, None if the frame is something else."""
@@ -123,9 +133,11 @@ class NodeWatcher:
         self._heard_s = time.monotonic()
         if state == BOOT_UP:
             said = "it booted, and must be configured anew"
+            self.was_interrupted = True
             raise self._bus.closing_fault(NoConnection, NodeEvent.NODE_RESTARTED, said)
         # One that left before the node was started may come after; a node that was not started sends no TPDO.
         self._was_operational |= state == OPERATIONAL
         if state != OPERATIONAL and self._was_operational:
             said = f"its heartbeat says {NMT_STATES.get(state, str(state))}"
+            self.was_interrupted = True
             raise self._bus.closing_fault(NoConnection, NodeEvent.NOT_OPERATIONAL, said)

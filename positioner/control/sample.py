@@ -19,4 +19,6 @@ class Sample:
     status: int = 0
     """The device's own bits, `DeviceStatus`; 0 is healthy."""
     held_pa: float | None = None
-    """The command the device held, when the connection was made anew in this cycle."""
+    """The command the device held, when it was looked at anew and not commanded in this cycle."""
+    unattended_s: float = 0.0
+    """For how long the daemon had not commanded the device, where that was too long; 0 otherwise."""

@@ -66,7 +66,8 @@ class Settings:
                 lost_after_cycles=safety.lost_after_cycles,
                 stale_after_s=safety.stale_after_s,
                 heartbeat_timeout_s=safety.heartbeat_timeout_s,
-                restart_tolerance_pa=1e-3 * file.pressure.maximum_pa,
+                # A device may round the command that it is told to its own digits.
+                restart_tolerance_pa=max(1e-3 * file.pressure.maximum_pa, file.device.command_step_pa),
                 action=safety.action,
                 heartbeat_action=safety.heartbeat_action,
             ),

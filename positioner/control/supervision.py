@@ -1,4 +1,4 @@
-"""Supervision: is the measurement fresh and plausible, does the DCS live, who commands?
+"""Supervision: did the daemon run, is the measurement fresh and plausible, does the DCS live, who commands?
 
 It knows nothing of the law. A fault is latched: the mode falls to hold, the safe action commands, and only an
 acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again.
@@ -66,7 +66,7 @@ def supervise(
 ) -> SupervisionMemory:
     """Return what is known after this sample; `command_pa` is the last command given."""
     good = usable(sample, limits)
-    bad = sample.quality is Quality.LOST or (sample.quality is Quality.GOOD and not good)
+    bad = not good and sample.quality is not Quality.REPEATED
     first = math.isinf(memory.good_s)
     alive = first or requests.heartbeats != memory.heartbeats
     bad_in_a_row = memory.bad_in_a_row + 1 if bad else 0
@@ -98,6 +98,8 @@ def supervise(
 
 
 def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s: float, limits: Limits) -> Fault:
+    if sample.unattended_s > 0:
+        return Fault.STALLED
     held_pa = sample.held_pa
     if held_pa is not None and all(abs(held_pa - each) > limits.restart_tolerance_pa for each in given_pa):
         return Fault.RESTARTED
@@ -105,7 +107,10 @@ def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s
         return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE
     if sample.quality is not Quality.LOST and sample.status & UNFIT_STATUS:
         return Fault.DEVICE
-    return Fault.STALE if age_s > limits.stale_after_s else Fault.NONE
+    if age_s > limits.stale_after_s:  # on a slow line sooner than so many cycles
+        by_quality = {Quality.LOST: Fault.NO_REPLY, Quality.NO_NUMBER: Fault.IMPLAUSIBLE}
+        return by_quality.get(sample.quality, Fault.STALE)
+    return Fault.NONE
 
 
 def _mode(memory: SupervisionMemory, requests: Requests, fault: Fault) -> Mode:

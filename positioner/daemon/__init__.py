@@ -3,8 +3,9 @@
 One blocking thread owns the driver and runs `cycle`; the supervisory server and the recorder have threads of their
 own. They meet only in immutable snapshots that are replaced whole: the cycle waits for nobody.
 
-    service                       assembles it from its file, starts and ends it
+    service, ending               assembles it from its file, starts and ends it; what ends it
     cycle, pacing, link           one cycle, when it begins, and the driver with its connection
+    backoff                       when to try again what failed, and what to say of it
     snapshot                      what a cycle leaves for the others
     supervisory_registers         what the DCS reads and writes
     refinement_process            fits in a process of its own

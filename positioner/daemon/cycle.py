@@ -58,6 +58,7 @@ class Cycle:
         """Make the calling thread, which takes the turns, as punctual as can be."""
         with logging_valve(self._valve):
             self._pace.prepare()
+            self.link.begin()
 
     def turn(self) -> None:
         """Wait until the next cycle is due and run it."""
@@ -66,6 +67,10 @@ class Cycle:
             started_s = time.monotonic()
             self.once()
             self.statistics.enter(started_s, time.monotonic() - started_s, missed)
+
+    def since_s(self, snapshot: Snapshot) -> float:
+        """Return how long ago a snapshot was made. Called by any thread."""
+        return self._pace.since_s(snapshot.sample.now_s)
 
     def once(self) -> None:
         """Run one cycle."""
@@ -78,7 +83,9 @@ class Cycle:
         sample = self.link.exchange(sent_pa)
         decision = self._controller.step(sample, self.requests)
         if self.recorder is not None and sample.quality is Quality.GOOD:
-            in_force_pa = self._pace.in_force_pa(sent_pa, decision.command_pa)
+            # A device that was only looked at has got nothing.
+            given_pa = sent_pa if sample.held_pa is None else sample.held_pa
+            in_force_pa = self._pace.in_force_pa(given_pa, decision.command_pa)
             self.recorder.offer(_row(sample, decision, in_force_pa, self.link.counts.lost_samples))
         if self.health is not None:
             self.health.enter(sample, decision, self.requests)

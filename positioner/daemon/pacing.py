@@ -43,6 +43,10 @@ class Pace(Protocol):
         """Return the time of this cycle; `device_time_s` is that of its measurement, None without one."""
         ...
 
+    def since_s(self, now_s: float) -> float:
+        """Return how long ago a cycle was that began at `now_s`. Called by any thread."""
+        ...
+
     def in_force_pa(self, sent_pa: float, decided_pa: float) -> float:
         """Return which command acts from a sample on: the one sent with it, or the one decided on it."""
         ...
@@ -92,6 +96,10 @@ class RealTimePace:
         """Return the gateway's monotonic time."""
         return time.monotonic()
 
+    def since_s(self, now_s: float) -> float:
+        """Return how long ago that was."""
+        return max(0.0, time.monotonic() - now_s)
+
     def in_force_pa(self, sent_pa: float, decided_pa: float) -> float:  # noqa: ARG002 - it leaves with the next exchange
         """Return the command that travelled with the sample: it acts until the next exchange."""
         return sent_pa
@@ -119,6 +127,10 @@ class DevicePace:
         if device_time_s is not None:
             self._now_s = device_time_s
         return self._now_s
+
+    def since_s(self, now_s: float) -> float:  # noqa: ARG002 - no time passes between two cycles
+        """Return 0: the device's clock waits for the cycle."""
+        return 0.0
 
     def in_force_pa(self, sent_pa: float, decided_pa: float) -> float:  # noqa: ARG002 - its period is over
         """Return the decided command: the device stands still until it gets it."""

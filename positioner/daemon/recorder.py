@@ -2,8 +2,9 @@
 
 The cycle offers rows to a bounded queue and goes on. A thread writes them in whole lines, four times a second in one
 system call, and every second makes sure that they are on the disk: a crash costs that second at the most. A full
-file is followed by a new one, the oldest beyond a number is deleted. A row that finds the queue full is counted,
-and the column `unrecorded` of the next row says how many are missing before it.
+file is followed by a new one, the oldest beyond a number is deleted; which is older, the number at the end of the
+name says, for a clock may be set back. Where no new file can be begun, recording goes on in the old one. A row that
+finds the queue full is counted, and the column `unrecorded` of the next row says how many are missing before it.
 """
 
 import errno
@@ -12,6 +13,7 @@ import os
 import re
 from collections import deque
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from threading import Event, Thread
 
@@ -50,9 +52,9 @@ class Recorder:
         self._waiting: deque[tuple[Row, int]] = deque()
         self._stopping = Event()
         self._thread = Thread(target=self._work, name="recorder", daemon=True)
+        self._valve = " ".join(name.split())
         self._file = -1
         self._room = 0
-        self._number = 0
 
     def start(self) -> None:
         """Make the folder and begin to record.
@@ -102,10 +104,8 @@ class Recorder:
         os.close(self._file)
 
     def _write_waiting(self) -> None:
-        if self._room <= 0:
-            os.fsync(self._file)
-            os.close(self._file)
-            self._open_next()
+        if self._room <= 0 and self._waiting:
+            self._rotate()
         batch = [self._waiting.popleft() for _ in range(len(self._waiting))]
         data = "".join(_line(*each) for each in batch).encode()
         try:
@@ -122,17 +122,41 @@ class Recorder:
             os.ftruncate(self._file, os.lseek(self._file, 0, os.SEEK_END) - written)
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
+    def _rotate(self) -> None:
+        """Go on in a new file; in the old one if there can be none yet, and try again after another part of a file."""
+        before = self._file
+        try:
+            self._open_next()
+        except OSError as error:
+            self._room = max(self._file_bytes // 10, 1)
+            log_event(log, logging.ERROR, "no new recording", folder=str(self._folder), reason=error.strerror)
+            return
+        os.fsync(before)
+        os.close(before)
+
     def _open_next(self) -> None:
+        """Begin a file, and delete the oldest beyond those to keep."""
         now = datetime.now(UTC)
-        stamp = now.strftime("%Y%m%dT%H%M%SZ")
-        self._number += 1
-        path = self._folder / f"{self._stem}-{stamp}-{self._number:04d}.csv"
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
-        header = f"# valve: {self._stem}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{','.join(COLUMNS)}\n".encode()
-        self._room = self._file_bytes - os.write(self._file, header)
-        for old in _files(self._folder, self._stem)[: -self._keep_files]:
-            old.unlink()
+        header = f"# valve: {self._valve}\n# recorded: {now:%Y-%m-%dT%H:%M:%SZ}\n{','.join(COLUMNS)}\n".encode()
+        others = _files(self._folder, self._stem)
+        number = _number(others[-1]) + 1 if others else 1
+        path = self._folder / f"{self._stem}-{now:%Y%m%dT%H%M%SZ}-{number:04d}.csv"
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        try:
+            written = os.write(file, header)
+            if written < len(header):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError:
+            os.close(file)
+            path.unlink(missing_ok=True)
+            raise
+        self._file, self._room = file, self._file_bytes - written
         log_event(log, logging.INFO, "recording", file=str(path))
+        for old in others[: max(len(others) + 1 - self._keep_files, 0)]:
+            try:
+                old.unlink(missing_ok=True)
+            except OSError as error:
+                log_event(log, logging.WARNING, "old recording stays", file=str(old), reason=error.strerror)
 
 
 def files_of(folder: Path, name: str) -> list[Path]:
@@ -143,11 +167,22 @@ def files_of(folder: Path, name: str) -> list[Path]:
 def _files(folder: Path, stem: str) -> list[Path]:
     # By its whole name: a valve FV-1 must not take what belongs to a valve FV-1-A.
     mine = re.compile(re.escape(stem) + r"-\d{8}T\d{6}Z-\d+\.csv")
-    return sorted(each for each in folder.iterdir() if mine.fullmatch(each.name))
+    return sorted(
+        (each for each in folder.iterdir() if mine.fullmatch(each.name)), key=lambda each: (_number(each), each)
+    )
+
+
+def _number(file: Path) -> int:
+    """Return the running number of a recording."""
+    return int(file.stem.rpartition("-")[2])
 
 
 def _stem(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)
+    """Return what the names of a valve's files begin with: no two valves have the same."""
+    plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name)
+    if plain == name:
+        return name
+    return f"{plain.strip('-') or 'valve'}-{sha256(name.encode()).hexdigest()[:8]}"
 
 
 def _line(row: Row, unrecorded: int) -> str:

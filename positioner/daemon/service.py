@@ -1,11 +1,10 @@
 """The daemon, assembled: `positioner run`.
 
-Start: connect, hold the pressure the device has, look whether its measurement can be true, then serve. End (SIGTERM,
-Ctrl-C, or a cycle that failed): leave each valve in its configured safe state, finish the recordings, stop serving.
+Start: connect, hold the pressure the device has, look whether its measurement can be true, then serve. End (a signal,
+or a thread that died): stop serving, leave each valve in its configured safe state, finish the recordings.
 """
 
 import logging
-import signal
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from positioner.control.controller import Controller
 from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle, run_in_turn
+from positioner.daemon.ending import Endings
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth
 from positioner.daemon.link import Link
 from positioner.daemon.logs import log_event, logging_valve, start_logging
@@ -71,7 +71,10 @@ class ServedValve:
     def leave(self) -> None:
         """Give the device the command of the safe action."""
         with logging_valve(self.name):
-            self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.left_pa))
+            try:
+                self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.left_pa))
+            except Exception:  # a driver that is not ours must not keep the other valves from theirs
+                log.exception("the valve could not be left as configured")
 
 
 def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[ExtendedValve | None]) -> int:
@@ -87,10 +90,9 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
     Raises:
         InputError: a device is not there or not as described, a port is taken, recordings cannot be written.
     """
-    ended: list[int] = []  # not an Event: a handler that sets one may deadlock with the wait it interrupts
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda number, _frame: ended.append(number))
+    endings = Endings()
     with ExitStack() as on_exit:
+        on_exit.callback(start_logging(files[0].log.level).stop)
         refinement = RefinementProcess()
         on_exit.callback(refinement.stop)
         paced = zip(files, extended, _paces(files), strict=True)
@@ -103,18 +105,19 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
         for recorder in [valve.recorder for valve in valves if valve.recorder is not None]:
             recorder.start()
             on_exit.callback(recorder.stop)
-        on_exit.callback(start_logging(files[0].log.level).stop)
         for valve in valves:
             _announce(valve, server.port)
             for keeper in valve.keepers:
                 keeper.start()
                 on_exit.callback(keeper.stop)
-        print(f"serving {', '.join(valve.name for valve in valves)} on {server.address}", flush=True)
-        status = _run(valves, ended)
-        for valve in valves:
-            valve.leave()
-        log_event(log, logging.INFO, "stopped", status=status)
-    return status
+        try:
+            print(f"serving {', '.join(valve.name for valve in valves)} on {server.address}", flush=True)
+            _run(valves, server, endings)
+        finally:
+            for valve in valves:
+                valve.leave()
+        log_event(log, logging.INFO, "stopped", status=endings.status, reason=endings.reason)
+    return endings.status
 
 
 def _assembled(
@@ -127,7 +130,7 @@ def _assembled(
     refinement: RefinementProcess,
 ) -> ServedValve:
     settings = Settings.of(file, extended)
-    link = Link(driver_for(file.device), pace)
+    link = Link(driver_for(file.device), pace, file.longest_unattended_s)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
     unreachable_reason = None
@@ -187,32 +190,28 @@ def _announce(valve: ServedValve, port: int) -> None:
             log_event(log, logging.WARNING, "device is not there", reason=valve.unreachable_reason)
 
 
-def _run(valves: Sequence[ServedValve], ended: list[int]) -> int:
-    """Run the cycles until a signal ends them, or until one fails; return the exit status.
+def _run(valves: Sequence[ServedValve], server: RegisterServer, endings: Endings) -> None:
+    """Run the cycles until something ends the daemon; nobody is served any more once they stop.
 
     Each has a thread of its own, save that valves on one line share that line's.
     """
-    stop, failures = Event(), list[Exception]()
-
-    def work(cycles: Sequence[Cycle]) -> None:
-        try:
-            run_in_turn(cycles, stop)
-        except Exception as error:
-            log.exception("the cycle failed")
-            failures.append(error)
-
+    stop = Event()
     threads = [
-        Thread(target=work, args=([valve.cycle for valve in together],), name=f"cycle of {together[0].name}")
+        Thread(
+            target=run_in_turn, args=([valve.cycle for valve in together], stop), name=f"cycle of {together[0].name}"
+        )
         for together in _by_line(valves)
     ]
     for thread in threads:
         thread.start()
-    while not (ended or failures):
-        threads[0].join(SIGNAL_CHECK_S)
-    stop.set()
-    for thread in threads:
-        thread.join()
-    return 1 if failures else 0
+    try:
+        while not endings.came:
+            threads[0].join(SIGNAL_CHECK_S)
+    finally:
+        server.stop()
+        stop.set()
+        for thread in threads:
+            thread.join()
 
 
 def _by_line(valves: Sequence[ServedValve]) -> list[list[ServedValve]]:

@@ -19,7 +19,7 @@ from importlib.metadata import version
 
 from pymodbus.constants import ExcCodes
 
-from config.codes import Fault, Mode
+from config.codes import Fault, Mode, Quality
 from config.registers import (
     BY_NAME,
     ESTIMATED,
@@ -204,7 +204,7 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     """Return, by register, what it serves of a snapshot."""
     getters = {
         **_command_getters(stroke_m),
-        **_status_getters(stroke_m),
+        **_status_getters(cycle, stroke_m),
         **_estimate_getters(stroke_m),
         **_statistics_getters(cycle),
         **_identity_getters(),
@@ -235,11 +235,16 @@ def _command_getters(stroke_m: float) -> dict[str, Getter]:
     }
 
 
-def _status_getters(stroke_m: float) -> dict[str, Getter]:
+def _status_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
+    def quality(snapshot: Snapshot, _: Requests) -> float:
+        # Of a cycle that stands still nothing is good any more.
+        stands = cycle.since_s(snapshot) > cycle.link.longest_unattended_s
+        return Quality.LOST if stands else snapshot.sample.quality
+
     return {
         "state": lambda s, _: s.decision.state,
         "fault": lambda s, _: s.decision.fault,
-        "quality": lambda s, _: s.sample.quality,
+        "quality": quality,
         "why": lambda s, _: s.decision.inhibit_reason,
         "position": lambda s, _: s.sample.position_m / stroke_m,
         "position_scaled": lambda s, _: SCALE * s.sample.position_m / stroke_m,
@@ -248,7 +253,7 @@ def _status_getters(stroke_m: float) -> dict[str, Getter]:
         "pressure": lambda s, _: s.sample.pressure_pa,
         "command": lambda s, _: s.decision.command_pa,
         "delta_r": lambda s, _: s.decision.delta_r_m / stroke_m,
-        "sample_age": lambda s, _: s.decision.sample_age_s,
+        "sample_age": lambda s, _: s.decision.sample_age_s + cycle.since_s(s),
         "reference_in_force": lambda s, _: s.decision.reference_m / stroke_m,
         "restored": lambda s, _: s.decision.restoration.trust,
         "restored_agreed": lambda s, _: s.decision.restoration.ups + s.decision.restoration.downs,

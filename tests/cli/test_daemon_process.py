@@ -72,6 +72,9 @@ def lone_slave(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
         (signal.SIGINT, "hold", 24000.0),
         (signal.SIGTERM, "vent", 0.0),
         (signal.SIGINT, "fill", 420e3),
+        (signal.SIGHUP, "vent", 0.0),
+        (signal.SIGQUIT, "fill", 420e3),
+        (signal.SIGUSR1, "vent", 0.0),
     ],
 )
 def test_the_end_leaves_the_valve_in_the_safe_state(
@@ -87,6 +90,31 @@ def test_the_end_leaves_the_valve_in_the_safe_state(
     assert "Traceback" not in log
     with watcher(lone_slave) as after:
         assert after.open() == pytest.approx(left_pa), "what it was commanded last"
+
+
+def test_a_daemon_that_was_stopped_finds_what_the_device_did_and_does_not_undo_it(tmp_path: Path) -> None:
+    """In automatic, stopped for longer than the device's time-out: the device has vented, and stays so."""
+    device = 'communication_timeout_s = 0.4\ncommunication_action = "vent"\n'
+    with (
+        running("sim", slave_file(tmp_path), "--port", "0") as slave,
+        child("run", daemon_file(tmp_path, port_in(slave), device=PATIENT + device)) as (daemon, ready),
+        Dcs("127.0.0.1", port_in(ready)) as dcs,
+        watcher(port_in(slave)) as eye,
+    ):
+        dcs.set("mode", Mode.AUTOMATIC)
+        dcs.set("reference", 0.5)
+        until(lambda: abs(dcs.get("position") - 0.5) < 0.01, "the stem at the reference")
+        daemon.signal(signal.SIGSTOP)
+        until(lambda: eye.read().position_m < 0.4 * 0.1016, "the device's own time-out")
+        daemon.signal(signal.SIGCONT)
+        until(lambda: dcs.get("fault") == Fault.STALLED, "the fault")
+        assert dcs.get_all("mode", "command") == {"mode": Mode.HOLD, "command": 0.0}
+        cycles = dcs.get("cycles")
+        until(lambda: dcs.get("cycles") > cycles + 100, "cycles")
+        assert eye.open() == 0.0, "it holds what the device chose"
+        assert eye.read().position_m < 0.4 * 0.1016
+        daemon.signal(signal.SIGTERM)
+        assert '"event": "the daemon stood still"' in daemon.ended().log
 
 
 @contextmanager

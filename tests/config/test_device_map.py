@@ -3,7 +3,9 @@
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
+from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from config.errors import InputError
 from config.loading import validated
@@ -98,3 +100,14 @@ def test_a_command_is_what_its_register_can_say() -> None:
     assert device.delivered_pa(device.delivered_pa(43_219.0)) == 43_180.0
     any_pressure = ModbusTcpDevice()
     assert (any_pressure.delivered_pa(43_219.5), any_pressure.command_step_pa) == (43_219.5, 0.0)
+
+
+def test_a_time_out_within_a_cycle_is_refused_and_a_stall_is_known_by_the_shorter_of_two() -> None:
+    def file(timeout_s: float) -> DaemonFile:
+        device = {"bus": "modbus", "communication_timeout_s": timeout_s, "reply_timeout_s": 0.05}
+        return DaemonFile.model_validate({"valve": {"stroke_m": 0.1}, "device": device, "cycle": {"period_s": 0.02}})
+
+    assert file(0.12).longest_unattended_s == 0.12
+    assert file(1.0).longest_unattended_s == file(0.0).longest_unattended_s == pytest.approx(0.15)
+    with pytest.raises(ValidationError, match=r"communication_timeout_s must be more than cycle.period_s \(0.02 s\)"):
+        file(0.02)

@@ -253,11 +253,16 @@ def stand_still(bench: Bench) -> Decision:
     return [bench.step(quality=Quality.REPEATED) for _ in range(12)][-1]
 
 
+def stall(bench: Bench) -> Decision:
+    return bench.step(unattended_s=2.0)
+
+
 FAILURES = [
     (lose, Fault.NO_REPLY),
     (jump, Fault.IMPLAUSIBLE),
     (break_down, Fault.DEVICE),
     (stand_still, Fault.STALE),
+    (stall, Fault.STALLED),
 ]
 
 

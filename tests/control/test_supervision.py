@@ -58,6 +58,11 @@ def test_the_third_lost_reply_in_a_row_is_a_fault_and_the_mode_falls() -> None:
     assert watches[-1].mode is Mode.HOLD
 
 
+def test_a_dead_line_that_is_slower_than_staleness_is_no_reply() -> None:
+    lost = [replace(good(0.0), now_s=2.0 * n, quality=Quality.LOST) for n in range(1, 3)]
+    assert faults(watched([good(0.0), *lost], AUTOMATIC))[1] is Fault.NO_REPLY
+
+
 def test_two_lost_replies_with_a_good_one_between_are_none() -> None:
     lost = replace(good(0.01), quality=Quality.LOST)
     assert faults(watched([good(0.0), lost, lost, good(0.03), lost, lost], AUTOMATIC)) == [Fault.NONE] * 6
@@ -82,6 +87,18 @@ def test_an_unfit_device_is_a_fault_at_once(status: DeviceStatus) -> None:
 @pytest.mark.parametrize(("held_pa", "fault"), [(50e3, Fault.NONE), (50.3e3, Fault.NONE), (0.0, Fault.RESTARTED)])
 def test_a_device_that_comes_back_with_another_command_was_restarted(held_pa: float, fault: Fault) -> None:
     assert faults(watched([replace(good(0.0), held_pa=held_pa)], AUTOMATIC)) == [fault]
+
+
+def test_a_daemon_that_stood_still_is_a_fault_whatever_the_device_says() -> None:
+    late = replace(good(0.01), unattended_s=2.0, held_pa=0.0, status=DeviceStatus.COMMUNICATION_LOST)
+    watches = watched([good(0.0), late], AUTOMATIC)
+    assert faults(watches) == [Fault.NONE, Fault.STALLED]
+    assert watches[-1].mode is Mode.HOLD
+
+
+def test_a_measurement_that_is_no_number_is_implausible() -> None:
+    none = [replace(good(0.01 * n), quality=Quality.NO_NUMBER) for n in range(1, 4)]
+    assert faults(watched([good(0.0), *none], AUTOMATIC))[-2:] == [Fault.NONE, Fault.IMPLAUSIBLE]
 
 
 def after_a_new_command(lost: int) -> Fault:

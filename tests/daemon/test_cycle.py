@@ -26,13 +26,14 @@ class Device:
 
     def __init__(self, counters: list[int | None]) -> None:
         self._counters: Iterator[int | None] = iter(counters)
+        self._last = 0
         self.sent_pa: list[float] = []
 
     def open(self) -> float:
         return 40e3
 
     def read(self) -> Reading:
-        return Reading(0.03, 40e3, 0, 0.0)
+        return Reading(0.03, 40e3, self._last, self._last * 1e-3)
 
     def write(self, command_pa: float) -> None:
         self.sent_pa.append(command_pa)
@@ -42,6 +43,7 @@ class Device:
         counter = next(self._counters)
         if counter is None:
             raise NoReply("silent")
+        self._last = counter
         return Reading(0.03, command_pa, counter, counter * 1e-3)
 
     def close(self) -> None:
@@ -76,7 +78,7 @@ def run(counters: list[int | None], pace: Pace) -> tuple[list[Row], list[float]]
 
 
 def test_only_new_samples_are_recorded() -> None:
-    rows, _ = run([1, 2, 2, None, 3, 4], DevicePace())
+    rows, _ = run([1, 2, 2, None, 3, 4, 5], DevicePace())  # after the loss it only looks
     assert [row[0] for row in rows] == [1e-3, 2e-3, 3e-3, 4e-3]
 
 

@@ -131,7 +131,7 @@ def test_on_one_line_a_dead_device_takes_time_from_nobody_but_itself(monkeypatch
     """Its time-out is six times an answer's; still the others are asked at the very same moments."""
     alive, undisturbed = line(monkeypatch, dies=False)
     disturbed_devices, disturbed = line(monkeypatch, dies=True)
-    assert disturbed[1].link.counts.lost_replies > 100
+    assert disturbed[1].link.counts.lost_replies > 3, "and then ever more seldom"
     assert disturbed[1].snapshot.decision.fault is Fault.NO_REPLY
     for index in (0, 2, 3):
         assert disturbed_devices[index].asked_s == pytest.approx(alive[index].asked_s, abs=1e-6)

@@ -1,9 +1,13 @@
 """The link: what becomes of readings and of their absence."""
 
+from dataclasses import replace
+
 import pytest
 
 from config.codes import Quality
-from drivers.boundary import Capabilities, DriverError, NoConnection, NoReply, Reading
+from config.quantities import DeviceStatus
+from drivers.boundary import Capabilities, DriverError, NoConnection, NoNumber, NoReply, Reading, Refused
+from positioner.daemon import link as room
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 
@@ -17,14 +21,17 @@ class Scripted:
         self.answers = list(answers)
         self.held_pa = held_pa
         self.sent_pa: list[float] = []
-        self.opened = 0
+        self.shown: Reading | DriverError = reading(0)
+        self.opened = self.closed = 0
 
     def open(self) -> float:
         self.opened += 1
         return self.held_pa
 
     def read(self) -> Reading:
-        return reading(0)
+        if isinstance(self.shown, DriverError):
+            raise self.shown
+        return self.shown
 
     def write(self, command_pa: float) -> None:
         self.sent_pa.append(command_pa)
@@ -37,16 +44,16 @@ class Scripted:
         return answer
 
     def close(self) -> None:
-        pass
+        self.closed += 1
 
 
 def reading(counter: int, position_m: float = 0.05) -> Reading:
     return Reading(position_m, 50e3, counter, counter * 1e-3, 0)
 
 
-def opened(driver: Scripted) -> Link:
+def opened(driver: Scripted, shown: Reading | None = None) -> Link:
     link = Link(driver, DevicePace())
-    assert link.open() == (driver.held_pa, reading(0))
+    assert link.open() == (driver.held_pa, shown or reading(0))
     return link
 
 
@@ -55,9 +62,14 @@ def test_a_new_sample_is_good_and_the_same_again_is_repeated() -> None:
     assert [link.exchange(5e4).quality for _ in range(3)] == [Quality.GOOD, Quality.REPEATED, Quality.GOOD]
 
 
-@pytest.mark.parametrize(("first", "second", "missed"), [(1, 2, 0), (1, 5, 3), (2**32 - 1, 0, 0), (2**32 - 2, 1, 2)])
-def test_missed_samples_are_counted_across_the_counters_wrap(first: int, second: int, missed: int) -> None:
-    link = opened(Scripted(reading(first), reading(second)))
+@pytest.mark.parametrize(
+    ("bits", "first", "second", "missed"),
+    [(32, 1, 2, 0), (32, 1, 5, 3), (32, 2**32 - 1, 0, 0), (32, 2**32 - 2, 1, 2), (16, 65535, 0, 0), (8, 254, 1, 2)],
+)
+def test_missed_samples_are_counted_across_the_counters_wrap(bits: int, first: int, second: int, missed: int) -> None:
+    driver = Scripted(reading(first), reading(second))
+    driver.capabilities = replace(driver.capabilities, counter_range=1 << bits)
+    link = opened(driver)
     link.exchange(5e4)
     link.exchange(5e4)
     assert link.counts.lost_samples == missed
@@ -71,19 +83,114 @@ def test_a_lost_reply_keeps_the_last_values_and_says_so() -> None:
     assert link.counts.lost_replies == 1
 
 
-def test_after_a_loss_it_connects_anew_and_first_gives_the_device_what_it_holds() -> None:
-    """A device that was restarted must not be moved by the command it had before."""
-    driver = Scripted(reading(1), NoConnection("gone"), reading(1), reading(2), held_pa=0.0)
-    link = opened(driver)
+def test_after_a_loss_it_connects_anew_and_looks_before_it_commands() -> None:
+    """A device that was restarted must not be moved by the command it had before, nor its status be cleared by it."""
+    driver = Scripted(reading(1), NoConnection("gone"), reading(2), held_pa=0.0)
+    driver.shown = replace(reading(9), status=DeviceStatus.COMMUNICATION_LOST)
+    link = opened(driver, driver.shown)
     samples = [link.exchange(5e4) for _ in range(4)]
     assert driver.opened == 2
-    assert driver.sent_pa == [5e4, 5e4, 0.0, 5e4]
+    assert driver.sent_pa == [5e4, 5e4, 5e4]
     assert [sample.held_pa for sample in samples] == [None, None, 0.0, None]
+    assert samples[2].status == DeviceStatus.COMMUNICATION_LOST
 
 
-def test_the_same_counter_after_a_reconnection_is_a_new_sample() -> None:
-    link = opened(Scripted(reading(7), NoReply("silent"), reading(7)))
-    assert [link.exchange(5e4).quality for _ in range(3)] == [Quality.GOOD, Quality.LOST, Quality.GOOD]
+def test_the_same_sample_after_a_reconnection_is_repeated_and_the_next_is_new_whatever_its_counter() -> None:
+    driver = Scripted(reading(7), NoReply("silent"), reading(7))
+    link = opened(driver)
+    driver.shown = reading(7)
+    expected = [Quality.GOOD, Quality.LOST, Quality.REPEATED, Quality.REPEATED]
+    assert [link.exchange(5e4).quality for _ in range(4)] == expected
+    driver = Scripted(reading(7), NoReply("silent"), reading(1))
+    link = opened(driver)
+    assert [link.exchange(5e4).quality for _ in range(4)] == [Quality.GOOD, Quality.LOST, Quality.GOOD, Quality.GOOD]
+    assert link.counts.lost_samples == 0
+
+
+class Stopwatch:
+    """The gateway's clock, moved by hand."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 1000.0
+        monkeypatch.setattr(room, "awake_s", lambda: self.now_s)
+
+
+def test_a_daemon_that_stood_still_looks_at_the_device_before_it_commands_it(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock = Stopwatch(monkeypatch)
+    driver = Scripted(reading(1), reading(2), reading(4), held_pa=0.0)
+    link = Link(driver, DevicePace(), longest_unattended_s=0.5)
+    link.open()
+    link.begin()
+    samples = [link.exchange(5e4)]
+    clock.now_s += 0.4
+    samples.append(link.exchange(5e4))
+    clock.now_s += 0.6
+    driver.shown = replace(reading(3), status=DeviceStatus.COMMUNICATION_LOST)
+    samples.append(link.exchange(5e4))
+    assert driver.sent_pa == [5e4, 5e4], "nothing was commanded"
+    samples.append(link.exchange(0.0))
+    assert [sample.unattended_s for sample in samples] == [0.0, 0.0, pytest.approx(0.6), 0.0]
+    assert (samples[2].held_pa, samples[2].status) == (0.0, DeviceStatus.COMMUNICATION_LOST)
+    assert "the daemon stood still" in caplog.text
+
+
+def test_a_stall_is_told_even_where_the_device_is_found_only_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Stopwatch(monkeypatch)
+    driver = Scripted(reading(1), reading(4))
+    link = Link(driver, DevicePace(), longest_unattended_s=0.5)
+    link.open()
+    link.exchange(5e4)
+    clock.now_s += 0.6
+    driver.shown = NoReply("silent")
+    assert link.exchange(5e4).quality is Quality.LOST
+    driver.shown = reading(3)
+    assert link.exchange(5e4).unattended_s == pytest.approx(0.6)
+
+
+def test_a_device_that_is_away_is_asked_ever_more_seldom_and_each_kind_said_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A minute of cycles of 1 ms; it comes for one reply every 50th time it is asked."""
+    clock = Stopwatch(monkeypatch)
+    driver = Scripted(reading(1))
+    link = opened(driver)
+    link.exchange(5e4)
+    for attempt in range(60_000):
+        gone = driver.opened % 50 != 0
+        driver.shown = NoReply(f"silent {attempt}") if gone else reading(2)
+        driver.answers = [NoReply(f"silent again {attempt}")]
+        link.exchange(5e4)
+        clock.now_s += 1e-3
+    assert 60 < driver.opened < 100
+    assert len(caplog.records) < 10
+    driver.shown, driver.answers = reading(2), [reading(number) for number in range(3, 30_003)]
+    for _ in range(12_000):
+        link.exchange(5e4)
+        clock.now_s += 1e-3
+    driver.answers.insert(0, NoReply("silent"))
+    qualities = [link.exchange(5e4).quality for _ in range(3)]
+    assert qualities[0] is Quality.LOST
+    assert qualities[2] is Quality.GOOD, "after a while that went well it is asked again at once"
+
+
+@pytest.mark.parametrize(
+    ("error", "quality"), [(Refused("exception 6", 6), Quality.LOST), (NoNumber("nan"), Quality.NO_NUMBER)]
+)
+def test_an_exception_or_a_number_that_is_none_keeps_the_connection(error: DriverError, quality: Quality) -> None:
+    driver = Scripted(reading(1), error, reading(2), error, error, reading(3))
+    link = opened(driver)
+    expected = [Quality.GOOD, quality, Quality.GOOD, quality, quality, Quality.GOOD]
+    assert [link.exchange(5e4).quality for _ in range(6)] == expected
+    assert (driver.opened, driver.closed) == (1, 0)
+
+
+def test_a_device_that_goes_on_refusing_is_looked_at_anew() -> None:
+    refusals = [Refused("exception 4", 4)] * 3
+    driver = Scripted(reading(1), *refusals, held_pa=0.0)
+    link = opened(driver)
+    assert [link.exchange(5e4).held_pa for _ in range(5)] == [None] * 4 + [0.0]
 
 
 def test_a_device_without_pressure_and_clock_is_taken_at_its_command_and_the_gateways_time() -> None:

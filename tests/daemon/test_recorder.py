@@ -1,5 +1,6 @@
 """The recorder: every row, whole lines, bounded in files and in memory."""
 
+import errno
 import os
 from datetime import UTC, datetime
 from pathlib import Path
@@ -58,6 +59,69 @@ def test_full_files_are_followed_and_the_oldest_deleted(tmp_path: Path, monkeypa
     assert len(files) == 3
     assert all(path.stat().st_size < 2200 for path in files)
     assert read_recording(files[-1]).time_s[-1] == 0.399
+
+
+def fill(recorder: Recorder, first: int, rows: int) -> None:
+    for index in range(first, first + rows):
+        recorder.offer(row(index))
+        while recorder.waiting:
+            os.sched_yield()
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_older_files_with_a_later_stamp_do_not_cost_the_file_that_is_written(tmp_path: Path) -> None:
+    """The clock was set back."""
+    for number in (1, 2, 3):
+        (tmp_path / f"v-20990101T000000Z-000{number}.csv").write_text("time_s\n")
+    recorder = Recorder(tmp_path, "v", 10_000, 2)
+    recorder.start()
+    fill(recorder, 0, 10)
+    recorder.stop()
+    kept = names(tmp_path)
+    assert [name.rpartition("-")[2] for name in kept] == ["0004.csv", "0003.csv"]
+    assert len(read_recording(tmp_path / kept[0])) == 10
+    assert [path.name for path in room.files_of(tmp_path, "v")] == kept[::-1], "oldest first, by their numbers"
+
+
+@pytest.mark.parametrize("failing", ["open", "write"])
+def test_a_rotation_that_fails_goes_on_in_the_old_file_and_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
+    recorder = Recorder(tmp_path, "v", 2000, 5)
+    recorder.start()
+    real = getattr(os, failing)
+
+    def fail(*arguments: object) -> object:
+        if failing == "open" or bytes(arguments[1]).startswith(b"# valve"):  # type: ignore[call-overload]
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real(*arguments)
+
+    with monkeypatch.context() as full:
+        full.setattr(os, failing, fail)
+        fill(recorder, 0, 100)
+    assert len(names(tmp_path)) == 1
+    fill(recorder, 100, 100)
+    recorder.stop()
+    files = room.files_of(tmp_path, "v")
+    assert len(files) > 1
+    times_s = [time_s for path in files for time_s in read_recording(path).time_s]
+    assert times_s == pytest.approx([index * 1e-3 for index in range(200)]), "no row is lost"
+
+
+def test_valves_of_like_names_and_starts_within_a_second_do_not_meet(tmp_path: Path) -> None:
+    valves = ["FV 1", "FV-1", "FV/1", "阀门一", "阀门二"]
+    for valve in valves * 2:
+        recorder = Recorder(tmp_path, valve, 10_000, 5)
+        recorder.start()
+        fill(recorder, 0, 1)
+        recorder.stop()
+    assert len(names(tmp_path)) == 10
+    assert [len(room.files_of(tmp_path, valve)) for valve in valves] == [2] * 5
+    assert read_recording(room.files_of(tmp_path, "阀门一")[0]).metadata["valve"] == "阀门一"
 
 
 def test_a_row_without_room_is_counted_and_the_next_one_says_so(

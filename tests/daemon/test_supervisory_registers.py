@@ -6,7 +6,7 @@ import math
 import pytest
 from pymodbus.constants import ExcCodes
 
-from config.codes import Fault
+from config.codes import Fault, Quality
 from config.daemon_file import DaemonFile
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
 from config.slave_file import SlaveFile
@@ -233,3 +233,15 @@ def test_estimates_are_served_with_their_reasons(panel: Panel) -> None:
     assert panel.get("a_reason") == 1
     assert panel.get("b_over_c_applied") == -814e3
     assert panel.get("identifications") == 0
+
+
+def test_the_age_is_worked_out_when_it_is_read_and_what_is_old_is_not_good(
+    panel: Panel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a cycle that stands still."""
+    panel.run()
+    monkeypatch.setattr(panel.cycle.link, "_longest_unattended_s", 1.0)
+    for stands_s, quality in ((0.5, Quality.GOOD), (2.5, Quality.LOST)):
+        monkeypatch.setattr(panel.cycle._pace, "since_s", lambda _now_s, stands_s=stands_s: stands_s)
+        assert panel.get("sample_age") == pytest.approx(stands_s)
+        assert panel.get("quality") == quality

@@ -17,7 +17,7 @@ from config.errors import InputError
 from config.quantities import DeviceStatus
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoReply, Refused
 from drivers.canopen import pdo, watcher
 from drivers.canopen.driver import CanopenDriver
 from drivers.canopen.events import NodeEvent
@@ -207,7 +207,7 @@ def test_a_measurement_that_is_no_number_is_refused_and_the_next_taken(driver: C
     node.fault = lambda identity, data: [
         (identity, struct.pack("<ff", float("nan"), 0) if identity == TPDO_1 else data)
     ]
-    with pytest.raises(BadReply, match="no number: position_m nan"):
+    with pytest.raises(NoNumber, match="no number: position_m nan"):
         driver.exchange(PUSH_PA)
     node.fault = honest
     assert driver.exchange(PUSH_PA).sample_counter == 3
@@ -353,6 +353,17 @@ def test_a_node_that_another_master_resets_or_stops(
     if command == 2:
         node.node.send_message(HEARTBEAT, bytes((4,)))
     fails(NoConnection, event, lambda: driver.exchange(PUSH_PA))
+    if command == 2:
+        driver._sdo._timeout_s = 0.05
+        fails(NoConnection, NodeEvent.NO_NODE, driver.open)
+        assert node.node.state == 4, "it is left as the other master wants it"
+        driver._sdo._timeout_s = PATIENT_S
+        third.send(frame(0, bytes((128, NODE))))
+        in_time(lambda: node.node.state == 127)
+    driver.open()
+    statuses = [driver.read().status for _ in range(2)]
+    assert statuses == [DeviceStatus.NOT_READY, 0], "the first sample is a fault of the device, however quick it was"
+    driver.close()
     recovers(driver, node)
 
 

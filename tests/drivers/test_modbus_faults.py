@@ -15,7 +15,7 @@ from config.device import ModbusTcpDevice
 from config.modbus_map import SIMULATED_MAP
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoReply, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep
@@ -217,9 +217,9 @@ def test_a_number_that_is_none_is_no_measurement_but_the_connection_holds(
         return frame(transaction, reply[:at] + struct.pack(">f", float(number)) + reply[at + 4 :])
 
     scripted.fault = no_number
-    text = refused_as(driver, BadReply, lambda: driver.exchange(PUSH_PA))
+    text = refused_as(driver, NoNumber, lambda: driver.exchange(PUSH_PA))
     assert f"{name} {number}" in text
-    refused_as(driver, BadReply, driver.read)
+    refused_as(driver, NoNumber, driver.read)
     scripted.fault = honest
     assert driver.exchange(PUSH_PA).sample_counter == 3
 

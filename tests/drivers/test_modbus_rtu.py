@@ -21,7 +21,7 @@ from config.modbus_map import SIMULATED_MAP
 from config.serial_port import Baud, SerialPort
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoReply, Refused
 from drivers.modbus_rtu import ModbusRtuDriver
 from fieldbus.modbus.rtu import framed
 from fieldbus.modbus.serial_line import SerialLine
@@ -233,7 +233,7 @@ def test_a_number_that_is_none_is_no_measurement_but_the_line_stays(
     driver: ModbusRtuDriver, scripted: ScriptedDevice
 ) -> None:
     scripted.fault = lambda _, reply: framed(1, reply[1:3] + struct.pack(">f", float("nan")) + reply[7:-2])
-    assert "position_m nan" in refused_as(BadReply, lambda: driver.exchange(PUSH_PA))
+    assert "position_m nan" in refused_as(NoNumber, lambda: driver.exchange(PUSH_PA))
     scripted.fault = honest
     assert driver.exchange(PUSH_PA).sample_counter == 3
 
@@ -375,6 +375,26 @@ def test_a_device_without_echo_refuses_it_and_that_will_do(driver: ModbusRtuDriv
     scripted.fault = lambda request, reply: framed(1, b"\x88\1") if request[1] == 8 else reply
     assert driver.open() == PUSH_PA
     assert driver.exchange(PUSH_PA).sample_counter == 2
+
+
+def test_a_device_that_passes_over_the_echo_is_reached_by_reads_and_no_late_reply_is_taken(
+    scripted: ScriptedDevice,
+) -> None:
+    """As the slaves of libmodbus do."""
+    scripted.fault = lambda request, reply: b"" if request[1] == 8 else reply
+    driver = ModbusRtuDriver(ModbusRtuDevice(serial=port(scripted.driver_end), reply_timeout_s=REPLY_TIMEOUT_S))  # type: ignore[attr-defined]
+    assert driver.open() == scripted.device.command_pa
+    assert {request[1] for request in scripted.heard[1:]} <= {3, 16}, "after the echo only reads, and its time-out"
+    assert driver.exchange(PUSH_PA).sample_counter == 1
+    late = one_behind()
+    scripted.fault = lambda request, reply: b"" if request[1] == 8 else late(request, reply)
+    refused_as(NoReply, driver.read)
+    for _ in range(3):
+        refused_as(NoConnection, driver.open)
+    scripted.fault = lambda request, reply: b"" if request[1] == 8 else reply
+    driver.open()
+    assert driver.exchange(PUSH_PA).sample_counter == scripted.device.sample_counter
+    driver.close()
 
 
 def test_requests_keep_the_silence_between_frames(driver: ModbusRtuDriver, scripted: ScriptedDevice) -> None:

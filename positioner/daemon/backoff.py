@@ -1,0 +1,62 @@
+"""Back-off: when to try again what failed, and what to say of it.
+
+A device is asked for again at once, for a reply may be lost; then ever more seldom. A kind of failure is said once and
+then counted.
+"""
+
+import math
+from collections.abc import Hashable
+
+AT_ONCE = 4
+"""Failures before the first wait: a reply that was lost, and three attempts."""
+FIRST_S, LONGEST_S = 0.01, 1.0
+STEADY_S = 10.0
+"""What has gone well for so long has recovered: the next failure is the first again."""
+
+
+class Backoff:
+    """Of one thing that is tried: `may_try`, then `failed` or `succeeded`. Times are of any clock, s."""
+
+    def __init__(self) -> None:
+        self._failures = 0
+        self._next_s = -math.inf
+        self._well_since_s = math.inf
+
+    def may_try(self, now_s: float) -> bool:
+        """Return whether it is time to try."""
+        return now_s >= self._next_s
+
+    def failed(self, now_s: float) -> None:
+        """Note a failure: the next attempt waits, for twice as long each time."""
+        if now_s - self._well_since_s > STEADY_S:
+            self._failures = 0
+        self._well_since_s = math.inf
+        self._failures += 1
+        beyond = self._failures - AT_ONCE
+        if beyond > 0:
+            self._next_s = now_s + min(FIRST_S * 2.0 ** min(beyond - 1, 60), LONGEST_S)
+
+    def succeeded(self, now_s: float) -> None:
+        """Note a success; one that lasts makes the failures before it forgotten."""
+        self._well_since_s = min(self._well_since_s, now_s)
+
+
+class Sayings:
+    """What was said already, by its kind: each is said once in `every_s`, with how often it was not said before."""
+
+    MOST_KINDS = 256
+
+    def __init__(self, every_s: float = 60.0) -> None:
+        self._every_s = every_s
+        self._said: dict[Hashable, tuple[float, int]] = {}
+
+    def unsaid(self, kind: Hashable, now_s: float) -> int | None:
+        """Return how many of this kind were passed over since the last that was said; None to pass over this one."""
+        said_s, passed = self._said.get(kind, (-math.inf, 0))
+        if now_s - said_s < self._every_s:
+            self._said[kind] = said_s, passed + 1
+            return None
+        if kind not in self._said and len(self._said) >= self.MOST_KINDS:
+            self._said.pop(next(iter(self._said)))
+        self._said[kind] = now_s, 0
+        return passed
