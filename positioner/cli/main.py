@@ -91,14 +91,14 @@ def _unread() -> bool:
 
 def command_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands, which are imported for it."""
-    from positioner import __version__
+    from importlib.metadata import version
 
     parser = argparse.ArgumentParser(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",
         epilog="exit status: 0 done, 1 the thing asked about does not hold, 2 bad input",
     )
-    parser.add_argument("--version", action="version", version=f"positioner {__version__}")
+    parser.add_argument("--version", action="version", version=f"positioner {version('positioner')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
         module = importlib.import_module(f"positioner.cli.{MODULES.get(name, name)}")
