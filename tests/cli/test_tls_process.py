@@ -77,7 +77,15 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 def test_each_role_may_write_what_is_its_own_and_a_refusal_is_exception_1_and_one_line(site: Site) -> None:
     values = {"reference": 0.3, "reference_scaled": 3000, "heartbeat": 7, "acknowledge": 0, "eta_1": 1, "mode": 0}
-    values |= {"eta_2": 1, "eta_3": 1, "manual_pressure": 24000, "alpha": 44126, "beta": 13238, "omega": 1, "experiment_veto": 0}
+    values |= {
+        "eta_2": 1,
+        "eta_3": 1,
+        "manual_pressure": 24000,
+        "alpha": 44126,
+        "beta": 13238,
+        "omega": 1,
+        "experiment_veto": 0,
+    }
     operators = {"reference", "reference_scaled", "heartbeat", "acknowledge", "experiment_veto"}
     allowed = {"observer": set[str](), "operator": operators}
     for register in BY_NAME.values():
