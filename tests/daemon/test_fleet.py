@@ -398,6 +398,7 @@ def port_of(path: Path, valve: int) -> int:
     return int(text.split("\n")[0])
 
 
+@pytest.mark.usefixtures("root_logging")
 def test_a_line_of_the_log_names_the_valve_it_is_about(capsys: pytest.CaptureFixture[str]) -> None:
     log = logging.getLogger("test_fleet")
     listener = start_logging("info")
@@ -405,7 +406,6 @@ def test_a_line_of_the_log_names_the_valve_it_is_about(capsys: pytest.CaptureFix
         log_event(log, logging.INFO, "one")
     log_event(log, logging.INFO, "two")
     listener.stop()
-    logging.basicConfig(force=True)
     one, two = (json.loads(line) for line in capsys.readouterr().err.splitlines())
     assert one["valve"] == "FV-1"
     assert "valve" not in two

@@ -27,29 +27,25 @@ class Pipe(io.StringIO):
         return super().write(text)
 
 
+@pytest.mark.usefixtures("root_logging")
 def test_a_log_that_nobody_reads_is_bounded_and_says_what_it_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MOST_WAITING", 100)
     monkeypatch.setattr(logs, "FLUSH_S", 0.2)
     pipe = Pipe()
     monkeypatch.setattr(sys, "stderr", pipe)
-    root = logging.getLogger()
-    handlers, level = root.handlers[:], root.level
-    try:
-        listener = start_logging("info")
-        for number in range(10_000):
-            log_event(log, logging.INFO, "write refused", number=number)
-        start_s = time.monotonic()
-        thread = listener._thread
-        listener.stop()
-        assert time.monotonic() - start_s < 30.0, "it does not wait for a reader that stopped"
-        pipe.read_on.set()
-        assert thread is not None
-        thread.join(30.0)
-        listener.start()
-        log_event(log, logging.INFO, "on")
-        listener.stop()
-    finally:
-        root.handlers[:], root.level = handlers, level
+    listener = start_logging("info")
+    for number in range(10_000):
+        log_event(log, logging.INFO, "write refused", number=number)
+    start_s = time.monotonic()
+    thread = listener._thread
+    listener.stop()
+    assert time.monotonic() - start_s < 30.0, "it does not wait for a reader that stopped"
+    pipe.read_on.set()
+    assert thread is not None
+    thread.join(30.0)
+    listener.start()
+    log_event(log, logging.INFO, "on")
+    listener.stop()
     lines = [json.loads(line) for line in pipe.getvalue().splitlines()]
     written = [line for line in lines if line["event"] == "write refused"]
     assert sum(line.get("lines_lost", 0) for line in lines) == 10_000 - len(written)
