@@ -3,8 +3,8 @@
 First, what all is made of: a free run of the bare valve, and how far it is from one in steps and to a tolerance a
 hundredth of its own.
 
-`python -m benchmarks.workbench [SEED]`. The kernels are compiled and the libraries loaded beforehand: the former once per
-machine, about a minute for all.
+`python -m benchmarks.workbench [SEED]`. Libraries are loaded and kernels compiled beforehand: these once per machine,
+about a minute for all.
 """
 
 import sys
