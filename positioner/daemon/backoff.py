@@ -10,17 +10,18 @@ from collections.abc import Hashable
 AT_ONCE = 4
 """Failures before the first wait: a reply that was lost, and three attempts."""
 FIRST_S, LONGEST_S = 0.01, 1.0
-STEADY_S = 10.0
-"""What has gone well for so long has recovered: the next failure is the first again."""
+MOST = AT_ONCE + 8
+"""Failures that are remembered: then the wait is the longest."""
+MAKE_UP = 2
+"""Successes that make up for a failure: a line that loses a reply now and then is no device that is away."""
 
 
 class Backoff:
     """Of one thing that is tried: `may_try`, then `failed` or `succeeded`. Times are of any clock, s."""
 
     def __init__(self) -> None:
-        self._failures = 0
+        self._failures = 0.0
         self._next_s = -math.inf
-        self._well_since_s = math.inf
 
     def may_try(self, now_s: float) -> bool:
         """Return whether it is time to try."""
@@ -28,17 +29,14 @@ class Backoff:
 
     def failed(self, now_s: float) -> None:
         """Note a failure: the next attempt waits, for twice as long each time."""
-        if now_s - self._well_since_s > STEADY_S:
-            self._failures = 0
-        self._well_since_s = math.inf
-        self._failures += 1
-        beyond = self._failures - AT_ONCE
+        self._failures = min(self._failures + 1.0, MOST)
+        beyond = math.ceil(self._failures - AT_ONCE)
         if beyond > 0:
-            self._next_s = now_s + min(FIRST_S * 2.0 ** min(beyond - 1, 60), LONGEST_S)
+            self._next_s = now_s + min(FIRST_S * 2.0 ** (beyond - 1), LONGEST_S)
 
-    def succeeded(self, now_s: float) -> None:
-        """Note a success; one that lasts makes the failures before it forgotten."""
-        self._well_since_s = min(self._well_since_s, now_s)
+    def succeeded(self) -> None:
+        """Note a success."""
+        self._failures = max(0.0, self._failures - 1.0 / MAKE_UP)
 
 
 class Sayings:

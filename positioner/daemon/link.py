@@ -82,7 +82,7 @@ class Link:
             if self._connected:
                 self._commanded_s = now_s
                 self._sample = self._fresh(self._driver.exchange(command_pa), command_pa)
-                self._backoff.succeeded(now_s)
+                self._backoff.succeeded()
                 self._refusals = 0
             elif self._unattended_s > 0 or self._backoff.may_try(now_s):
                 self._sample = self._found_again()

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from config.codes import Quality
@@ -166,13 +167,28 @@ def test_a_device_that_is_away_is_asked_ever_more_seldom_and_each_kind_said_once
     assert 60 < driver.opened < 100
     assert len(caplog.records) < 10
     driver.shown, driver.answers = reading(2), [reading(number) for number in range(3, 30_003)]
-    for _ in range(12_000):
+    for _ in range(2_000):
         link.exchange(5e4)
         clock.now_s += 1e-3
     driver.answers.insert(0, NoReply("silent"))
     qualities = [link.exchange(5e4).quality for _ in range(3)]
     assert qualities[0] is Quality.LOST
     assert qualities[2] is Quality.GOOD, "after a while that went well it is asked again at once"
+
+
+def test_a_line_that_loses_one_reply_in_thirty_loses_no_more_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However long it goes on: what is lost now and then is no device that is away."""
+    clock = Stopwatch(monkeypatch)
+    rng = np.random.default_rng(1)
+    lost = (rng.random(10_000) < 1 / 30).tolist()
+    answers = [NoReply("lost") if gone else reading(number) for number, gone in enumerate(lost, 2)]
+    link = opened(Scripted(reading(1), *answers))
+    in_a_row = longest = 0
+    for _ in range(8_000):
+        in_a_row = in_a_row + 1 if link.exchange(5e4).quality is Quality.LOST else 0
+        longest = max(longest, in_a_row)
+        clock.now_s += 1e-3
+    assert longest <= 3, "as many as happen to be lost one after another"
 
 
 @pytest.mark.parametrize(
