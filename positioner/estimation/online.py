@@ -35,6 +35,8 @@ READINGS = 16
 """Times per window at which (13) is solved."""
 PROGRESS_WHILE_REFINING = 0.99
 """Progress while the refinement is awaited."""
+GROSS = 1e-3
+"""Of the stroke: residuals beyond this are not those of a loop in real time."""
 REFINEMENT_TIMEOUT_S = 2.0
 """Time after which a refinement is no longer awaited."""
 MOST_KEPT = 200_000
@@ -230,8 +232,10 @@ class Identification:
             self.estimates = replace(refined, breakaway=with_validity(broke_away, self._settings.largest_relative_std))
             self.moves += self._passive
         elif not self._passive:
-            # What the model cannot say of these samples, the integrals of the same samples do not know either.
-            refused = result.fit is not None and not fits
+            # Of samples that are far from any motion of the model the integrals know nothing either. A loop in real
+            # time, whose commands come into force a little early or late, stays well below.
+            gross_m = GROSS * self._settings.stroke_m
+            refused = result.fit is not None and not fits and result.fit.residual_std_m > gross_m
             self.estimates = refined if refused else replace(self.estimates, progress=1.0)
 
     def _request(self, parameters: bool, friction: bool) -> None:
