@@ -13,6 +13,7 @@ window; at once, without a way back, by another mode, by eta_1 = 0 and by a faul
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 from config.codes import ExperimentState, Fault, Mode
 from positioner.control.requests import ExperimentRequest
@@ -33,9 +34,8 @@ class ExperimentLimits:
     high_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What permits an experiment: `position_m` is None without a good measurement."""
+class Surroundings(NamedTuple):
+    """What permits an experiment: `position_m` is None without a good measurement; a tuple, for it is made each step."""
 
     now_s: float
     mode: Mode
@@ -88,9 +88,9 @@ def experiment_after(
     before: PlayedExperiment, request: ExperimentRequest, around: Surroundings, limits: ExperimentLimits
 ) -> PlayedExperiment:
     """Return the experiment after one more step."""
-    started, here = request.starts != before.starts, replace(before, starts=request.starts)
+    here = before if request.starts == before.starts else replace(before, starts=request.starts)
     if not here.commands:
-        return _started(here, request, around, limits) if started else here
+        return here if here is before else _started(here, request, around, limits)
     if (ended := _not_ours(around)) is not ExperimentState.NONE:
         return replace(here, state=ended)
     over = around.now_s - here.begin_s >= here.sequence[-1][0]

@@ -99,7 +99,7 @@ class RestWindow:
             self._rows[: MOST // 2] = 0.5 * (self._rows[::2] + self._rows[1::2])
             self._count //= 2
             self._each *= 2
-        if time_s >= self._look_s:
+        if time_s >= self._look_s and self._count >= 2 * FEWEST:
             self._look_s = self._start_s + LOOKED_AGAIN * (time_s - self._start_s)
             self.rest = self._rest()
 
@@ -119,8 +119,6 @@ class RestWindow:
         return near_s * (1.0 + min(hidden, LONGEST_HIDDEN))
 
     def _rest(self) -> Rest | None:
-        if self._count < 2 * FEWEST:
-            return None
         time_s, position_m, pressure_pa = self._rows[: self._count].T
         half = int(np.searchsorted(time_s, 0.5 * time_s[-1]))
         late_m = position_m[half:]
