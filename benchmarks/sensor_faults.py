@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import exp, inf, log, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -85,31 +86,21 @@ class Spoilt:
     def __init__(self, device: Device, fault: SensorFault) -> None:
         self._device, self._fault = device, fault
         self.position_m = device.position_m
-        self._note()
+        self._measure()
 
-    def _note(self) -> None:
-        device, fault = self._device, self._fault
-        self.pressure_pa, self.command_pa = device.pressure_pa, device.command_pa
-        if not fault.at_s <= self.device_time_us / 1e6 < fault.at_s + fault.over_s:
-            self.position_m = device.position_m
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._device, name)
+
+    def _measure(self) -> None:
+        fault = self._fault
+        if not fault.at_s <= self._device.device_time_us / 1e6 < fault.at_s + fault.over_s:
+            self.position_m = self._device.position_m
         elif not np.isnan(fault.by_m):
-            self.position_m = device.position_m + fault.by_m
-
-    @property
-    def sample_counter(self) -> int:
-        return self._device.sample_counter
-
-    @property
-    def device_time_us(self) -> int:
-        return self._device.device_time_us
-
-    @property
-    def status(self) -> int:
-        return int(self._device.status)
+            self.position_m = self._device.position_m + fault.by_m
 
     def tick(self, command_pa: float) -> None:
         self._device.tick(command_pa)
-        self._note()
+        self._measure()
 
 
 def drawn(rng: np.random.Generator, each: Experiment) -> SensorFault:

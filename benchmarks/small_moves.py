@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf, log
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -109,31 +109,15 @@ class Late:
     """A device whose command comes into force one period late, as it does in real time."""
 
     def __init__(self, device: Device) -> None:
-        self._device = device
-        self._command_pa = device.command_pa
-        self._note()
+        self._device, self.command_pa = device, device.command_pa
 
-    def _note(self) -> None:
-        device = self._device
-        self.position_m, self.pressure_pa, self.command_pa = device.position_m, device.pressure_pa, self._command_pa
-
-    @property
-    def sample_counter(self) -> int:
-        return self._device.sample_counter
-
-    @property
-    def device_time_us(self) -> int:
-        return self._device.device_time_us
-
-    @property
-    def status(self) -> int:
-        return int(self._device.status)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._device, name)
 
     def tick(self, command_pa: float) -> None:
         self._device.check(command_pa)
-        self._device.tick(self._command_pa)
-        self._command_pa = command_pa
-        self._note()
+        self._device.tick(self.command_pa)
+        self.command_pa = command_pa
 
 
 class Timed(Controller):

@@ -31,7 +31,7 @@ ILLEGAL_VALUE = 3
 IDENTITY, VENDOR, PRODUCT = 0x1018, 1, 2
 HEARTBEAT_MS = 0x1017
 LONGEST_LISTENING_S = 1.0
-"""For a heartbeat."""
+"""For a heartbeat, however short its period: one that comes late is of a node that may well be running."""
 NO_SUCH_OBJECT = 0x06020000
 RESERVED = range(0x0400, 0x1000)
 """Indices at which CiA 301 lets no node have an object."""
@@ -174,8 +174,8 @@ class SdoTransfers:
         Raises:
             DriverError: as `upload`.
         """
-        period_s = 1e-3 * self.upload(HEARTBEAT_MS) if self.has(HEARTBEAT_MS) else 0.0
-        end_s = time.monotonic() + min(1.5 * period_s, LONGEST_LISTENING_S)
+        heartbeats = self.has(HEARTBEAT_MS) and self.upload(HEARTBEAT_MS) > 0
+        end_s = time.monotonic() + (LONGEST_LISTENING_S if heartbeats else 0.0)
         while self._watcher.state is None and (rest_s := end_s - time.monotonic()) > 0:
             self._receive(rest_s)
         return self._watcher.state == OPERATIONAL

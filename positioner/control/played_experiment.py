@@ -35,7 +35,7 @@ class ExperimentLimits:
 
 
 class Surroundings(NamedTuple):
-    """What permits an experiment: `position_m` is None without a good measurement; a tuple, for it is made each step."""
+    """What permits an experiment, made anew in each step: `position_m` is None without a good measurement."""
 
     now_s: float
     mode: Mode
