@@ -182,20 +182,8 @@ def step(
     )
     if excitation is not None and memory.excitation is None:
         statics.restart()
-    experiment = experiment_after(
-        memory.experiment,
-        requests.experiment,
-        Surroundings(
-            now_s=sample.now_s,
-            mode=supervision.mode,
-            fault=supervision.fault,
-            excited=requests.eta[0] == 0,
-            position_m=sample.position_m if fresh else None,
-            command_pa=memory.command_pa,
-            held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
-        ),
-        settings.experiment,
-    )
+    experiment = _experiment(memory, supervision, sample, requests, settings, fresh=fresh)
+    playing = experiment.commands
     outcome = None
     if fresh:
         arrived = (
@@ -208,16 +196,16 @@ def step(
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
     identifying, applied = _identify(memory, excitation, sample, fresh, requests, identification, statics)
-    ordinary = excitation is None and not experiment.commands
+    ordinary = excitation is None and not playing
     restoration = _restoration(memory, applied, outcome if ordinary else None, settings)
     dropped = restoration.trust is Restored.DROPPED
     if dropped and memory.restoration.provisional:
         memory, applied = _nothing_known(memory, applied, settings, statics)
-    elif outcome is not None and outcome.landing and not experiment.commands:
+    elif outcome is not None and outcome.landing and not playing:
         applied = statics.corrected(applied)
     situation = Situation(
         automatic=supervision.mode is Mode.AUTOMATIC,
-        exciting=experiment.commands or (excitation is not None and not excitation.ended),
+        exciting=playing or (excitation is not None and not excitation.ended),
         law_ready=applied.ratios is not None,
         delta_r_m=reference.delta_m,
         dropped=dropped,
@@ -245,7 +233,7 @@ def step(
     elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
         asked_pa = requests.manual_pa
     else:
-        exciting = experiment if experiment.commands else excitation
+        exciting = experiment if playing else excitation
         asked_pa = _pressure_pa(
             state, held_pa, exciting, sample.now_s, reference, applied, settings, law_memory, statics.valve
         )
@@ -293,6 +281,31 @@ def step(
         path,
         restoration,
     ), decision
+
+
+def _experiment(
+    memory: ControllerMemory,
+    supervision: SupervisionMemory,
+    sample: Sample,
+    requests: Requests,
+    settings: Settings,
+    *,
+    fresh: bool,
+) -> PlayedExperiment:
+    """Return the experiment after this sample; as it was where none is under way and none is asked for."""
+    before = memory.experiment
+    if before.is_idle(requests.experiment):
+        return before
+    around = Surroundings(
+        now_s=sample.now_s,
+        mode=supervision.mode,
+        fault=supervision.fault,
+        excited=requests.eta[0] == 0,
+        position_m=sample.position_m if fresh else None,
+        command_pa=memory.command_pa,
+        held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
+    )
+    return experiment_after(before, requests.experiment, around, settings.experiment)
 
 
 def _path(

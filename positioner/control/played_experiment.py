@@ -13,7 +13,6 @@ window; at once, without a way back, by another mode, by eta_1 = 0 and by a faul
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
 
 from config.codes import ExperimentState, Fault, Mode
 from positioner.control.requests import ExperimentRequest
@@ -34,8 +33,9 @@ class ExperimentLimits:
     high_m: float
 
 
-class Surroundings(NamedTuple):
-    """What permits an experiment, made anew in each step: `position_m` is None without a good measurement."""
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What permits an experiment: `position_m` is None without a good measurement."""
 
     now_s: float
     mode: Mode
@@ -68,6 +68,10 @@ class PlayedExperiment:
         """Whether it commands the pressure."""
         return self.state in (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
 
+    def is_idle(self, request: ExperimentRequest) -> bool:
+        """Whether nothing is under way, and nothing is asked for that was not yet taken note of."""
+        return request.starts == self.starts and not self.commands
+
     def elapsed_s(self, now_s: float) -> float:
         """Return the time since the end of the approach; 0 before it and where none is under way."""
         if self.state is not ExperimentState.UNDER_WAY:
@@ -88,9 +92,11 @@ def experiment_after(
     before: PlayedExperiment, request: ExperimentRequest, around: Surroundings, limits: ExperimentLimits
 ) -> PlayedExperiment:
     """Return the experiment after one more step."""
-    here = before if request.starts == before.starts else replace(before, starts=request.starts)
+    if before.is_idle(request):
+        return before
+    here = replace(before, starts=request.starts)
     if not here.commands:
-        return here if here is before else _started(here, request, around, limits)
+        return _started(here, request, around, limits)
     if (ended := _not_ours(around)) is not ExperimentState.NONE:
         return replace(here, state=ended)
     over = around.now_s - here.begin_s >= here.sequence[-1][0]
