@@ -11,7 +11,7 @@ An instant between all landings up and all landings down cannot be told from unl
 more in the first direction (the staircase does).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from math import sqrt
 
 import numpy as np
@@ -27,7 +27,7 @@ APART = 1e-3
 """Least singular value of what tells the unknowns apart."""
 
 
-def shifted(landings: Sequence[SlideOutcome], stroke_m: float) -> bool:
+def shifted(landings: Iterable[SlideOutcome], stroke_m: float) -> bool:
     """Return whether landings before and after some instant disagree.
 
     Args:

@@ -135,10 +135,17 @@ class StaticIdentification:
         self._elsewhere = self._elsewhere + 1 if elsewhere else 0
         return 0 < self._elsewhere < IN_A_ROW
 
-    def _slides_and_last(self) -> tuple[SlideOutcome, ...]:
-        """Return the slides, and the last landing even if by the law it is none: there the law may be wrong."""
-        last = max((each[0] for each in self._in_direction.values() if each), key=lambda one: one.time_s)
-        return self.landings if last in self.landings else (last, *self.landings)
+    def _shifted(self) -> bool:
+        """Return whether landings before and after some instant disagree.
+
+        The slides, and such as by the law are none, for it may be the law that is wrong: the last one, and ways longer
+        than any packing gives way.
+        """
+        both = (*self._in_direction[1], *self._in_direction[-1])
+        last = max(both, key=lambda each: each.time_s)
+        far = [each for each in both if abs(each.position_m - each.from_m) > LONGEST_WAY * self._stroke_m]
+        doubtful = ([last], [*far, last])
+        return any(shifted({*self.landings, *more}, self._stroke_m) for more in doubtful)
 
     def tested(self, estimates: Estimates) -> Estimates:
         """Return estimates whose friction is refused if the landings contradict it."""
@@ -164,7 +171,7 @@ class StaticIdentification:
 
     def accepted(self, applied: Applied) -> Applied:
         """Return what is applied after an identification by landings alone: the law's numbers, or those in use."""
-        if self.law.valid and shifted(self._slides_and_last(), self._stroke_m):
+        if self.law.valid and self._shifted():
             self.restart()
             self.law = no_static_law(Refusal.LANDINGS_SHIFTED)
         if not self.law.valid:
