@@ -8,6 +8,8 @@ from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
+    from config.valve_file import ValveFile
+    from workbench.select.diagnosis import Diagnosis
     from workbench.select.tangent_preview import TangentScore
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
@@ -32,9 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--experiment",
         type=Path,
-        default=Path("experiment.csv"),
         metavar="FILE",
-        help="where the input goes that would tell apart what the recordings do not (experiment.csv)",
+        help="write the input that would tell apart what the recordings do not",
+    )
+    parser.add_argument(
+        "-o", "--out", type=Path, metavar="BETTER.toml", help="write the valve with what is missing, if that is sure"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     add_export_arguments(parser)
@@ -46,13 +50,14 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.next_step import extend_commands
     from positioner.cli.parts.progress import show
     from workbench.data.imposed_motion import is_imposed
     from workbench.report import Subject, report_diagnosis, require_plotly
     from workbench.select.diagnosis import diagnose
     from workbench.select.diagnosis_json import as_json
 
-    for option in ("json", "report", "experiment"):
+    for option in ("json", "report", "experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
@@ -76,19 +81,46 @@ def run(arguments: argparse.Namespace) -> int:
             on_preview=_tell_preview,
             progress=show,
         )
-    if diagnosis.experiment:
-        diagnosis.experiment.write(arguments.experiment)
-        print(f"{arguments.experiment}: the experiment that would tell apart what the recordings do not")
+    commands = extend_commands(diagnosis, arguments)
     print(diagnosis.summary())
+    _tell_experiment(diagnosis, arguments.experiment)
+    for command in commands:
+        print(f"to add it: {command}" if len(commands) == 1 else f"one of: {command}")
+    if arguments.out is not None:
+        _write_valve(diagnosis, valve, arguments)
     if arguments.json is not None:
-        written = str(arguments.experiment) if diagnosis.experiment else None
+        written = str(arguments.experiment) if diagnosis.experiment and arguments.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
         write_json(arguments.json, whole)
     if arguments.report is not None:
         files = tuple(str(path) for path in (*arguments.recordings, arguments.test) if path)
         subject = Subject(valve, files, recordings[0].metadata)
-        report_diagnosis(diagnosis, arguments.report, subject, str(arguments.experiment))
+        report_diagnosis(diagnosis, arguments.report, subject, commands)
     return 0 if diagnosis.verdict == "adequate" else 1
+
+
+def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
+    if diagnosis.experiment is None:
+        return
+    if path is None:
+        print("--experiment FILE writes the experiment that would tell apart what the recordings do not")
+        return
+    diagnosis.experiment.write(path)
+    print(f"{path}: the experiment that would tell apart what the recordings do not")
+
+
+def _write_valve(diagnosis: "Diagnosis", valve: "ValveFile", arguments: argparse.Namespace) -> None:
+    """Write what was found with its journal, where the diagnosis is sure of it; say so where it is not."""
+    from config.valve_file import find_valve
+    from positioner.cli.parts.next_step import not_written
+    from workbench.select.extension import extension_of
+    from workbench.select.extension_journal import write_extended
+
+    if diagnosis.verdict != "missing":
+        print(not_written(arguments.out, diagnosis))
+        return
+    journal = write_extended(extension_of(diagnosis, valve), find_valve(arguments.valve), arguments.out)
+    print(f"{arguments.out}: {journal.steps[-1].why}")
 
 
 def _tell_preview(suspects: "tuple[TangentScore, ...]") -> None:

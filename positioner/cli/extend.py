@@ -20,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="added together; an own effect by its .py file",
     )
-    parser.add_argument("--fit", type=Path, required=True, metavar="REC", help="a recording")
-    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recording)")
+    parser.add_argument("--fit", type=Path, nargs="+", required=True, metavar="REC", help="one or several recordings")
+    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="NEW.toml")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal, to be read in a browser")
@@ -34,12 +34,11 @@ def run(arguments: argparse.Namespace) -> int:
     import time
 
     from config.valve_file import find_valve, load_valve
-    from config.writing import write_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import show
     from workbench.report import report_journal, require_plotly
     from workbench.select.extension import extend
-    from workbench.select.extension_journal import Journal
+    from workbench.select.extension_journal import Journal, write_extended
     from workbench.select.extension_json import as_json
 
     writable(arguments.out, "-o")
@@ -50,16 +49,15 @@ def run(arguments: argparse.Namespace) -> int:
     began_s = time.monotonic()
     path = find_valve(arguments.valve)
     valve = load_valve(path)
-    recording = read_any(arguments.fit, arguments, valve.valve.stroke_m)
+    recordings = [read_any(each, arguments, valve.valve.stroke_m) for each in arguments.fit]
     test = read_any(arguments.test, arguments, valve.valve.stroke_m) if arguments.test else None
-    before = Journal.beside(path)
-    with naming({"recording": str(arguments.fit), "valve file": arguments.valve}):
-        extension = extend(recording, valve, arguments.effect, test=test, seed=arguments.seed, progress=show)
-    journal = before.followed_by(extension)
-    write_valve(arguments.out, extension.valve, journal.remarks)
-    journal.write_beside(arguments.out)
+    Journal.beside(path)  # what is none is refused before the work begins
+    with naming({"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}):
+        extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=show)
+    journal = write_extended(extension, path, arguments.out)
     print(extension.summary())
-    print(f"{arguments.out}: {journal.steps[-1].why}")
+    worth = "" if extension.falls else "written, though the effect is not worth it: "
+    print(f"{arguments.out}: {worth}{journal.steps[-1].why}")
     if arguments.json is not None:
         whole = as_json(extension) | {"valve": str(arguments.out), "seconds": time.monotonic() - began_s}
         write_json(arguments.json, whole)

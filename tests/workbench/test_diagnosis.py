@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 
 from config.recording import Recording, read_table, write_recording
+from config.valve_file import load_valve
 from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.fit.fitting import fit
 from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.experiment import MENU, experiment
+from workbench.select.extension import extension_of
+from workbench.select.extension_journal import Journal, write_extended
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.05)
@@ -66,6 +69,19 @@ def test_a_valve_is_no_experiment_away_from_itself(diagnosed: Diagnosis, monkeyp
     assert experiment(twins, diagnosed.split.test.record).separation < 1.1
 
 
+def test_what_was_found_is_written_as_extend_writes_it(diagnosed: Diagnosis, tmp_path: Path) -> None:
+    given, out = tmp_path / "given.toml", tmp_path / "better.toml"
+    given.write_text(valve_toml(SEED), encoding="utf-8")
+    extension = extension_of(diagnosed, SEED)
+    assert extension.effects == ("ip_lag",)
+    assert extension.falls
+    assert extension.given_test_rmse_m >= extension.refitted_errors.test_rmse_m > extension.extended_errors.test_rmse_m
+    write_extended(extension, given, out)
+    assert load_valve(out) == diagnosed.best.fit.valve
+    (step,) = Journal.beside(out).steps
+    assert step.effects == ("ip_lag",)
+
+
 PUSH = '''"""A push that grows with speed."""
 from typing import Annotated, NamedTuple
 from sim.effect import Parameter
@@ -87,11 +103,13 @@ def test_a_parameter_that_would_have_to_be_negative_is_not_physical(tmp_path: Pa
     assert drag.value == pytest.approx(0.0, abs=1.0)
 
 
-def test_nothing_hidden_nothing_found(tmp_path: Path) -> None:
+def test_nothing_hidden_nothing_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_recording(tmp_path / "rec.csv", record_of(BARE, 4, COUNT))
     (tmp_path / "valve.toml").write_text(valve_toml(SEED), encoding="utf-8")
     said = _diagnosed(tmp_path, "sensor_gain")
     assert said["status"] == 0
+    assert capsys.readouterr().out.endswith("better.toml: not written: nothing is missing\n")
+    assert not (tmp_path / "better.toml").exists()
     assert said["verdict"] == "adequate"
     assert said["missing"] == said["suspected"] == []
     assert said["base"]["parameters"] == said["best"]["parameters"]
@@ -111,7 +129,14 @@ def test_a_stem_that_hardly_moves_is_said_with_the_files_name(
 
 def _diagnosed(folder: Path, *effects: str) -> dict[str, Any]:
     words = ["diagnose", str(folder / "rec.csv"), "--valve", str(folder / "valve.toml"), "--effects", *effects]
-    words += ["--json", str(folder / "said.json"), "--experiment", str(folder / "experiment.csv")]
+    words += [
+        "--json",
+        str(folder / "said.json"),
+        "--experiment",
+        str(folder / "experiment.csv"),
+        "-o",
+        str(folder / "better.toml"),
+    ]
     status = main(words)
     said: dict[str, Any] = json.loads((folder / "said.json").read_text())
     return {"status": status} | said

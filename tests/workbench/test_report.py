@@ -83,7 +83,7 @@ def test_the_same_diagnosis_gives_the_same_bytes(diagnosed: tuple[Diagnosis, Sub
 
 
 def test_a_comparison_is_reported_in_full(page: Page, compared: tuple[Comparison, Subject]) -> None:
-    wanted = ["verdict", "overlay", "phases", "friction", "slips", "statistics", "recording", "words"]
+    wanted = ["verdict", "overlay", "signature", "phases", "friction", "slips", "statistics", "recording", "words"]
     assert page.sections == wanted
     for sentence in compared[0].sentences:
         assert sentence[1:] in page.words
@@ -96,6 +96,7 @@ def test_a_diagnosis_is_reported_in_full(diagnosed_page: Page, diagnosed: tuple[
         "verdict",
         "fall",
         "overlay",
+        "signature",
         "where",
         "ranking",
         "added",
@@ -128,6 +129,33 @@ def test_the_overlay_is_the_comparison_s(page: Page, compared: tuple[Comparison,
     np.testing.assert_allclose(traces["measured"]["x"], comparison.time_s, atol=1e-5)
 
 
+def test_the_signature_is_position_over_command(page: Page, compared: tuple[Comparison, Subject]) -> None:
+    traces = {each["name"]: each for each in page.figures["plot-signature"]["data"]}
+    comparison = compared[0]
+    np.testing.assert_allclose(traces["measured"]["x"], 1e-3 * comparison.command_pa, atol=1e-3)
+    np.testing.assert_allclose(traces["measured"]["y"], 1e3 * comparison.measured_m, atol=1e-4)
+    np.testing.assert_allclose(traces["model"]["y"], 1e3 * comparison.simulated_m, atol=1e-4)
+
+
+def test_the_signature_of_a_diagnosis_has_both_models(diagnosed_page: Page) -> None:
+    assert [each["name"] for each in diagnosed_page.figures["plot-signature"]["data"]] == [
+        "measured",
+        "before",
+        "after",
+    ]
+
+
+def test_the_error_falls_on_a_logarithmic_axis_that_shows_the_floor(
+    diagnosed_page: Page, diagnosed: tuple[Diagnosis, Subject]
+) -> None:
+    axes = diagnosed_page.figures["plot-fall"]["layout"]
+    (floor,) = axes["shapes"]
+    low, high = axes["yaxis"]["range"]
+    assert axes["yaxis"]["type"] == "log"
+    assert floor["y0"] == pytest.approx(1e3 * diagnosed[0].split.floor_m)
+    assert low < np.log10(floor["y0"]) < high
+
+
 def test_the_ranking_has_the_diagnosis_s_numbers(diagnosed_page: Page, diagnosed: tuple[Diagnosis, Subject]) -> None:
     candidates = {each.name: each for each in diagnosed[0].steps[0].candidates}
     for row in diagnosed_page.tables["table-ranking-1"][1:]:
@@ -150,10 +178,10 @@ def test_what_no_record_tells_apart_is_said_so(diagnosed_page: Page, diagnosed: 
 def test_the_experiment_is_drawn(diagnosed: tuple[Diagnosis, Subject], tmp_path: Path) -> None:
     chosen = Experiment("staircase", 7.25, np.arange(4.0), np.array([1e4, 2e4, 3e4, 1e4]))
     path = tmp_path / "chosen.html"
-    report_diagnosis(replace(diagnosed[0], experiment=chosen), path, diagnosed[1], "next/input.csv")
+    report_diagnosis(replace(diagnosed[0], experiment=chosen), path, diagnosed[1], ["positioner extend <one>"])
     page = read(path)
     assert page.figures["plot-experiment"]["data"][0]["y"] == [10.0, 20.0, 30.0, 10.0]
-    for said in ("staircase", "7.25 times", "next/input.csv"):
+    for said in ("staircase", "7.25 times", "positioner extend <one>"):
         assert said in page.words
 
 

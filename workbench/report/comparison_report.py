@@ -26,6 +26,7 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.plot_series import MOST, stretch
+from workbench.report.signature_loop import signature
 from workbench.report.units import Shown, length, of_stroke, times
 
 MEANINGS = {
@@ -71,6 +72,7 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> N
             _verdict(comparison),
             _key_figures(comparison, stroke_m),
             _overlay(comparison),
+            signature(comparison.command_pa, comparison.measured_m, [_model(comparison)]),
             _phases(comparison, stroke_m),
             _friction(comparison),
             _slips(comparison),
@@ -118,13 +120,17 @@ def _is_noise(each: Comparison) -> bool:
     return each.repeatability_m is None or each.repeatability_m <= each.noise_m
 
 
+def _model(each: Comparison) -> Simulated:
+    return Simulated("model", MODEL, each.simulated_m)
+
+
 def _overlay(each: Comparison) -> Html:
     valid = np.isfinite(each.residual_m)
     figure = overlay(
         each.time_s,
         each.command_pa,
         each.measured_m,
-        [Simulated("model", MODEL, each.simulated_m)],
+        [_model(each)],
         phase_shades(each.phase, valid),
         each.slips,
     )

@@ -1,5 +1,6 @@
 """The report of a diagnosis: what is missing, how the error fell, what is not told apart, what to measure next."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from workbench.report.page import (
     glossary,
     heading,
     plot,
+    preformatted,
     section,
     table,
     text,
@@ -32,6 +34,7 @@ from workbench.report.page import (
 )
 from workbench.report.plot_series import drawn, rounded
 from workbench.report.ranking import RankedEffect
+from workbench.report.signature_loop import signature
 from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import LEAST_BIC
@@ -67,16 +70,14 @@ def _validation(diagnosis: Diagnosis) -> _Validation:
     return _Validation(part.recording, part.counted, diagnosis.split.floor_m, base, best)
 
 
-def report_diagnosis(
-    diagnosis: Diagnosis, path: Path, subject: Subject, experiment_file: str = "experiment.csv"
-) -> None:
+def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, commands: Sequence[str] = ()) -> None:
     """Write the report.
 
     Args:
         diagnosis: what `diagnose` returned.
         path: the HTML file.
         subject: the valve as it was given, and the recordings.
-        experiment_file: where the experiment's input was or would be written, for the reader.
+        commands: that act on the verdict, to be typed.
 
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
@@ -92,11 +93,12 @@ def report_diagnosis(
             _key_figures(diagnosis, validation),
             _fall(diagnosis, validation),
             _overlay(validation),
+            signature(validation.base.command_pa, validation.base.measured_m, _models(validation)),
             _where(validation),
             _ranking(diagnosis, validation),
             _added(diagnosis),
             not_told_apart(diagnosis.indistinguishable, _names(diagnosis), diagnosis.missing, "see the next section"),
-            _next(diagnosis, experiment_file),
+            _next(diagnosis, commands),
             _undetectable(diagnosis),
             _preview(diagnosis),
             recording(subject, diagnosis.split.train.record.notes, []),
@@ -174,8 +176,8 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
             "plot-fall",
             figure,
             300,
-            f"Error, rms, of each model. The held-out data it had not seen before. Dashed: the floor, "
-            f"{length(validation.floor_m).text} mm.",
+            f"Error, rms, of each model, on a logarithmic scale. The held-out data it had not seen before. Dashed: the "
+            f"floor, {length(validation.floor_m).text} mm.",
         ),
         table("table-fall", head, rows),
         text(
@@ -185,17 +187,22 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
     )
 
 
-def _overlay(validation: _Validation) -> Html:
+def _models(validation: _Validation) -> list[Simulated]:
     base, best = validation.base, validation.best
     models = [Simulated("before", MODEL, base.simulated_m)]
     if base is not best and not np.array_equal(base.simulated_m, best.simulated_m, equal_nan=True):
         models.append(Simulated("after", EXTENDED, best.simulated_m))
+    return models
+
+
+def _overlay(validation: _Validation) -> Html:
+    base = validation.base
     whole = bool(validation.held_out.all())
     figure = overlay(
         base.time_s,
         base.command_pa,
         base.measured_m,
-        models,
+        _models(validation),
         [] if whole else [Shade("held out", HELD_OUT, validation.held_out)],
     )
     told = "All of it was held out." if whole else "On the green ground: what was held out."
@@ -266,20 +273,23 @@ def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
     return Row([words, shown(before), shown(after), interval, unit], remark)
 
 
-def _next(diagnosis: Diagnosis, experiment_file: str) -> Html:
+def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
     chosen = diagnosis.experiment
+    adding = (text("To add what is missing, type:" if len(commands) == 1 else "To add one of them, type:"),)
+    acting = (*adding, preformatted("\n".join(commands))) if commands else ()
     if chosen is None:
-        return section("next", "What to measure next", bullets(_advice(diagnosis)))
+        return section("next", "What to do next", *acting, bullets(_advice(diagnosis)))
     return section(
         "next",
-        "What to measure next",
+        "What to do next",
         text(
             f"Play this command to the valve: {chosen.name}. It was chosen from a menu by what it tells apart after "
             f"every rival has been refitted: the wrong one is then left with an error of {chosen.separation:.3g} times "
             "the sensor's noise. It stays within the pressures of the recording and begins at rest.",
         ),
-        plot("plot-experiment", _command(chosen), 260, f"The command of the experiment, in {experiment_file}."),
+        plot("plot-experiment", _command(chosen), 260, "The command of the experiment; --experiment FILE writes it."),
         text("Then diagnose again with both recordings."),
+        *acting,
     )
 
 

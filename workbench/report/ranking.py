@@ -93,32 +93,42 @@ def _ticks(values: Sequence[float]) -> Figure:
 
 
 def error_reduction(stages: Sequence[tuple[str, float, float]], floor: float | None, of: Quantity) -> Figure:
-    """Return the errors of the models in the order they were made: name, fitted and held-out rms, SI."""
+    """Return the errors of the models in the order they were made, on a logarithmic scale.
+
+    Args:
+        stages: name, fitted and held-out rms, SI.
+        floor: what no model undercuts, SI; None where it is not known.
+        of: the quantity of the errors.
+    """
     names = [name for name, _, _ in stages]
+    levels = [] if floor is None else [floor]
+    shown = [of.factor * each for each in (*levels, *(error for stage in stages for error in stage[1:]))]
     traces = []
-    for label, column, colour in (("fitted", 1, "#c3cad3"), ("held out", 2, EXTENDED)):
+    kinds = (("fitted", "#9aa4b1", "diamond-open", "dot"), ("held out", EXTENDED, "circle", "solid"))
+    for column, (label, colour, symbol, dash) in enumerate(kinds, start=1):
         errors = np.array([stage[column] for stage in stages], np.float64)
         traces.append(
             {
-                "type": "bar",
+                "type": "scatter",
+                "mode": "lines+markers+text",
                 "name": label,
                 "x": names,
                 "y": significant(of.factor * errors),
                 "customdata": significant(errors),
-                "text": [f"{of.factor * each:.3g}" for each in errors.tolist()],
-                "textposition": "outside",
+                "text": [f"{of.factor * each:.3g}" if label == "held out" else "" for each in errors.tolist()],
+                "textposition": "top right",
                 "cliponaxis": False,
-                "marker": {"color": colour},
+                "line": {"color": colour, "width": 1.4, "dash": dash},
+                "marker": {"color": colour, "symbol": symbol, "size": 10},
                 "hovertemplate": f"%{{y:.4~g}} {of.unit} (%{{customdata:.4~g}} {of.si})<extra>%{{x}}, {label}</extra>",
             }
         )
     return {
         "data": traces,
         "layout": layout(
-            xaxis=axis(""),
-            yaxis=axis(f"error, rms, {of.unit}", rangemode="tozero"),
-            shapes=[] if floor is None else [_across(of.factor * floor)],
-            bargap=0.45,
+            xaxis=axis("", range=[-0.4, len(names) - 0.6]),
+            yaxis=axis(f"error, rms, {of.unit}", type="log", **_ticks(shown)),
+            shapes=[_across(of.factor * each) for each in levels],
         ),
     }
 

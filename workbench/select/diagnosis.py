@@ -48,7 +48,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
 
     def blocks(self) -> list[Block]:
         """Say the verdict, what was tried in each step, and what the recordings would not show."""
-        said: list[Block] = [f"{self.verdict}: {self.sentence}"]
+        sentence = self.sentence.removeprefix("Missing: ") if self.verdict == "missing" else self.sentence
+        said: list[Block] = [f"{self.verdict}: {sentence}"]
         for number, step in enumerate(self.steps, start=1):
             errors = step.before.errors
             title = (

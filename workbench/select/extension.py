@@ -23,6 +23,7 @@ from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import Fit, fit
 from workbench.model.free_run import FreeRun
 from workbench.select.block_errors import BlockErrors, block_errors
+from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import Gain, gain
 
 if TYPE_CHECKING:
@@ -160,6 +161,27 @@ def extend(
         extended=after,
         extended_errors=after_errors,
         gain=gain(before, after, before_errors, after_errors),
+        split=on,
+    )
+
+
+def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
+    """Return what a diagnosis has added to the valve that it began with; nothing is fitted again.
+
+    Args:
+        diagnosis: that named what is missing.
+        valve: as it was given.
+    """
+    before, after, on = diagnosis.base, diagnosis.best, diagnosis.split
+    return Extension(
+        effects=diagnosis.missing,
+        given_train_rmse_m=_rmse_m(valve, on.train),
+        given_test_rmse_m=_rmse_m(valve, on.test),
+        refitted=before.fit,
+        refitted_errors=before.errors,
+        extended=after.fit,
+        extended_errors=after.errors,
+        gain=gain(before.fit, after.fit, before.errors, after.errors),
         split=on,
     )
 

@@ -8,6 +8,7 @@ from typing import Self
 
 from config.errors import InputError
 from config.loading import Schema, validated
+from config.writing import write_valve
 from workbench.select.extension import Extension
 
 
@@ -82,6 +83,23 @@ class Journal(Schema):
             f"{1e3 * each.extended_test_rmse_m:.4g} mm rms; {each.why}"
             for i, each in enumerate(self.steps, start=1)
         )
+
+
+def write_extended(extension: Extension, given: Path, out: Path) -> Journal:
+    """Write an extended valve's file, its journal beside it; return the journal.
+
+    Args:
+        extension: to be written.
+        given: the valve file that was extended, whose journal goes on.
+        out: the new file.
+
+    Raises:
+        InputError: what lies beside the given file is not a journal.
+    """
+    journal = Journal.beside(given).followed_by(extension)
+    write_valve(out, extension.valve, journal.remarks)
+    journal.write_beside(out)
+    return journal
 
 
 def journal_path(valve: Path) -> Path:

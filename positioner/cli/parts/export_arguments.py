@@ -46,6 +46,21 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     export.add_argument("--sheet", metavar="NAME", help="of a workbook (else the one that has the columns)")
 
 
+def export_words(arguments: argparse.Namespace) -> list[str]:
+    """Return the words of these arguments as they were given, for a command that reads the same files."""
+    words: list[str] = []
+    for name in ("column", *BESIDES):
+        given = getattr(arguments, name)
+        flag = f"--{name.replace('_', '-')}"
+        if name in ("column", "status"):
+            words += [word for each in given for word in (flag, each)]
+        elif name == "range_pa" and given:
+            words += [flag, *(f"{each:g}" for each in given)]
+        elif given is not None:
+            words += [flag, f"{given:g}" if name == "stroke_m" else given]
+    return words
+
+
 def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":
     """Read a recording, or an export if columns are mapped, all of a command's by the same mapping.
 

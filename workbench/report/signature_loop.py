@@ -1,0 +1,39 @@
+"""The signature of a valve: position over command, a loop whose width is friction; measured, and of each model.
+
+What widens the loop is friction, what tilts it the spring, what bends it a spring or a sensor that is not straight, and
+what shifts it whole a preload or a sensor's offset.
+"""
+
+from collections.abc import Sequence
+
+from config.recording import Column
+from workbench.report.charts import MEASURED, Figure, Trace, axis, layout, line
+from workbench.report.overlay import Simulated
+from workbench.report.page import Html, plot, section
+from workbench.report.plot_series import extremes, rounded
+
+MOST = 6000
+"""Points drawn of one loop at most."""
+TOLD = (
+    "Position over command. Friction widens the loop, the spring tilts it, a preload or a sensor's offset shifts it; "
+    "where measurement and model part, the model lacks something there."
+)
+
+
+def signature(command_pa: Column, measured_m: Column, models: Sequence[Simulated]) -> Html:
+    """Return the section; command, Pa, and positions, m, are (n,), NaN where there is nothing."""
+    traces = [_loop(command_pa, measured_m, "measured", MEASURED)]
+    traces += [_loop(command_pa, each.position_m, each.name, each.colour) for each in models]
+    figure: Figure = {"data": traces, "layout": layout(xaxis=axis("command, kPa"), yaxis=axis("position, mm"))}
+    return section("signature", "The signature: position over command", plot("plot-signature", figure, 420, TOLD))
+
+
+def _loop(command_pa: Column, position_m: Column, name: str, colour: str) -> Trace:
+    rows = extremes(position_m, MOST)
+    return line(
+        rounded(1e-3 * command_pa[rows], 3),
+        rounded(1e3 * position_m[rows], 4),
+        name,
+        colour,
+        "%{y:.3f} mm at %{x:.2f} kPa",
+    )
