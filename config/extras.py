@@ -14,6 +14,7 @@ EXTRAS = {
     "canopen": "canopen",
     "can": "canopen",
     "cryptography": "tls",
+    "shtab": "completion",
 }
 """The extra, by the name of the module that is missing."""
 

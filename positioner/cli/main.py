@@ -34,6 +34,7 @@ COMMANDS = (
     "reproduce",
     "hide",
     "certificates",
+    "completion",
 )
 
 MODULES = {"import": "import_recording", "valve": "valve_from_data_sheet"}
