@@ -23,9 +23,7 @@ def completed(words: Path, *typed: str) -> set[str]:
     """Return what bash proposes for the last word."""
     function = "_shtab_positioner"
     line = " ".join(typed)
-    script = (
-        f"source {words}; COMP_WORDS=({line}); COMP_CWORD={len(typed) - 1}; {function}; echo ${{COMPREPLY[@]}}"
-    )
+    script = f"source {words}; COMP_WORDS=({line}); COMP_CWORD={len(typed) - 1}; {function}; echo ${{COMPREPLY[@]}}"
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True, cwd=words.parent)
     return set(done.stdout.split())
 
