@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.next_step import extend_commands
-    from positioner.cli.parts.progress import show
+    from positioner.cli.parts.progress import Progress
     from workbench.data.imposed_motion import is_imposed
     from workbench.report import Subject, report_diagnosis, require_plotly
     from workbench.select.diagnosis import diagnose
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
             effects=arguments.effects,
             seed=arguments.seed,
             on_preview=_tell_preview,
-            progress=show,
+            progress=Progress(),
         )
     commands = extend_commands(diagnosis, arguments)
     print(diagnosis.summary())

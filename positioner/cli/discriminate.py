@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.experiment_player import player_on, require_ready
     from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import show
+    from positioner.cli.parts.progress import Progress
     from sim.effect import find_effect, shipped_effects
     from workbench.select.diagnosis import diagnose
     from workbench.select.discrimination import discriminate, rivals_of
@@ -59,7 +59,9 @@ def run(arguments: argparse.Namespace) -> int:
     make_folder(arguments.out)
     named = {"recording": ", ".join(map(str, arguments.rec)), "valve file": arguments.valve}
     with naming(named):
-        found = diagnose(recordings, valve, test=test, effects=arguments.effects, seed=arguments.seed, progress=show)
+        found = diagnose(
+            recordings, valve, test=test, effects=arguments.effects, seed=arguments.seed, progress=Progress()
+        )
     print(found.sentence, flush=True)
     fits = rivals_of(found)
     if found.verdict != "one_of":

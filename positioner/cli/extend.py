@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import show
+    from positioner.cli.parts.progress import Progress
     from workbench.report import report_journal, require_plotly
     from workbench.select.extension import extend
     from workbench.select.extension_journal import Journal, write_extended
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     test = read_any(arguments.test, arguments, valve.valve.stroke_m) if arguments.test else None
     Journal.beside(path)  # what is none is refused before the work begins
     with naming({"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}):
-        extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=show)
+        extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=Progress())
     journal = write_extended(extension, path, arguments.out)
     print(extension.summary())
     worth = "" if extension.falls else "written, though the effect is not worth it: "

@@ -1,10 +1,33 @@
-"""Progress on a terminal: one line on standard error, written over; nothing where it is not a terminal."""
+"""Progress of long work on standard error: on a terminal one line, written over; in a log a line now and then."""
 
 import sys
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+SELDOM_S = 20.0
+"""Time between two lines of a log; what is done sooner leaves none."""
 
 
-def show(what: str, done: float) -> None:
-    """Show what is being done and the fraction done."""
-    if sys.stderr.isatty():
-        bar = "#" * round(20 * done)
-        print(f"\r\033[K{what} [{bar:<20}] {done:.0%}", end="\n" if done >= 1.0 else "", file=sys.stderr, flush=True)
+class Progress:
+    """What is being done, and the fraction of it done, as it is told.
+
+    Args:
+        stream: by default standard error.
+        clock: time, s.
+    """
+
+    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._stream = stream or sys.stderr
+        self._clock = clock
+        self._told_s = clock()
+
+    def __call__(self, what: str, done: float) -> None:
+        """Tell what is being done and the fraction done."""
+        if self._stream.isatty():
+            bar = "#" * round(20 * done)
+            end = "\n" if done >= 1.0 else ""
+            print(f"\r\033[K{what} [{bar:<20}] {done:.0%}", end=end, file=self._stream, flush=True)
+        elif (now_s := self._clock()) - self._told_s >= SELDOM_S:
+            self._told_s = now_s
+            print(f"{what}: {done:.0%}", file=self._stream, flush=True)
