@@ -2,6 +2,7 @@
 
     driver, only_watch    drives a node; reads one that another drives
     sdo, pdo              what is asked and set; the cycle's frames
+    found_pdos            PDOs used as the node has them
     watcher, events       heartbeats, boot-up, emergencies; what can happen
     activation            the device states of CiA 408
     readings, node_bus    what the boundary gets of the node; the node's frames

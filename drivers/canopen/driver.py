@@ -78,11 +78,12 @@ class CanopenDriver:
         """
         self.close()
         try:
-            own_ids = (first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
-            self._bus.open((*own_ids, *self._pdos.tpdo_ids))
+            own_ids = tuple(first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
+            self._bus.open(own_ids)
             self._sdo.open()
             held_pa = self._sdo.held_command_pa(self._config.map.command_pa)
             wanted = self._wanted()
+            self._bus.hear((*own_ids, *self._pdos.tpdo_ids))
             self._sdo.require_alone()
             self._set(wanted)
             self._manage(START)

@@ -14,6 +14,7 @@ from contextlib import suppress
 from typing import Any
 
 import can
+from can.typechecking import CanFilter
 
 from config.canopen_device import CanopenDevice
 from drivers.boundary import DriverError, NoConnection
@@ -47,12 +48,19 @@ class NodeBus:
         Raises:
             NoConnection: the bus cannot be opened.
         """
-        filters = [{"can_id": each, "can_mask": WHOLE_ID, "extended": False} for each in identities]
         try:
-            self._bus = can.Bus(can_filters=filters, **self._arguments)
+            self._bus = can.Bus(can_filters=_filters(identities), **self._arguments)
         except Exception as error:  # somebody else's interface: it may raise anything
             said = " ".join(str(error).split())
             raise self.fault(NoConnection, NodeEvent.BUS_OFF, f"the bus cannot be opened: {said}") from None
+
+    def hear(self, identities: Iterable[int]) -> None:
+        """Receive these arbitration ids from now on.
+
+        Raises:
+            NoConnection: the bus is not open.
+        """
+        self.require_open().set_filters(_filters(identities))
 
     def close(self) -> None:
         """Leave the bus, if it was joined. Never raises."""
@@ -125,3 +133,7 @@ class NodeBus:
 
     def _off(self, said: str) -> DriverError:
         return self.closing_fault(NoConnection, NodeEvent.BUS_OFF, " ".join(said.split()))
+
+
+def _filters(identities: Iterable[int]) -> list[CanFilter]:
+    return [{"can_id": each, "can_mask": WHOLE_ID, "extended": False} for each in identities]

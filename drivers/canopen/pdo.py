@@ -4,13 +4,15 @@
     SYNC    `sync_cob_id`        empty
     TPDOs   0x180, 0x280, .. + n the quantities of one sample     sent at each SYNC (transmission type 1)
 
-What a PDO carries is set by SDO in its records (0x1400 and 0x1600, 0x1800 and 0x1A00 on), the quantities packed first
-fit into 8 bytes each. A TPDO too short, twice, or without SYNC cannot be trusted: the bus is left.
+PDOs that carry what is wanted are used as they were found (`found_pdos`). Else what a PDO carries is set by SDO in its
+records (0x1400 and 0x1600, 0x1800 and 0x1A00 on), the quantities packed first fit into 8 bytes each. A TPDO too short,
+twice, or without SYNC cannot be trusted: the bus is left.
 """
 
 import math
 import struct
 import time
+from collections.abc import Mapping, Sequence
 
 import can
 from canopen.objectdictionary import ObjectDictionary, ODVariable
@@ -19,16 +21,14 @@ from config.canopen_device import CanopenDevice, Entry
 from config.errors import InputError
 from drivers.boundary import BadReply, NoNumber, NoReply
 from drivers.canopen.events import NodeEvent
+from drivers.canopen.found_pdos import EACH_SYNC, INVALID, MAPPING, FoundPdo, found_pdos, that_carry, that_takes
 from drivers.canopen.node_bus import NodeBus
 from drivers.canopen.sdo import REALS, SdoTransfers, Setting, sheet_variable
 from drivers.canopen.watcher import NodeWatcher
 from fieldbus.canopen.objects import MOST_PDOS, Control, first_fit
 
-RPDO, TPDO, MAPPING = 0x1400, 0x1800, 0x200
-"""First communication records; the mapping of each lies 0x200 higher."""
-INVALID = 1 << 31
-"""Of a PDO's COB-ID."""
-EACH_SYNC = 1
+RPDO, TPDO = 0x1400, 0x1800
+"""First communication records."""
 RPDO_ID, TPDO_ID = 0x200, 0x180
 
 
@@ -38,20 +38,24 @@ class Pdo:
     Args:
         record: the index of its communication record.
         cob_id: its arbitration id.
-        entries: where each of its quantities lies, by name.
+        entries: where each of its quantities lies, by name, in the order of the bytes; a number is so many bytes of
+            what is not wanted.
         variables: what the data sheet says of each.
     """
 
-    def __init__(self, record: int, cob_id: int, entries: dict[str, Entry], variables: dict[str, ODVariable]) -> None:
+    def __init__(
+        self, record: int, cob_id: int, entries: Sequence[tuple[str, Entry] | int], variables: Mapping[str, ODVariable]
+    ) -> None:
         self.record, self.cob_id = record, cob_id
-        self.names = tuple(entries)
-        self.entries = tuple(entries.values())
-        objects = [variables[name] for name in entries]
+        named = dict(each for each in entries if not isinstance(each, int))
+        self.names = tuple(named)
+        self.entries = tuple(named.values())
+        objects = [variables[name] for name in named]
         self.mapping = [each.index << 16 | each.subindex << 8 | len(each) for each in objects]
-        letters = (ODVariable.STRUCT_TYPES[each.data_type or 0].format.lstrip("<") for each in objects)
+        letters = (f"{each}x" if isinstance(each, int) else _letter(variables[each[0]]) for each in entries)
         self.layout = struct.Struct("<" + "".join(letters))
         self._is_plain = all(entry.scale == 1 and entry.offset == 0 for entry in self.entries)
-        self._is_real = objects[0].data_type in REALS
+        self._is_real = [each.data_type in REALS for each in objects]
 
     def values(self, data: bytes | bytearray) -> dict[str, float]:
         """Return the quantities by name, in the map's units."""
@@ -60,17 +64,18 @@ class Pdo:
             raw = tuple(entry.value(each) for entry, each in zip(self.entries, raw, strict=True))
         return dict(zip(self.names, raw, strict=True))
 
-    def command(self, command_pa: float, control: Control) -> bytes:
-        """Return the bytes of a command, in Pa, and the control word if it is mapped.
+    def packed(self, values: Mapping[str, float]) -> bytes:
+        """Return the bytes of quantities, in the map's units.
 
         Raises:
-            ValueError: the command is not a finite number, or its object cannot hold it.
+            ValueError: one is not a finite number, or its object cannot hold it.
         """
-        raw = self.entries[0].raw(command_pa)
+        numbers = [entry.raw(values[name]) for name, entry in zip(self.names, self.entries, strict=True)]
         try:
-            return self.layout.pack(raw if self._is_real else round(raw), *(int(control),)[: len(self.names) - 1])
+            pairs = zip(numbers, self._is_real, strict=True)
+            return self.layout.pack(*(each if is_real else round(each) for each, is_real in pairs))
         except (struct.error, OverflowError):
-            raise ValueError(f"{command_pa:g} does not fit") from None
+            raise ValueError(f"{values['command_pa']:g} does not fit") from None
 
     def wanted(self, sdo: SdoTransfers) -> list[Setting]:
         """Return what to set, in order; nothing where the node's PDO is so already. Raises as `SdoTransfers.upload`."""
@@ -82,6 +87,10 @@ class Pdo:
             return []
         invalid, empty = Setting(self.record, 1, self.cob_id | INVALID), Setting(mapped, 0, 0)
         return [invalid, kind, empty, *mapping, whole, valid]
+
+
+def _letter(variable: ODVariable) -> str:
+    return ODVariable.STRUCT_TYPES[variable.data_type or 0].format.lstrip("<")
 
 
 class PdoExchange:
@@ -101,16 +110,13 @@ class PdoExchange:
         self._sheet, self._bus, self._watcher = sheet, bus, watcher
         self._reply_timeout_s = config.reply_timeout_s
         sampled, commanded = config.map.sampled, config.map.commanded
-        variables = {
+        self._variables = {
             name: sheet_variable(sheet, config, name, entry) for name, entry in {**sampled, **commanded}.items()
         }
-        groups = self._grouped(config, {name: len(variables[name]) // 8 for name in sampled})
-        self._tpdos = {
-            self._tpdo_id(n): Pdo(TPDO + n, self._tpdo_id(n), {each: sampled[each] for each in names}, variables)
-            for n, names in enumerate(groups)
-        }
-        self._rpdo = Pdo(RPDO, RPDO_ID + bus.node, commanded, variables)
-        self._command = can.Message(arbitration_id=self._rpdo.cob_id, data=bytes(8), is_extended_id=False)
+        self._sampled, self._commanded = sampled, commanded
+        self._groups = self._grouped(config, {name: len(self._variables[name]) // 8 for name in sampled})
+        self._tpdos: dict[int, Pdo] = {}
+        self._use_own()
         self._sync = can.Message(arbitration_id=config.sync_cob_id, is_extended_id=False)
 
     @property
@@ -118,12 +124,49 @@ class PdoExchange:
         """The arbitration ids of the TPDOs in use."""
         return tuple(self._tpdos)
 
+    def _use_own(self) -> None:
+        """Use PDOs by the predefined connection set."""
+        self._tpdos = {
+            self._tpdo_id(n): Pdo(
+                TPDO + n, self._tpdo_id(n), [(each, self._sampled[each]) for each in names], self._variables
+            )
+            for n, names in enumerate(self._groups)
+        }
+        self._use_rpdo(Pdo(RPDO, RPDO_ID + self._bus.node, list(self._commanded.items()), self._variables))
+
+    def _use_rpdo(self, rpdo: Pdo) -> None:
+        self._rpdo = rpdo
+        self._command = can.Message(arbitration_id=rpdo.cob_id, data=bytes(8), is_extended_id=False)
+
+    def use_found(self, sdo: SdoTransfers) -> bool:
+        """Use the node's PDOs as they were found, if they carry what is wanted; return whether they do.
+
+        Raises:
+            DriverError: as `SdoTransfers.upload`.
+        """
+        self._use_own()
+        carrying = that_carry(found_pdos(sdo, self._sheet, TPDO), self._sampled)
+        taking = that_takes(found_pdos(sdo, self._sheet, RPDO), self._commanded)
+        if carrying is None or taking is None:
+            return False
+        self._tpdos = {each.cob_id: self._as_found(each, self._sampled) for each in carrying}
+        self._use_rpdo(self._as_found(taking, self._commanded))
+        return True
+
+    def _as_found(self, found: FoundPdo, wanted: Mapping[str, Entry]) -> Pdo:
+        names = {(entry.index, entry.subindex): (name, entry) for name, entry in wanted.items()}
+        return Pdo(
+            found.record, found.cob_id, [names.get(place, size) for place, size in found.carried], self._variables
+        )
+
     def wanted(self, sdo: SdoTransfers) -> list[Setting]:
         """Return what must be set, in order, for the PDOs to carry this; those not needed become invalid.
 
         Raises:
             DriverError: as `SdoTransfers.upload`.
         """
+        if self.use_found(sdo):
+            return []
         wanted = [each for pdo in (self._rpdo, *self._tpdos.values()) for each in pdo.wanted(sdo)]
         for n in range(len(self._tpdos), MOST_PDOS):
             if TPDO + n in self._sheet and not int(sdo.upload(TPDO + n, 1)) & INVALID:
@@ -136,7 +179,7 @@ class PdoExchange:
         Raises:
             ValueError: the command is not a finite number, or its object cannot hold it.
         """
-        data = self._rpdo.command(command_pa, control)
+        data = self._rpdo.packed({"command_pa": command_pa, "control_word": control})
         self._command.data, self._command.dlc = bytearray(data), len(data)
 
     def catch_up(self) -> None:

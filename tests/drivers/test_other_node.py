@@ -4,6 +4,7 @@ It is somebody's running equipment: OPERATIONAL, configured by another master. U
 nothing may be sent to it but questions; where it refuses what it is told, everything is as it was found.
 """
 
+import struct
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -74,6 +75,22 @@ class OtherNode:
             time.sleep(1e-3)
         return bool(self.node.nmt.state == state)
 
+    def hears(self, identity: int, data: bytes) -> bool:
+        """Whether this frame comes."""
+        end_s = time.monotonic() + 10.0
+        while (identity, data) not in self.frames and time.monotonic() < end_s:
+            time.sleep(1e-3)
+        return (identity, data) in self.frames
+
+    def answer_sync(self, tpdos: dict[int, bytes]) -> None:
+        """Send these at each SYNC from now on."""
+
+        def answer(*_: object) -> None:
+            for identity, data in tpdos.items():
+                self.network.send_message(identity, data)
+
+        self.network.subscribe(0x80, answer)
+
     def close(self) -> None:
         self.node.nmt.stop_heartbeat()
         self.network.disconnect()
@@ -119,6 +136,7 @@ def test_a_node_that_is_as_wanted_is_told_nothing_but_to_be_active(other: OtherN
     first = driver_of(other, heartbeat_s=1e-3 * HEARTBEAT_MS)
     first.open()
     first.close()
+    assert other.hears(0, bytes((1, NODE)))
     other.frames.clear()
     other.constant = {index for index, _ in CONFIGURATION}
     again = driver_of(other, heartbeat_s=1e-3 * HEARTBEAT_MS)
@@ -156,3 +174,64 @@ def test_a_stopped_node_is_named_and_left_stopped(other: OtherNode, monkeypatch:
         driver.open()
     assert not [frame for frame in other.frames if frame[0] == 0]
     assert other.node.nmt.state == "STOPPED"
+
+
+POSITION, PRESSURE, COUNTER, COMMAND = 0x2000, 0x2001, 0x2002, 0x2005
+OBJECTS = {"position_m": {"index": POSITION}, "pressure_pa": {"index": PRESSURE}, "command_pa": {"index": COMMAND}}
+MAPPED = {0x1800: [(COUNTER, 32), (POSITION, 32)], 0x1801: [(0x2006, 32), (PRESSURE, 32)], 0x1400: [(COMMAND, 32)]}
+"""Another master's: each TPDO begins with what nobody here wants."""
+COB_IDS = {0x1800: 0x1C1, 0x1801: 0x2C1, 0x1400: 0x341}
+
+
+def fix_pdos(other: OtherNode, transmission: int = 1) -> None:
+    """Give the node PDOs of its own, on arbitration ids of its own, which it lets nobody change."""
+    for record, mapped in MAPPED.items():
+        other.node.sdo[record][1].raw = COB_IDS[record]
+        other.node.sdo[record][2].raw = 1 if record == 0x1400 else transmission
+        other.node.sdo[record + 0x200][0].raw = len(mapped)
+        for n, (index, bits) in enumerate(mapped, 1):
+            other.node.sdo[record + 0x200][n].raw = index << 16 | bits
+    for n in (2, 3):
+        other.node.sdo[0x1800 + n][1].raw = 1 << 31 | 0x180 + 0x100 * n + NODE
+    other.constant = {index + record for index in (0, 0x200) for record in (*MAPPED, 0x1802, 0x1803)}
+
+
+def test_pdos_that_cannot_be_changed_are_used_as_they_are(other: OtherNode) -> None:
+    fix_pdos(other)
+    before = other.configuration
+    other.answer_sync({0x1C1: struct.pack("<If", 77, 0.025), 0x2C1: struct.pack("<ff", 7.0, 41e3)})
+    other.network.subscribe(0x341, other._note)
+    driver = driver_of(other, map=OBJECTS)
+    assert driver.open() == HELD_PA
+    reading = driver.exchange(33e3)
+    driver.close()
+    assert reading.position_m == pytest.approx(0.025)
+    assert reading.pressure_pa == pytest.approx(41e3)
+    assert other.hears(0x341, struct.pack("<f", 33e3))
+    assert other.configuration[4:] == before[4:], "no PDO was told anything"
+
+
+def test_fixed_pdos_that_lack_what_is_wanted_are_refused_and_left(other: OtherNode) -> None:
+    fix_pdos(other)
+    before = other.configuration
+    with pytest.raises(Refused, match="SDO abort"):
+        driver_of(other).open()
+    assert other.configuration[4:] == before[4:]
+    assert other.settles("OPERATIONAL")
+
+
+def test_fixed_pdos_that_come_by_themselves_are_refused(other: OtherNode) -> None:
+    """Whether such a sample is new, nothing tells."""
+    fix_pdos(other, transmission=255)
+    with pytest.raises(Refused, match="SDO abort"):
+        driver_of(other, map=OBJECTS).open()
+
+
+def test_what_else_an_rpdo_takes_would_be_commanded(other: OtherNode) -> None:
+    fix_pdos(other)
+    other.constant = set()
+    other.node.sdo[0x1600][0].raw = 2
+    other.node.sdo[0x1600][2].raw = 0x20060020
+    other.constant = {0x1400, 0x1600}
+    with pytest.raises(Refused, match="SDO abort"):
+        driver_of(other, map=OBJECTS).open()
