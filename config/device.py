@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from config.hosts import is_host
 from config.loading import Port, Schema
-from config.modbus_map import SIMULATED_MAP, ModbusMap
+from config.modbus_map import SIMULATED_MAP, ModbusMap, words_of
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
 from config.tls_table import Tls
@@ -110,6 +110,15 @@ class ModbusDevice(Device):
         return self.model_copy(update={"map": places})
 
     @model_validator(mode="after")
+    def _can_do_the_action(self) -> Self:
+        codes = self.map.communication_action_codes
+        if codes is not None and getattr(codes, self.communication_action) is None:
+            raise ValueError(
+                f"communication_action: {self.communication_action} has no number in map.communication_action_codes"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _timeout_survives_the_registers(self) -> Self:
         place = self.map.communication_timeout_s
         if place is None or self.communication_timeout_s == 0:
@@ -172,7 +181,8 @@ class ModbusRtuDevice(ModbusDevice):
 
     @model_validator(mode="after")
     def _a_reply_fits_into_its_timeout(self) -> Self:
-        least_s = self.serial.silence_s + (2 * self.map.sampled_words + 5) * self.serial.character_s
+        longest = max(map(words_of, self.map.runs))
+        least_s = self.serial.silence_s + (2 * longest + 5) * self.serial.character_s
         if self.reply_timeout_s <= least_s:
             raise ValueError(
                 f"reply_timeout_s must be more than {least_s:.4f} s, which a measurement takes "

@@ -4,13 +4,14 @@
 """
 
 import math
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from config.loading import Schema
-from config.quantities import QUANTITIES, WRITABLE
+from config.quantities import QUANTITIES, WRITABLE, ActionName, CommunicationAction, DeviceStatus
 from config.register_format import Format, WireType, WordOrder
 
 MOST_REGISTERS = 125
@@ -71,11 +72,60 @@ class Place(Schema):
         return raw if self.is_float else round(raw)
 
 
+Mask = Annotated[int, Field(ge=0, lt=1 << 32)]
+
+
+class StatusBits(Schema):
+    """Which bits of a device's own status word say what: any bit of a mask says so; of `ready`, any that is missing."""
+
+    communication_lost: Mask = 0
+    sensor_fault: Mask = 0
+    not_ready: Mask = 0
+    ready: Mask = 0
+    """Bits that are 1 while the device works."""
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        if not self.communication_lost | self.sensor_fault | self.not_ready | self.ready:
+            raise ValueError("names no bit; leave the table out where the status has the bits of DeviceStatus")
+        return self
+
+    def status(self, raw: int) -> DeviceStatus:
+        """Return what a status word says."""
+        said = DeviceStatus(0)
+        if raw & self.communication_lost:
+            said |= DeviceStatus.COMMUNICATION_LOST
+        if raw & self.sensor_fault:
+            said |= DeviceStatus.SENSOR_FAULT
+        if raw & self.not_ready or self.ready & ~raw:
+            said |= DeviceStatus.NOT_READY
+        return said
+
+
+class ActionCodes(Schema):
+    """The device's own numbers for what it does when nobody has commanded it for its time-out; None: it cannot."""
+
+    hold: Annotated[int, Field(ge=0, lt=1 << 16)] | None = None
+    vent: Annotated[int, Field(ge=0, lt=1 << 16)] | None = None
+    fill: Annotated[int, Field(ge=0, lt=1 << 16)] | None = None
+
+    @model_validator(mode="after")
+    def _differ(self) -> Self:
+        codes = [each for each in (self.hold, self.vent, self.fill) if each is not None]
+        if len(set(codes)) < len(codes) or not codes:
+            raise ValueError("hold, vent and fill need a number each, of those that the device can do")
+        return self
+
+
+Run = dict[str, Place]
+"""Quantities that one read brings, by name."""
+
+
 class ModbusMap(Schema):
     """The quantities a device has, by place. Only position and command are indispensable.
 
-    What the device says of one sample (position, pressure, counter, time, status) is read in one transaction,
-    so it must lie within 125 registers of one table.
+    What the device says of one sample (position, pressure, counter, time, status) is read in one transaction where it
+    lies within 125 registers of one table; else in several, and then need not be of one sample.
     """
 
     position_m: Place
@@ -88,6 +138,10 @@ class ModbusMap(Schema):
     communication_action: Place | None = None
     sample_counter_bits: Annotated[int, Field(ge=2, le=64)] | None = None
     """Of a counter that wraps before its registers are full; all of them where nobody says."""
+    status_bits: StatusBits | None = None
+    """By default the status has the bits of `DeviceStatus`."""
+    communication_action_codes: ActionCodes | None = None
+    """By default those of `CommunicationAction`."""
 
     @property
     def sample_counter_range(self) -> int:
@@ -106,18 +160,30 @@ class ModbusMap(Schema):
         return {name: place for name, place in self.places.items() if name not in WRITABLE}
 
     @property
-    def sampled_words(self) -> int:
-        """Registers from the first to the last of one sample, those between its quantities included."""
-        places = self.sampled.values()
-        return max(place.end for place in places) - min(place.address for place in places)
+    def runs(self) -> list[Run]:
+        """The reads that bring one sample: as few as there can be."""
+        tables = ({n: each for n, each in self.sampled.items() if each.table == t} for t in ("holding", "input"))
+        return [run for table in tables for run in _within(table, MOST_REGISTERS)]
+
+    def device_status(self, raw: int) -> int:
+        """Return the bits of `DeviceStatus` that a status word says."""
+        return raw if self.status_bits is None else int(self.status_bits.status(raw))
+
+    def action_code(self, action: ActionName) -> int:
+        """Return the device's number for a communication action."""
+        codes = self.communication_action_codes
+        code = CommunicationAction[action.upper()] if codes is None else getattr(codes, action)
+        return int(code)
 
     @model_validator(mode="after")
-    def _can_be_read_and_written(self) -> Self:
-        places = self.sampled.values()
-        if len({place.table for place in places}) > 1:
-            raise ValueError("position, pressure, counter, time and status must lie in one table")
-        if self.sampled_words > MOST_REGISTERS:
-            raise ValueError(f"one sample must lie within {MOST_REGISTERS} registers, it spans {self.sampled_words}")
+    def _says_what_it_has(self) -> Self:
+        for name, of in (("status_bits", "status"), ("communication_action_codes", "communication_action")):
+            if getattr(self, name) is not None and getattr(self, of) is None:
+                raise ValueError(f"{name} goes with {of}, which the device has not")
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_written(self) -> Self:
         for name, place in self.places.items():
             if name in WRITABLE and place.table != "holding":
                 raise ValueError(f"{name} is written, so it must lie in the holding table")
@@ -130,6 +196,30 @@ class ModbusMap(Schema):
             if place.table == next_place.table and place.end > next_place.address:
                 raise ValueError(f"{name} and {next_name} share register {next_place.address}")
         return self
+
+
+def without_holes(run: Run) -> list[Run]:
+    """Return a run cut wherever a register lies between its quantities, for a device that refuses to read such."""
+    return list(_within(run, 0))
+
+
+def words_of(run: Run) -> int:
+    """Return how many registers a run reads."""
+    return max(each.end for each in run.values()) - min(each.address for each in run.values())
+
+
+def _within(places: Run, most: int) -> Iterable[Run]:
+    """Yield the places by address, in runs of at most so many registers, or without a hole."""
+    run: Run = {}
+    for name, place in sorted(places.items(), key=lambda each: each[1].address):
+        longer = {**run, name: place}
+        beyond = words_of(longer) > max(most, sum(each.format.words for each in longer.values()))
+        if run and beyond:
+            yield run
+            longer = {name: place}
+        run = longer
+    if run:
+        yield run
 
 
 def _simulated_map() -> ModbusMap:

@@ -1,12 +1,14 @@
 """A device on any Modbus: its quantities by the map of its registers, in requests and replies without frames.
 
-One transaction a cycle (function 23), or two where it must be (16, or 6 where that is refused; then 3 or 4). Checked
-here: function, byte count, length, echo, and that every number is one. How a request travels, a subclass knows.
+One transaction a cycle (function 23), or more where it must be (16, or 6 where that is refused; then 3 or 4, once for
+each table, and for each run without a hole where the device refuses to read registers that it has not). Checked here:
+function, byte count, length, echo, and that every number is one. How a request travels, a subclass knows.
 """
 
 import math
 import struct
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 
 from pymodbus.constants import ExcCodes
 from pymodbus.pdu.register_message import (
@@ -18,8 +20,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from config.device import ModbusDevice
-from config.modbus_map import ModbusMap, Place
-from config.quantities import CommunicationAction
+from config.modbus_map import Place, Run, without_holes
 from drivers.boundary import BadReply, Capabilities, NoNumber, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.layout import layout
@@ -37,12 +38,13 @@ class ModbusDriver(ABC):
     def __init__(self, config: ModbusDevice, who: str) -> None:
         self._config = config
         self._who = who
-        self._sample = _Sample(config.map)
+        self._reads = [_Read(each) for each in config.map.runs]
         self._command = _Setting("command_pa", config.map.command_pa)
-        self._exchange_head = _exchange_head(self._sample, config.map.command_pa)
+        self._exchange_head = _exchange_head(self._reads[0], config.map.command_pa)
         self._one_register_at_a_time = False
         """Whether the device knows function 6 and not 16; known by its first refusal."""
-        self._one_transaction = self._sample.table == "holding"  # function 23 reads holding registers only
+        # Function 23 reads holding registers only.
+        self._one_transaction = len(self._reads) == 1 and self._reads[0].table == "holding"
 
     @abstractmethod
     def _connect(self) -> None:
@@ -91,8 +93,12 @@ class ModbusDriver(ABC):
 
     def read(self) -> Reading:
         """Return a measurement."""
-        sample = self._sample
-        return self._reading(self._ask(sample.read, sample.head, sample.length))
+        try:
+            return self._read_all()
+        except Refused as refusal:
+            if refusal.code != ExcCodes.ILLEGAL_ADDRESS or not self._split_at_holes():
+                raise
+        return self._read_all()
 
     def write(self, command_pa: float) -> None:
         """Command a pressure."""
@@ -104,11 +110,25 @@ class ModbusDriver(ABC):
             try:
                 return self._write_and_read(command_pa)
             except Refused as refusal:
-                if refusal.code != ExcCodes.ILLEGAL_FUNCTION:
+                without_holes = refusal.code == ExcCodes.ILLEGAL_ADDRESS and self._split_at_holes()
+                if refusal.code != ExcCodes.ILLEGAL_FUNCTION and not without_holes:
                     raise
                 self._one_transaction = False
         self.write(command_pa)
         return self.read()
+
+    def _read_all(self) -> Reading:
+        values: dict[str, float] = {}
+        for each in self._reads:
+            values |= each.values(self._ask(each.request, each.head, each.length))
+        return self._reading(values)
+
+    def _split_at_holes(self) -> bool:
+        """Read without holes from now on; return whether there were any."""
+        split = [part for each in self._reads for part in without_holes(each.run)]
+        had_holes = len(split) > len(self._reads)
+        self._reads = [_Read(each) for each in split]
+        return had_holes
 
     def _held_command_pa(self) -> float:
         place = self._config.map.command_pa
@@ -124,7 +144,7 @@ class ModbusDriver(ABC):
         # The action first: a time-out must never start with another's action.
         config, places = self._config, self._config.map
         if places.communication_action:
-            action = CommunicationAction[config.communication_action.upper()]
+            action = places.action_code(config.communication_action)
             self._tell(_Setting("communication_action", places.communication_action), action)
         if places.communication_timeout_s:
             self._tell(
@@ -132,9 +152,9 @@ class ModbusDriver(ABC):
             )
 
     def _write_and_read(self, command_pa: float) -> Reading:
-        sample, command = self._sample, self._command
+        read, command = self._reads[0], self._command
         request = self._exchange_head + self._data(command, command_pa)
-        return self._reading(self._ask(request, sample.head_after, sample.length))
+        return self._reading(read.values(self._ask(request, read.head_after, read.length)))
 
     def _tell(self, setting: "_Setting", value: float) -> None:
         data = self._data(setting, value)
@@ -160,12 +180,18 @@ class ModbusDriver(ABC):
         except ValueError as error:
             raise Refused(f"{self._who}: {setting.name} not sent: {error}", ExcCodes.ILLEGAL_VALUE) from None
 
-    def _reading(self, data: bytes) -> Reading:
-        values = self._sample.values(data)
-        if not all(map(math.isfinite, values)):
-            said = ", ".join(f"{name} {value}" for name, value in zip(self._sample.names, values, strict=True))
-            raise NoNumber(f"{self._who}: a measurement that is no number: {said}")
-        return self._sample.reading(values)
+    def _reading(self, said: Mapping[str, float]) -> Reading:
+        if not all(map(math.isfinite, said.values())):
+            values = ", ".join(f"{name} {value}" for name, value in said.items())
+            raise NoNumber(f"{self._who}: a measurement that is no number: {values}")
+        counter, time_us = said.get("sample_counter"), said.get("device_time_us")
+        return Reading(
+            position_m=said["position_m"],
+            pressure_pa=said.get("pressure_pa"),
+            sample_counter=None if counter is None else round(counter),
+            device_time_s=None if time_us is None else time_us / 1e6,
+            status=self._config.map.device_status(round(said.get("status", 0))),
+        )
 
     def _ask(self, request: bytes, head: bytes, length: int) -> bytes:
         """Return what follows `head` in the reply, which must begin with it and have that length."""
@@ -180,39 +206,29 @@ class ModbusDriver(ABC):
         return f"{self._who}: {_question(request)}"
 
 
-class _Sample:
-    """The registers of one measurement: how to ask for them and what they say."""
+class _Read:
+    """A run of registers: how to ask for it and what it says."""
 
-    def __init__(self, registers: ModbusMap) -> None:
-        self._places = list(registers.sampled.values())
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self._places = list(run.values())
+        self._names = list(run)
         self._layout = layout(self._places)
         self._is_plain = all(place.is_plain for place in self._places)
-        self.names = list(registers.sampled)
-        self.table = registers.position_m.table
+        self.table = self._places[0].table
         self.address, self.count = address, count = self._layout.address, self._layout.words
         read = ReadHoldingRegistersRequest if self.table == "holding" else ReadInputRegistersRequest
         self.length = 2 + 2 * count
-        self.read, self.head = encoded(read(address=address, count=count)), bytes((read.function_code, 2 * count))
+        self.request = encoded(read(address=address, count=count))
+        self.head = bytes((read.function_code, 2 * count))
         self.head_after = bytes((ReadWriteMultipleRegistersRequest.function_code, 2 * count))
 
-    def values(self, data: bytes) -> list[float]:
-        """Return the quantities, in the order of `names`."""
+    def values(self, data: bytes) -> dict[str, float]:
+        """Return the quantities by name."""
         raw = self._layout.unpack(data)
-        if self._is_plain:
-            return list(raw)
-        return [place.value(each) for place, each in zip(self._places, raw, strict=True)]
-
-    def reading(self, values: list[float]) -> Reading:
-        """Return the quantities as a reading."""
-        said = dict(zip(self.names, values, strict=True))
-        counter, time_us = said.get("sample_counter"), said.get("device_time_us")
-        return Reading(
-            position_m=said["position_m"],
-            pressure_pa=said.get("pressure_pa"),
-            sample_counter=None if counter is None else round(counter),
-            device_time_s=None if time_us is None else time_us / 1e6,
-            status=round(said.get("status", 0)),
-        )
+        if not self._is_plain:
+            raw = tuple(place.value(each) for place, each in zip(self._places, raw, strict=True))
+        return dict(zip(self._names, raw, strict=True))
 
 
 class _Setting:
@@ -237,10 +253,10 @@ class _Setting:
         return self._layout.pack((self._place.raw(value),))
 
 
-def _exchange_head(sample: _Sample, command: Place) -> bytes:
+def _exchange_head(read: _Read, command: Place) -> bytes:
     """Return the request of function 23 that writes a command and reads a sample, up to its registers."""
     nothing = [0] * command.format.words
-    return encoded(ReadWriteMultipleRegistersRequest(sample.address, sample.count, command.address, nothing))[:10]
+    return encoded(ReadWriteMultipleRegistersRequest(read.address, read.count, command.address, nothing))[:10]
 
 
 def _question(request: bytes) -> str:

@@ -9,8 +9,8 @@ from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from config.errors import InputError
 from config.loading import validated
-from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
-from config.quantities import QUANTITIES, WRITABLE
+from config.modbus_map import SIMULATED_MAP, ModbusMap, Place, StatusBits, without_holes
+from config.quantities import QUANTITIES, WRITABLE, DeviceStatus
 
 
 def refusal(tables: dict[str, Any]) -> str:
@@ -50,6 +50,9 @@ def test_raw_numbers_are_rounded_to_nearest_and_finite() -> None:
 
 
 FLOAT = {"address": 0}
+BARE: dict[str, Any] = {"position_m": FLOAT, "command_pa": {"address": 4}}
+WITH_STATUS = BARE | {"status": {"address": 8, "type": "uint16"}}
+WITH_ACTION = BARE | {"communication_action": {"address": 8, "type": "uint16"}}
 
 
 @pytest.mark.parametrize(
@@ -59,13 +62,16 @@ FLOAT = {"address": 0}
         ({"position_m": FLOAT, "command_pa": {"address": 1}}, "position_m and command_pa share register 1"),
         ({"position_m": {"address": 65535}, "command_pa": {"address": 4}}, "past register 65535"),
         ({"position_m": FLOAT, "command_pa": {"address": 4, "table": "input"}}, "command_pa is written"),
+        (WITH_STATUS | {"status_bits": {}}, "status_bits: names no bit"),
+        ({**BARE, "status_bits": {"ready": 1}}, "status_bits goes with status, which the device has not"),
         (
-            {"position_m": FLOAT, "command_pa": {"address": 4}, "pressure_pa": {"address": 4, "table": "input"}},
-            "must lie in one table",
+            {**BARE, "communication_action_codes": {"hold": 1}},
+            "codes goes with communication_action",
         ),
+        (WITH_ACTION | {"communication_action_codes": {"hold": 1, "vent": 1}}, "need a number each"),
         (
-            {"position_m": FLOAT, "command_pa": {"address": 4}, "pressure_pa": {"address": 124}},
-            "within 125 registers, it spans 126",
+            WITH_ACTION | {"communication_action_codes": {"vent": 1}},
+            "hold has no number in map",
         ),
         ({"position_m": {"address": 0, "scale": 0}, "command_pa": {"address": 4}}, "scale must not be 0"),
     ],
@@ -111,3 +117,41 @@ def test_a_time_out_within_a_cycle_is_refused_and_a_stall_is_known_by_the_shorte
     assert file(1.0).longest_unattended_s == file(0.0).longest_unattended_s == pytest.approx(0.15)
     with pytest.raises(ValidationError, match=r"communication_timeout_s must be more than cycle.period_s \(0.02 s\)"):
         file(0.02)
+
+
+@pytest.mark.parametrize(
+    ("more", "runs", "without"),
+    [
+        ({"pressure_pa": {"address": 2}}, [["position_m", "pressure_pa"]], [["position_m", "pressure_pa"]]),
+        ({"pressure_pa": {"address": 6}}, [["position_m", "pressure_pa"]], [["position_m"], ["pressure_pa"]]),
+        ({"pressure_pa": {"address": 123}}, [["position_m", "pressure_pa"]], [["position_m"], ["pressure_pa"]]),
+        ({"pressure_pa": {"address": 124}}, [["position_m"], ["pressure_pa"]], [["position_m"], ["pressure_pa"]]),
+        (
+            {"pressure_pa": {"address": 0, "table": "input"}},
+            [["position_m"], ["pressure_pa"]],
+            [["position_m"], ["pressure_pa"]],
+        ),
+    ],
+)
+def test_a_sample_is_read_in_as_few_runs_as_there_can_be(
+    more: dict[str, Any], runs: list[list[str]], without: list[list[str]]
+) -> None:
+    registers = ModbusMap.model_validate(BARE | {"command_pa": {"address": 200}} | more)
+    assert [list(each) for each in registers.runs] == runs
+    assert [list(part) for each in registers.runs for part in without_holes(each)] == without
+
+
+@pytest.mark.parametrize(
+    ("raw", "status"),
+    [
+        (0b0001, DeviceStatus(0)),
+        (0b0000, DeviceStatus.NOT_READY),
+        (0b0101, DeviceStatus.SENSOR_FAULT),
+        (0b1001, DeviceStatus.SENSOR_FAULT),
+        (0b10001, DeviceStatus.NOT_READY),
+        (0b100101, DeviceStatus.SENSOR_FAULT | DeviceStatus.COMMUNICATION_LOST),
+    ],
+)
+def test_a_status_of_other_bits_and_an_inverted_one(raw: int, status: DeviceStatus) -> None:
+    bits = StatusBits(ready=0b1, sensor_fault=0b1100, not_ready=0b10000, communication_lost=0b100000)
+    assert bits.status(raw) == status

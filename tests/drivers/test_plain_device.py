@@ -11,7 +11,8 @@ from modbus_tk.modbus_tcp import TcpServer
 
 from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
-from config.modbus_map import ModbusMap, Place
+from config.modbus_map import ActionCodes, ModbusMap, Place, StatusBits
+from config.quantities import DeviceStatus
 from drivers import driver_for
 from positioner.control.settings import Settings
 from positioner.daemon.link import Link
@@ -97,3 +98,44 @@ def test_a_set_point_of_coarse_digits_is_no_restart(device: PlainDevice) -> None
     """The device may round to its own digits what it is told."""
     file = DaemonFile.model_validate({"valve": {"stroke_m": 0.03}, "device": device.described(None).model_dump()})
     assert Settings.of(file).limits.restart_tolerance_pa == 1000.0
+
+
+IN_INPUT, BEHIND_HOLE, STATUS, ACTION = 3, 40, 41, 61
+HEALTHY, SENSOR_BAD = 0b1, 0b101
+
+
+def scattered(device: PlainDevice) -> ModbusTcpDevice:
+    """Its position is an input register, and its pressure lies behind registers that it has not."""
+    device.slave.remove_block("registers")
+    device.slave.add_block("registers", defines.HOLDING_REGISTERS, BEHIND_HOLE, 2)
+    device.slave.add_block("counter", defines.HOLDING_REGISTERS, COUNTER, 1)
+    device.slave.add_block("commands", defines.HOLDING_REGISTERS, COMMAND, 2)
+    device.slave.add_block("inputs", defines.ANALOG_INPUTS, IN_INPUT, 1)
+    device.slave.set_values("inputs", IN_INPUT, [150])
+    device.slave.set_values("registers", BEHIND_HOLE, [41, HEALTHY])
+    device.slave.set_values("commands", COMMAND, [40, 0])
+    registers = ModbusMap(
+        position_m=Place(table="input", address=IN_INPUT, type="uint16", scale=1e-4),
+        pressure_pa=Place(address=BEHIND_HOLE, type="uint16", scale=1000.0),
+        status=Place(address=STATUS, type="uint16"),
+        sample_counter=Place(address=COUNTER, type="uint16"),
+        command_pa=Place(address=COMMAND, type="uint16", scale=1000.0),
+        communication_action=Place(address=ACTION, type="uint16"),
+        status_bits=StatusBits(ready=1, sensor_fault=4),
+        communication_action_codes=ActionCodes(hold=7, vent=3),
+    )
+    return ModbusTcpDevice(port=device.port, unit=UNIT, reply_timeout_s=2.0, map=registers)
+
+
+def test_what_lies_in_two_tables_and_behind_a_hole_is_read_in_parts(device: PlainDevice) -> None:
+    driver = driver_for(scattered(device))
+    assert driver.open() == 40e3
+    assert device.slave.get_values("commands", ACTION, 1) == (7,), "the device's own number for hold"
+    for bits, status in ((HEALTHY, 0), (SENSOR_BAD, DeviceStatus.SENSOR_FAULT), (0, DeviceStatus.NOT_READY)):
+        device.slave.set_values("registers", STATUS, [bits])
+        device.functions.clear()
+        reading = driver.exchange(50e3)
+        assert reading.position_m == pytest.approx(0.015)
+        assert (reading.pressure_pa, reading.status) == (41e3, status)
+    assert device.functions == [6, 3, 3, 4], "and the hole is not tried again"
+    driver.close()
