@@ -26,6 +26,8 @@ class SerialPort(Schema):
     baud: Baud = 19200
     parity: Literal["none", "even", "odd"] = "even"
     stop_bits: Literal[1, 2] = 1
+    local_echo: bool = False
+    """Whether a two-wire adapter hands back all that is sent."""
 
     @property
     def character_s(self) -> float:

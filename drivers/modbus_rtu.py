@@ -22,6 +22,8 @@ from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
 
 EXCEPTION_FRAME = 5
+READS = (3, 4)
+"""Functions whose reply is never the request itself."""
 READ_COUNTS = (1, 2, 3, 4)
 ROUND_FRAME = 3
 """Bytes of a frame round its PDU: unit and check sum."""
@@ -128,6 +130,8 @@ class ModbusRtuDriver(ModbusDriver):
         about = self._about(request)
         if not frame:
             return NoReply(f"{about}: no reply within {1e3 * self._reply_timeout_s:g} ms")
+        if request[0] in READS and frame.startswith(framed(self._unit, request)):
+            return BadReply(f"{about}: the line hands back what is sent: serial.local_echo = true")
         return BadReply(f"{about}: {self._mismatch(frame)}: {frame.hex(' ')}")
 
     def _is_ours(self, frame: bytes) -> bool:

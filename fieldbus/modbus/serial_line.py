@@ -23,6 +23,13 @@ _PARITY = {"none": 0, "even": termios.PARENB, "odd": termios.PARENB | termios.PA
 _SHAPE = termios.CSIZE | termios.PARENB | termios.PARODD | termios.CSTOPB
 
 
+class NotEchoed(OSError):
+    """What is sent does not come back, on a line that is said to echo."""
+
+    def __init__(self) -> None:
+        super().__init__(errno.EIO, "the line does not hand back what is sent: serial.local_echo = false")
+
+
 class NeverSilent(OSError):
     """Somebody keeps sending, so no frame can begin."""
 
@@ -38,6 +45,8 @@ class _OpenLine:
     users: int
     active_s: float
     """When the last character was on it, as far as known."""
+    behind_echo: bytes = b""
+    """What came with the end of an echo."""
 
 
 _OPEN_LINES: dict[str, _OpenLine] = {}
@@ -88,10 +97,12 @@ class SerialLine:
     def send(self, frame: bytes, within_s: float) -> float:
         """Send a frame once the line has been silent for long enough; return when its last character will be out, s.
 
-        What arrives before that nobody has asked for: it is thrown away, and the silence begins anew.
+        What arrives before that nobody has asked for: it is thrown away, and the silence begins anew. A local echo is
+        waited for and taken away.
 
         Raises:
             NeverSilent: no silence came within `within_s`.
+            NotEchoed: what came within `within_s` was no echo.
             OSError: the line is gone, or takes nothing.
         """
         taken = self._open_line()
@@ -107,8 +118,19 @@ class SerialLine:
                 raise NeverSilent
         if os.write(taken.fd, frame) != len(frame):
             raise OSError(errno.EIO, "the line takes no more")
-        taken.active_s = time.monotonic() + len(frame) * self._port.character_s
-        return taken.active_s
+        out_s = taken.active_s = time.monotonic() + len(frame) * self._port.character_s
+        if self._port.local_echo:
+            taken.behind_echo = self._behind_echo(frame, out_s + within_s)
+        return out_s
+
+    def _behind_echo(self, frame: bytes, until_s: float) -> bytes:
+        heard = b""
+        while len(heard) < len(frame):
+            more = self.receive(until_s)
+            heard += more
+            if not more or not frame.startswith(heard[: len(frame)]):
+                raise NotEchoed
+        return heard[len(frame) :]
 
     def receive(self, until_s: float) -> bytes:
         """Return what has arrived, waiting for something until a time; b"" when that passes.
@@ -117,6 +139,9 @@ class SerialLine:
             OSError: the line is gone.
         """
         taken = self._open_line()
+        if behind := taken.behind_echo:
+            taken.behind_echo = b""
+            return behind
         ready, _, _ = select.select((taken.fd,), (), (), max(0.0, until_s - time.monotonic()))
         if not ready:
             return b""

@@ -548,3 +548,43 @@ def test_a_zero_behind_a_frame_which_the_check_sum_does_not_see_changes_nothing(
     line, device = slave_line
     assert answer(line, framed(5, COMMAND) + b"\0") == framed(5, b"\x90\3")
     assert device.samples == 0
+
+
+def echoed(request: bytes, reply: bytes) -> bytes:
+    """What a two-wire adapter hands over: the request itself, and what comes after it."""
+    return request + reply
+
+
+def echo_alone(request: bytes, _reply: bytes) -> bytes:
+    return request
+
+
+def on_two_wires(scripted: ScriptedDevice, *, local_echo: bool) -> ModbusRtuDriver:
+    end = scripted.driver_end  # type: ignore[attr-defined]
+    serial = SerialPort(path=end, baud=BAUD, local_echo=local_echo)
+    return ModbusRtuDriver(ModbusRtuDevice(serial=serial, reply_timeout_s=REPLY_TIMEOUT_S))
+
+
+def test_a_line_that_echoes_is_driven_if_it_is_said_to(scripted: ScriptedDevice) -> None:
+    scripted.fault = echoed
+    driver = on_two_wires(scripted, local_echo=True)
+    driver.open()
+    assert [driver.exchange(PUSH_PA).sample_counter for _ in range(3)] == [1, 2, 3]
+    driver.close()
+
+
+def test_an_echo_is_nobodys_answer(scripted: ScriptedDevice) -> None:
+    scripted.fault = echo_alone
+    driver = on_two_wires(scripted, local_echo=True)
+    assert "nobody answers" in refused_as(NoConnection, driver.open)
+
+
+def test_an_echo_that_nobody_spoke_of_is_named(scripted: ScriptedDevice) -> None:
+    scripted.fault = echoed
+    driver = on_two_wires(scripted, local_echo=False)
+    assert "the line hands back what is sent: serial.local_echo = true" in refused_as(BadReply, driver.open)
+
+
+def test_a_line_that_does_not_echo_as_said_is_named(scripted: ScriptedDevice) -> None:
+    driver = on_two_wires(scripted, local_echo=True)
+    assert "serial.local_echo = false" in refused_as(NoConnection, driver.open)
