@@ -37,6 +37,6 @@ def test_a_quantum_finer_than_the_noise_shows_is_not_trusted_however_many_search
     recording = Recording(columns, hidden.fit.metadata)
     base = fit(recording, hidden.base, workers=1, profile=False)
     found = fit(recording, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)
-    assert found.parameters["quantisation.quantum_m"].value < ready(recording).noise_m
+    assert found.parameters["quantisation.quantum_m"].value < ready(recording).scale_m
     assert found.cost < base.cost / WITHIN, "though it does better than the base"
     assert not found.trusted

@@ -15,6 +15,8 @@ from config.recording import Column
 REACH = 2
 NOTICED = 5.0 * 2**0.5
 COVERED = 6.0
+BAND, AT_ONCE, LONGEST_REST = 8.0, 4, 50
+"""Standard deviations within which a stem rests; samples of a rest, at least and at most."""
 PARABOLA = 9
 """Samples of a local parabola, from which accelerations come."""
 
@@ -56,6 +58,30 @@ def directions(position_m: Column, noise_m: float) -> Directions:
     across[REACH:-REACH] = position_m[2 * REACH :] - position_m[: -2 * REACH]
     across[~np.isfinite(across)] = 0.0
     return np.where(np.abs(across) > NOTICED * noise_m, np.sign(across), 0.0).astype(np.int64)
+
+
+def rests_first(position_m: Column, noise_m: float) -> int | None:
+    """Return the row of an unbroken stretch of positions, m, (n,), at which the stem first rests; None if nowhere.
+
+    0 where it stays at least `AT_ONCE` samples where it begins. One that begins in motion rests where it stays, within
+    the same band, for as many samples as it took to get there, `AT_ONCE` to `LONGEST_REST`.
+    """
+    rows = np.flatnonzero(np.isfinite(position_m))
+    x = position_m[rows]
+    band_m = BAND * noise_m
+    left = np.flatnonzero(np.abs(x[: LONGEST_REST + 1] - x[:1]) > band_m)
+    if not left.size or left[0] >= AT_ONCE:
+        return 0
+    row = 1
+    while row < x.size:
+        stay = min(max(AT_ONCE, row), LONGEST_REST)
+        if row + stay > x.size:
+            return None
+        off = np.flatnonzero(np.abs(x[row : row + stay] - x[row]) > band_m)
+        if not off.size:
+            return int(rows[row])
+        row += 1
+    return None
 
 
 def slips(position_m: Column, noise_m: float) -> tuple[Slip, ...]:
