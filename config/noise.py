@@ -11,7 +11,7 @@ stays below c_k^2, its 99.5 % quantile; motion scatters by more, by anything. He
 
 No window in which the stem is seen to move counts, whatever the sampling. Where no scale passes (fewer than 20 degrees
 of freedom, motion from sample to sample throughout) the noise is unknown, which is None and not 0. Of widths that pass,
-those within 1.5 times the least σ count, for motion only adds, and of these the longest that finds half as many samples
+those within 1.25 times the least σ count, for motion only adds, and of these the longest that finds half as many samples
 as any.
 
 A position rounded to q is taken with an even noise of q added, under which rounding becomes white. What is left, s^2,
@@ -40,11 +40,11 @@ WIDTHS = (64, 32, 16, 8, 5, 4, 3)
 """Samples of a window, the longest first."""
 STRAIGHT = 8
 """Samples from which a window may go along a straight line; it then begins half a window after the one before."""
-FEWEST = 20.0
-"""Degrees of freedom that tell a noise, to 16 %."""
+FEWEST, FEWEST_WINDOWS = 20.0, 8
+"""Degrees of freedom that tell a noise, to 16 %; windows: of one alone nothing shows whether it is like others."""
 LEAST_SHARE = 0.01
 """Of the windows: fewer may be still by chance."""
-ALIKE = 1.5
+ALIKE = 1.25
 """Ratio of the noises that two widths find, up to which they are one."""
 AS_MANY = 0.5
 """Of the samples that another width finds: as many are enough."""
@@ -113,7 +113,10 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
     quantum = quantum_m(position_m)
     if quantum:
         position_m = position_m + quantum * np.random.default_rng(0).uniform(-0.5, 0.5, position_m.size)
-    found = [each for each in (_of_width(position_m, drive_pa, width) for width in WIDTHS) if each]
+    told = [_of_width(position_m, drive_pa, width) for width in WIDTHS]
+    # Where a long window rests so do the shorter ones in it.
+    longest = next((i + 1 for i in range(WIDTHS.index(STRAIGHT), -1, -1) if told[i] is None), 0)
+    found = [each for each in told[longest:] if each]
     if not found:
         return None
     # Motion only adds: what another width finds far above the least is motion that looks like noise.
@@ -172,7 +175,7 @@ def _of_width(position_m: Array, drive_pa: Array | None, width: int) -> tuple[fl
     s, limit = windows.scatter, windows.limit
     rms = np.sqrt(np.cumsum(s**2) / np.arange(1, s.size + 1))
     each = windows.freedom * windows.share
-    fewest = max(int(FEWEST / each), int(LEAST_SHARE * s.size)) + 1
+    fewest = max(int(FEWEST / each), int(LEAST_SHARE * s.size), FEWEST_WINDOWS - 1) + 1
     if s.size < fewest:
         return None
     least, most = float(s[fewest - 1]), float(s[-1])

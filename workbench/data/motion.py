@@ -63,14 +63,15 @@ def directions(position_m: Column, noise_m: float) -> Directions:
 def rests_first(position_m: Column, noise_m: float) -> int | None:
     """Return the row of an unbroken stretch of positions, m, (n,), at which the stem first rests; None if nowhere.
 
-    0 where it stays at least `AT_ONCE` samples where it begins. One that begins in motion rests where it stays, within
-    the same band, for as many samples as it took to get there, `AT_ONCE` to `LONGEST_REST`.
+    0 where its first `AT_ONCE` samples lie in a band, or on a straight line: at rest, or at a velocity that can be told.
+    Else it rests where it stays, within that band, for as many samples as it took to get there, `AT_ONCE` to
+    `LONGEST_REST`.
     """
     rows = np.flatnonzero(np.isfinite(position_m))
     x = position_m[rows]
     band_m = BAND * noise_m
     left = np.flatnonzero(np.abs(x[: LONGEST_REST + 1] - x[:1]) > band_m)
-    if not left.size or left[0] >= AT_ONCE:
+    if not left.size or left[0] >= AT_ONCE or _is_straight(x[:AT_ONCE], 0.5 * band_m):
         return 0
     row = 1
     while row < x.size:
@@ -82,6 +83,12 @@ def rests_first(position_m: Column, noise_m: float) -> int | None:
             return int(rows[row])
         row += 1
     return None
+
+
+def _is_straight(position_m: Column, within_m: float) -> bool:
+    """Return whether samples, m, (n,), lie on a straight line, by their numbers."""
+    line = np.polynomial.Polynomial.fit(np.arange(position_m.size), position_m, 1)
+    return bool(np.max(np.abs(position_m - line(np.arange(position_m.size)))) < within_m)
 
 
 def slips(position_m: Column, noise_m: float) -> tuple[Slip, ...]:

@@ -3,8 +3,8 @@
 The clock set back, a gap, or rows that the daemon's recorder missed begin a new segment, simulated from rest on its
 own. Samples that the daemon lost are a longer period: it wrote no command in the meantime. A position that is not a
 number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. What
-begins in motion begins where the stem first rests, if that is in its first third: what went before, nobody knows.
-Nothing else is touched, and `notes` has a sentence for each of these, samples counted from 1.
+begins in motion, at a velocity that its samples do not tell, begins where the stem first rests, if that is in its first
+third. Nothing else is touched, and `notes` has a sentence for each of these, samples counted from 1.
 """
 
 from collections.abc import Iterator, Mapping
