@@ -11,8 +11,8 @@ stays below c_k^2, its 99.5 % quantile; motion scatters by more, by anything. He
 
 No window in which the stem is seen to move counts, whatever the sampling. Where no scale passes (fewer than 20 degrees
 of freedom, motion from sample to sample throughout) the noise is unknown, which is None and not 0. Of widths that pass,
-those within 1.25 times the least σ count, for motion only adds, and of these the longest that finds half as many samples
-as any.
+those within 1.25 times the least σ count, for motion only adds, and of these the longest that finds half as many
+samples as any.
 
 A position rounded to q is taken with an even noise of q added, under which rounding becomes white. What is left, s^2,
 lacks what the rounding of a stem at rest hides, for it rests at one place of the quantum for long:

@@ -63,7 +63,7 @@ def directions(position_m: Column, noise_m: float) -> Directions:
 def rests_first(position_m: Column, noise_m: float) -> int | None:
     """Return the row of an unbroken stretch of positions, m, (n,), at which the stem first rests; None if nowhere.
 
-    0 where its first `AT_ONCE` samples lie in a band, or on a straight line: at rest, or at a velocity that can be told.
+    0 where its first `AT_ONCE` samples lie in a band, or on a straight line: at rest, or at a velocity that they tell.
     Else it rests where it stays, within that band, for as many samples as it took to get there, `AT_ONCE` to
     `LONGEST_REST`.
     """
