@@ -2,8 +2,8 @@
 
 Simulated valves of low friction that ramp to somewhere and rest there, in legs of 5 to 40 samples and 0.2 s; `moving`
 is the share of a leg that the command ramps. The sensor has 10 to 16 bits over the stroke, with white noise before
-rounding. The truth is what a reading is off by, sqrt(σ_w^2 + q^2/12). A cell of the table: how many of the estimates lie
-within 20 % of it, how many of all are unknown, and the least and greatest ratio of estimate and truth.
+rounding. The truth is what a reading is off by, sqrt(σ_w^2 + q^2/12). A cell of the table: how many of the estimates
+lie within 20 % of it, how many of all are unknown, and the least and greatest ratio of estimate and truth.
 """
 
 import sys

@@ -28,7 +28,7 @@ LARGE = 5.0
 AT_MOST, FELL = 1.75, 0.2
 """Floors that may be left; or of the error that there was."""
 CLOSED_S = 0.2
-CHANGES, MOST_CHANGE = (0.0025, 0.005, 0.01), 0.02
+CHANGES, MOST_CHANGE = (0.001, 0.0025, 0.005, 0.01), 0.02
 MOST_SHARE = 0.1
 """Of the slips held out; one may always be."""
 

@@ -51,6 +51,8 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 def export_words(arguments: argparse.Namespace) -> list[str]:
     """Return the words of these arguments as they were given, for a command that reads the same files."""
     words: list[str] = []
+    for flag, end_s in (("--from-s", arguments.from_s), ("--to-s", arguments.to_s)):
+        words += [] if end_s is None else [flag, f"{end_s!r}"]
     for name in ("column", *BESIDES):
         given = getattr(arguments, name)
         flag = f"--{name.replace('_', '-')}"
