@@ -6,7 +6,8 @@ stays below c_k^2, its 99.5 % quantile; motion scatters by more, by anything. He
 
     S(σ) = rms of all s <= c_k σ        S(σ) = σ      the first, from below
     S(2 σ) <= 1.2 S(σ)                                no scatters of another origin go on where the noise's end
-    sum (x_i+1 - x_i)^2 / 2 n = S^2                   white, within 20 %: what goes on moving is not
+    sum (x_i+1 - x_i)^2 / 2 n = S^2                   white, within 20 %: what goes on moving is not,
+    sum (x_i+1 - 2 x_i + x_i-1)^2 / 6 n = S^2         nor is what wanders
     corr(x, u) < 0.3                                  in the windows, for a drive u that it may follow
 
 No window in which the stem is seen to move counts, whatever the sampling. Where no scale passes (fewer than 20 degrees
@@ -219,9 +220,11 @@ def _windows(position_m: Array, drive_pa: Array | None, width: int) -> _Windows 
 
 
 def _is_white(left: Array, noise_m: float, freedom: float) -> bool:
-    """Return whether differences of neighbours scatter as the samples themselves do."""
-    ratio = float(np.mean(np.diff(left, axis=1) ** 2)) / (2.0 * noise_m**2)
-    return abs(ratio - 1.0) < WHITE + 2.0 / sqrt(freedom * len(left))
+    """Return whether first and second differences scatter as the samples themselves do."""
+    count = sqrt(freedom * len(left))
+    first = float(np.mean(np.diff(left, axis=1) ** 2)) / (2.0 * noise_m**2)
+    second = float(np.mean(np.diff(left, 2, axis=1) ** 2)) / (6.0 * noise_m**2)
+    return abs(first - 1.0) < WHITE + 2.0 / count and abs(second - 1.0) < WHITE + 3.0 / count
 
 
 def _follows(windows: _Windows, count: int, freedom: float) -> bool:

@@ -42,6 +42,23 @@ def test_a_stem_that_rests_nowhere_tells_no_noise(every: int) -> None:
     assert position_noise_m(noisy(np.asarray(0.05 + 0.03 * np.sin(np.arange(400.0))))) is None
 
 
+@pytest.mark.parametrize("period", [11.3, 20.0, 50.0, 100.0, 200.0])
+def test_a_stem_that_swings_slowly_tells_no_noise_that_is_its_motion(period: float) -> None:
+    assert position_noise_m(noisy(np.asarray(0.05 + 0.03 * np.sin(2 * np.pi * np.arange(600.0) / period)))) is None
+
+
+@pytest.mark.parametrize("step_m", [1e-4, 1e-3])
+def test_a_stem_that_wanders_from_sample_to_sample_tells_no_noise(step_m: float) -> None:
+    walk = 0.05 + step_m * np.cumsum(np.random.default_rng(2).standard_normal(600))
+    assert position_noise_m(noisy(np.asarray(walk))) is None
+
+
+def test_steps_hardly_above_the_noise_are_not_taken_for_it() -> None:
+    levels = 0.05 + 6 * NOISE_M * np.random.default_rng(2).standard_normal(120)
+    found = position_noise_m(noisy(np.asarray(np.repeat(levels, 5))))
+    assert found is None or found == pytest.approx(NOISE_M, rel=0.2)
+
+
 def test_a_stem_at_rest_is_told_from_one_that_goes_elsewhere_at_every_sample_by_its_drive() -> None:
     still = noisy(np.full(600, 0.05))
     drive = np.random.default_rng(4).normal(0.0, 1e4, 600)
