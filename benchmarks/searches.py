@@ -98,7 +98,7 @@ def posed(case: Case) -> tuple[Recording, ValveFile, ValveFile]:
 def cut(recording: Recording) -> Recording:
     """Cut a recording off after its twelfth slip."""
     record = ready(recording)
-    last = slips(record.position_m, record.noise_m)[:FEW_SLIPS][-1].last
+    last = slips(record.position_m, record.scale_m)[:FEW_SLIPS][-1].last
     end = last + round(AFTER_LAST_S / record.period_s)
     return Recording({name: each[:end] for name, each in recording.columns.items()}, recording.metadata)
 

@@ -1,20 +1,35 @@
-"""The white noise of a sampled position, from its third differences in blocks, and the quantum it is rounded to.
+"""The noise of a sampled position where the stem rests or goes evenly, and the quantum it is rounded to.
 
-The third difference of a smooth signal is small of third order in the step, that of white noise is not:
+A record is cut into windows of w samples, w = 64 down to 3. Each has a scatter s about its mean, from 8 samples on
+about a straight line, with k = w - 1 or w - 2 degrees of freedom. Where nothing moves s^2 / σ^2 is chi^2_k / k and
+stays below c_k^2, its 99.5 % quantile; motion scatters by more, by anything. Hence σ is the scale that finds itself:
 
-    d_k = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-3),    var d = (1 + 9 + 9 + 1) σ^2 = 20 σ^2
+    S(σ) = rms of all s <= c_k σ        S(σ) = σ      the first, from below
+    S(2 σ) <= 1.2 S(σ)                                no scatters of another origin go on where the noise's end
+    sum (x_i+1 - x_i)^2 / 2 n = S^2                   white, within 20 %: what goes on moving is not,
+    sum (x_i+1 - 2 x_i + x_i-1)^2 / 6 n = S^2         nor is what wanders
+    corr(x, u) < 0.3                                  in the windows, for a drive u that it may follow
 
-A block of differences gives σ by one of two figures, and σ of a record is the median over its blocks, which takes no
-note of the few that a jerk or an impact lies in:
+No window in which the stem is seen to move counts, whatever the sampling. Where no scale passes (fewer than 20 degrees
+of freedom, motion from sample to sample throughout) the noise is unknown, which is None and not 0. Of widths that pass,
+those within 1.25 times the least σ count, for motion only adds, and of these the longest that finds half as many
+samples as any.
 
-    median of |d| / (0.6745 sqrt 20)    whatever a few samples of the block do; for blocks that a motion may begin in
-    rms of d / sqrt 20                  less scatter from a short block; for blocks that are short and many
+A position rounded to q is taken with an even noise of q added, under which rounding becomes white. What is left, s^2,
+lacks what the rounding of a stem at rest hides, for it rests at one place of the quantum for long:
 
-Everybody measures noise with these: the identification, running and from a record, and the workbench.
+    s^2 = σ_w^2 + q^2/12 - q^2/(2 π^2) sum_k exp(-(2 π k σ_w / q)^2) / k^2,      σ^2 = σ_w^2 + q^2/12
+
+σ_w white noise before rounding; σ is what a reading is off by. The running identification, which never has all samples
+at once, measures by third differences d_k = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-3), var d = 20 σ^2 (`noise_by_median`).
 """
+
+from dataclasses import dataclass
+from math import log, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 Array = npt.NDArray[np.float64]
 
@@ -22,8 +37,59 @@ VARIANCE = 20.0
 """Of the third difference of white noise of variance 1."""
 MEDIAN_OF_NORMAL = 0.6744897502
 """Median of |z|, z standard normal."""
-FEWEST, MOST = 8, 64
-"""Samples of a block that a record is cut into, a quarter of it in between."""
+WIDTHS = (64, 32, 16, 8, 5, 4, 3)
+"""Samples of a window, the longest first."""
+STRAIGHT = 8
+"""Samples from which a window may go along a straight line; it then begins half a window after the one before."""
+FEWEST, FEWEST_WINDOWS = 20.0, 8
+"""Degrees of freedom that tell a noise, to 16 %; windows: of one alone nothing shows whether it is like others."""
+LEAST_SHARE = 0.01
+"""Of the windows: fewer may be still by chance."""
+ALIKE = 1.25
+"""Ratio of the noises that two widths find, up to which they are one."""
+AS_MANY = 0.5
+"""Of the samples that another width finds: as many are enough."""
+NORMAL_995 = 2.576
+NEXT, GAP, GROWS = 1.05, 2.0, 1.2
+"""Ratio of one scale tried to the next; a scale above the noise's, up to which the rms may grow by so much."""
+BEYOND = 1.25
+"""Times the scale found: the rms up to there lacks none of the noise's windows."""
+WHITE = 0.2
+FOLLOWS = 0.3
+"""Correlation with the drive from which a stem is not at rest."""
+LATEST = 3
+"""Samples by which the stem follows its drive at most."""
+HARMONICS = np.arange(1, 8)
+DIVISORS = range(1, 7)
+"""The smallest step between two levels is so many quanta at most."""
+ON_GRID, REACHES = 0.02, (10.5, 100.5, 1000.5, 10000.5)
+"""Of a quantum, how far a step between levels may be off it; the steps that refine it, one after the other."""
+FEW_STEPS, MANY_STEPS = 5, 50
+"""Steps between levels that show a quantum: a tenth of all, but no fewer nor more than these."""
+ALL_NOISE = 12.0
+"""Times the noise that positions may span where it is all there is."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Windows:
+    """Windows of one width, about their mean or line, by scatter."""
+
+    left: Array
+    """(windows, w), m."""
+    scatter: Array
+    """(windows,), m, ascending."""
+    drive: Array | None
+    """(windows, w + LATEST), or what there is, beginning that much earlier."""
+    freedom: int
+    """Degrees of freedom of a window."""
+    share: float
+    """Part of a window's samples that no window before it holds."""
+
+    @property
+    def limit(self) -> float:
+        """c_k: what 99.5 % of the scatters of noise of 1 stay below (Wilson and Hilferty)."""
+        third = 2.0 / (9.0 * self.freedom)
+        return float((1.0 - third + NORMAL_995 * sqrt(third)) ** 1.5)
 
 
 def noise_by_median(differences: Array) -> Array:
@@ -31,28 +97,39 @@ def noise_by_median(differences: Array) -> Array:
     return np.asarray(np.median(np.abs(differences), axis=-1) / (MEDIAN_OF_NORMAL * VARIANCE**0.5))
 
 
-def noise_by_rms(differences: Array) -> Array:
-    """Return σ (...), in the unit of the position, by the rms over the last axis of third differences (..., n)."""
-    return np.asarray(np.sqrt(np.mean(differences**2, axis=-1) / VARIANCE))
+def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float | None:
+    """Return by what a reading is off, rms, m, rounding included; None where the samples do not tell.
 
-
-def white_noise_m(position_m: Array) -> float:
-    """Return the standard deviation, m, of the white noise of N positions, (N,), finite and about evenly sampled.
-
-    The median over blocks of `noise_by_median`; 0 for fewer than 8 samples. Rounding that hides the noise at rest shows
-    once the stem moves.
+    Args:
+        position_m: (N,), about evenly sampled; NaN counts as missing.
+        drive_pa: what moves the stem, (N,): the command or the actuator pressure; a stem that follows it moves.
 
     >>> rng = np.random.default_rng(0)
-    >>> slow_motion_m = 0.05 + 0.01 * np.sin(np.linspace(0.0, 3.0, 4000))
-    >>> f"{white_noise_m(slow_motion_m + rng.normal(0.0, 1e-5, 4000)):.0e}"
-    '1e-05'
+    >>> steps_m = np.repeat(rng.uniform(0.0, 0.1, 80), 5)
+    >>> f"{position_noise_m(steps_m + rng.normal(0.0, 5e-5, 400)):.0e}"
+    '5e-05'
+    >>> position_noise_m(0.05 + 0.03 * np.sin(np.arange(400.0))) is None
+    True
     """
-    length = max(FEWEST, min(MOST, len(position_m) // 4))
-    count = len(position_m) // length
-    if not count:
-        return 0.0
-    blocks = np.diff(position_m[: count * length].reshape(count, length), 3, axis=1)
-    return float(np.median(noise_by_median(blocks)))
+    quantum = quantum_m(position_m)
+    if quantum:
+        position_m = position_m + quantum * np.random.default_rng(0).uniform(-0.5, 0.5, position_m.size)
+    told = [_of_width(position_m, drive_pa, width) for width in WIDTHS]
+    # Where a long window rests so do the shorter ones in it.
+    longest = next((i + 1 for i in range(WIDTHS.index(STRAIGHT), -1, -1) if told[i] is None), 0)
+    found = [each for each in told[longest:] if each]
+    if not found:
+        return None
+    # Motion only adds: what another width finds far above the least is motion that looks like noise.
+    least_m = min(noise_m for noise_m, _ in found)
+    found = [(noise_m, share) for noise_m, share in found if noise_m <= ALIKE * least_m]
+    most = max(share for _, share in found)
+    noise_m = next(noise_m for noise_m, share in found if share >= AS_MANY * most)
+    if noise_m == 0.0 and np.unique(position_m[np.isfinite(position_m)]).size <= FEW_STEPS:
+        return None  # a stem that hardly moves, in numbers that are rounded who knows how
+    if drive_pa is None and np.nanmax(position_m) - np.nanmin(position_m) < ALL_NOISE * noise_m:
+        return None  # noise, or a stem that goes elsewhere from sample to sample: the drive would tell
+    return _with_rounding(noise_m, quantum) if quantum else noise_m
 
 
 def quantum_m(position_m: Array) -> float:
@@ -61,13 +138,120 @@ def quantum_m(position_m: Array) -> float:
     >>> f"{quantum_m(np.round(np.linspace(0.0, 0.01, 500) / 25e-6) * 25e-6):.3g}"
     '2.5e-05'
     """
-    levels = np.unique(position_m[np.isfinite(position_m)])
+    finite_m = position_m[np.isfinite(position_m)]
+    levels = np.unique(finite_m)
     steps = np.diff(levels)
-    if steps.size < 2:
-        return float(steps[0]) if steps.size else 0.0
     # Levels a rounding error apart are one level.
-    steps = steps[steps > 1e-9 * float(np.ptp(levels))]
-    quantum = float(np.median(steps[steps < 1.5 * float(steps.min())]))
-    small = steps[steps < 10.5 * quantum] / quantum
-    on_grid = np.abs(small - np.round(small)) < 0.02
-    return quantum if small.size > 0.1 * steps.size and on_grid.mean() > 0.95 else 0.0
+    steps = steps[steps > 1e-9 * float(np.ptp(levels))] if steps.size else steps
+    if steps.size < FEW_STEPS:
+        # Of a stem at rest a few levels show the quantum, if it flickers between them.
+        flickers = np.count_nonzero(np.diff(finite_m)) > 2 * steps.size
+        return float(steps.min()) if steps.size and flickers else 0.0
+    smallest = float(np.median(steps[steps < 1.5 * float(steps.min())]))
+    enough = max(FEW_STEPS, min(0.1 * steps.size, MANY_STEPS))
+    grids = (_grid(steps, smallest / divisor, enough) for divisor in DIVISORS)
+    return next((quantum for quantum in grids if quantum), 0.0)
+
+
+def _grid(steps: Array, quantum: float, enough: float) -> float:
+    """Return a quantum, refined, if enough of the steps between levels are its multiples; else 0.
+
+    The long ones must be, too: near where a smooth motion turns, levels lie 1, 3, 5, ... times something apart.
+    """
+    for reach in REACHES:
+        part = steps[steps < reach * quantum]
+        multiples = np.round(part / quantum)
+        # Numbers written with few digits are off the grid themselves.
+        quantum = float(part @ multiples / (multiples @ multiples))
+        if np.mean(np.abs(part - quantum * multiples) < ON_GRID * quantum) <= 0.95:
+            return 0.0
+    return quantum if part.size >= enough else 0.0
+
+
+def _of_width(position_m: Array, drive_pa: Array | None, width: int) -> tuple[float, float] | None:
+    """Return σ, m, by windows of one width, and the share of them that tell it; None where it is not told."""
+    windows = _windows(position_m, drive_pa, width)
+    if windows is None:
+        return None
+    s, limit = windows.scatter, windows.limit
+    rms = np.sqrt(np.cumsum(s**2) / np.arange(1, s.size + 1))
+    each = windows.freedom * windows.share
+    fewest = max(int(FEWEST / each), int(LEAST_SHARE * s.size), FEWEST_WINDOWS - 1) + 1
+    if s.size < fewest:
+        return None
+    least, most = float(s[fewest - 1]), float(s[-1])
+    if least == 0.0:
+        return 0.0, float(np.mean(s == 0.0))
+    scales = least / limit * NEXT ** np.arange(int(log(most / least) / log(NEXT)) + 2 + int(log(limit) / log(NEXT)))
+    counts = np.searchsorted(s, limit * scales, side="right")
+    grown = rms[np.searchsorted(s, GAP * limit * scales, side="right") - 1]
+    passing = (counts >= fewest) & (rms[counts - 1] <= scales) & (grown <= GROWS * rms[counts - 1])
+    if not passing.any():
+        return None
+    first = int(passing.argmax())
+    count = int(np.searchsorted(s, BEYOND * limit * scales[first], side="right"))
+    noise_m = float(rms[count - 1])
+    still = _is_white(windows.left[:count], noise_m, each) and not _follows(windows, count, each)
+    return (noise_m, count / s.size) if still else None
+
+
+def _windows(position_m: Array, drive_pa: Array | None, width: int) -> _Windows | None:
+    if position_m.size < width:
+        return None
+    straight = width >= STRAIGHT
+    stride = width // 2 if straight else 1
+    left = sliding_window_view(position_m, width)[::stride]
+    rows = np.flatnonzero(np.isfinite(left).all(axis=1))
+    if not rows.size:
+        return None
+    left = left[rows] - left[rows].mean(axis=1, keepdims=True)
+    if straight:
+        line = np.arange(width) - 0.5 * (width - 1)
+        line /= np.linalg.norm(line)
+        left = left - np.outer(left @ line, line)
+    freedom = width - 2 if straight else width - 1
+    scatter = np.sqrt(np.sum(left**2, axis=1) / freedom)
+    order = np.argsort(scatter, kind="stable")
+    drive = None
+    if drive_pa is not None:
+        earlier = np.concatenate([np.full(LATEST, drive_pa[0]), drive_pa])
+        drive = sliding_window_view(earlier, width + LATEST)[::stride][rows][order]
+    return _Windows(left[order], scatter[order], drive, freedom, stride / width)
+
+
+def _is_white(left: Array, noise_m: float, freedom: float) -> bool:
+    """Return whether first and second differences scatter as the samples themselves do."""
+    count = sqrt(freedom * len(left))
+    first = float(np.mean(np.diff(left, axis=1) ** 2)) / (2.0 * noise_m**2)
+    second = float(np.mean(np.diff(left, 2, axis=1) ** 2)) / (6.0 * noise_m**2)
+    return abs(first - 1.0) < WHITE + 2.0 / count and abs(second - 1.0) < WHITE + 3.0 / count
+
+
+def _follows(windows: _Windows, count: int, freedom: float) -> bool:
+    """Return whether what is left in the first windows goes with the drive, at once or some samples later."""
+    if windows.drive is None:
+        return False
+    left, width = windows.left[:count], windows.left.shape[1]
+    drive = windows.drive[:count]
+    for late in range(LATEST + 1):
+        u = drive[:, LATEST - late : LATEST - late + width]
+        u = u - u.mean(axis=1, keepdims=True)
+        power = float(np.sum(u**2) * np.sum(left**2))
+        # A controller that answers the noise makes the drive go against the position.
+        if power > 0.0 and float(np.sum(u * left)) > max(FOLLOWS, 4.0 / sqrt(freedom * count)) * sqrt(power):
+            return True
+    return False
+
+
+def _with_rounding(scatter_m: float, quantum: float) -> float:
+    """Return sqrt(σ_w^2 + q^2/12) of the scatter of rests under an even noise of q besides."""
+    seen_m2 = max(scatter_m**2 - quantum**2 / 12.0, 0.0)
+    low_m, high_m = 0.0, scatter_m + quantum
+    for _ in range(50):
+        white_m = 0.5 * (low_m + high_m)
+        hidden = np.sum(np.exp(-((2.0 * pi * HARMONICS * white_m / quantum) ** 2)) / HARMONICS**2) / (2.0 * pi**2)
+        if white_m**2 + quantum**2 * (1.0 / 12.0 - float(hidden)) < seen_m2:
+            low_m = white_m
+        else:
+            high_m = white_m
+    return sqrt(low_m**2 + quantum**2 / 12.0)

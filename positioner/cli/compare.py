@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 
 HELP = "hold a model against a recording in free run and say where it fails; exit status 1 if it is not adequate"
@@ -16,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a report to be read in a browser")
+    add_noise_argument(parser)
     add_export_arguments(parser)
 
 
@@ -29,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     writable(arguments.json, "--json")
     writable(arguments.report, "--report")
     valve = load_valve(find_valve(arguments.valve))
-    recording = read_any(arguments.recording, arguments, valve.valve.stroke_m)
+    recording = noise_said(read_any(arguments.recording, arguments, valve.valve.stroke_m), arguments)
     with naming({"recording": str(arguments.recording), "valve file": arguments.valve}):
         compared = compare(recording, valve)
     print(f"{arguments.valve} against {arguments.recording}: {compared.summary()}")

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o", "--out", type=Path, metavar="BETTER.toml", help="write the valve with what is missing, if that is sure"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    add_noise_argument(parser)
     add_export_arguments(parser)
 
 
@@ -68,8 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     began_s = time.monotonic()
     valve = load_valve(find_valve(arguments.valve))
     stroke_m = valve.valve.stroke_m
-    recordings = [read_any(path, arguments, stroke_m) for path in arguments.recordings]
-    test = read_any(arguments.test, arguments, stroke_m) if arguments.test else None
+    recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
+    test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
     named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
     with naming(named):
         diagnosis = diagnose(

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 
 HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal, to be read in a browser")
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    add_noise_argument(parser)
     add_export_arguments(parser)
 
 
@@ -49,8 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
     began_s = time.monotonic()
     path = find_valve(arguments.valve)
     valve = load_valve(path)
-    recordings = [read_any(each, arguments, valve.valve.stroke_m) for each in arguments.fit]
-    test = read_any(arguments.test, arguments, valve.valve.stroke_m) if arguments.test else None
+    recordings = [noise_said(read_any(each, arguments, valve.valve.stroke_m), arguments) for each in arguments.fit]
+    test = noise_said(read_any(arguments.test, arguments, valve.valve.stroke_m), arguments) if arguments.test else None
     Journal.beside(path)  # what is none is refused before the work begins
     with naming({"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}):
         extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=Progress())

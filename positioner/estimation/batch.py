@@ -33,7 +33,7 @@ from math import nan, sqrt
 import numpy as np
 
 from config.codes import Refusal
-from config.noise import white_noise_m
+from config.noise import position_noise_m
 from config.results.result import Brief
 from positioner.estimation.array import Array
 from positioner.estimation.breakaway_force import from_interval, intersection, with_validity
@@ -65,6 +65,8 @@ AS_WELL = 1.1
 """Ratio of the residuals up to which another model explains a motion as well."""
 APART = 3.0
 """Standard deviations beyond which two values of b/c are different ones."""
+UNSEEN = 1e-3
+"""Of what the stem sweeps: where the noise is unknown, what differs by less is no motion."""
 LEAST_MISFIT = 2e-4
 """Share of the travel below which residuals are no misfit worth the name."""
 
@@ -97,7 +99,7 @@ class BatchResult(Brief):
         fit: behind them; None when nothing could be fitted.
         pressure: how it was taken between the samples: "held", "held ahead" or "linear".
         evened: whether the time stamps were taken to jitter about samples taken evenly.
-        noise_std_m: of the position, as given or measured.
+        noise_std_m: of the position, as given or measured; None: unknown.
         segments: how many motions were fitted.
         left_out: how many were found and not fitted.
         condition: of the information matrix of (ln τ, ln μ, ln g, ln q), scaled to a unit diagonal.
@@ -107,7 +109,7 @@ class BatchResult(Brief):
     fit: LikelihoodFit | None
     pressure: str
     evened: bool
-    noise_std_m: float
+    noise_std_m: float | None
     segments: int
     left_out: int
     condition: float
@@ -130,12 +132,7 @@ def identify(
     """
     whole = np.isfinite(time_s) & np.isfinite(position_m) & np.isfinite(pressure_pa)
     t, x, u = time_s[whole], position_m[whole], pressure_pa[whole]
-    if settings.noise_std_m is None:
-        noise_std_m = white_noise_m(x)
-        if noise_std_m == 0.0 and len(x) > 1:  # rounding hides it at rest
-            noise_std_m = _resolution_m(x) / sqrt(12)
-    else:
-        noise_std_m = settings.noise_std_m
+    noise_std_m = position_noise_m(x, u) if settings.noise_std_m is None else settings.noise_std_m
     hypotheses = [
         _fitted(t, x, interpolation, pressures, noise_std_m, settings, prior)
         for interpolation, pressures in _interpolations(u, settings)
@@ -182,13 +179,6 @@ def even_instants(time_s: Array) -> Array | None:
     return np.asarray(even_s) if jitters else None
 
 
-def _resolution_m(position_m: Array) -> float:
-    """Return the smallest step between positions; rounding of numbers is none."""
-    steps = np.diff(np.unique(position_m))
-    steps = steps[steps > 1e-9 * float(np.ptp(position_m))]
-    return float(steps.min()) if len(steps) else 0.0
-
-
 def _interpolations(pressure_pa: Array, settings: BatchSettings) -> list[tuple[str, Array]]:
     """Return the ways in which the pressure may go between the samples, each with the pressures that say so."""
     if settings.pressure_held is not None:
@@ -213,21 +203,24 @@ def _residual_m(each: _Hypothesis) -> float:
     return each.fit.residual_std_m if each.fit is not None else float("inf")
 
 
-def _does_not_fit(each: _Hypothesis, noise_std_m: float, settings: BatchSettings) -> bool:
+def _does_not_fit(each: _Hypothesis, noise_std_m: float | None, settings: BatchSettings) -> bool:
     """Return whether the residuals are more than the sensor's noise."""
     return each.fit is not None and each.fit.residual_std_m > _allowed_m(each, noise_std_m, settings)
 
 
-def _allowed_m(each: _Hypothesis, noise_std_m: float, settings: BatchSettings) -> float:
-    """Return how large residuals may be, m: as the sensor's noise; where that was measured, as any sensor's."""
+def _allowed_m(each: _Hypothesis, noise_std_m: float | None, settings: BatchSettings) -> float:
+    """Return how large residuals may be, m: as the sensor's noise; where that was measured, as any sensor's.
+
+    Where it is unknown only what no sensor would show passes.
+    """
     travel_m = max(float(np.ptp(segment.position_m)) for segment in each.chosen)
-    allowed_m = max(MISFIT * noise_std_m, LEAST_MISFIT * travel_m)
+    allowed_m = max(MISFIT * (noise_std_m or 0.0), LEAST_MISFIT * travel_m)
     if settings.noise_std_m is None:
         allowed_m = min(allowed_m, LARGEST_RESIDUAL * travel_m)
     return allowed_m
 
 
-def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float, settings: BatchSettings) -> bool:
+def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings) -> bool:
     """Return whether a force of one direction beside friction explains motions both ways as well, with another b/c."""
     if best.fit is None or len({each.direction for each in best.chosen}) < 2:
         return False
@@ -246,12 +239,13 @@ def _fitted(
     x: Array,
     interpolation: str,
     u: Array,
-    noise_std_m: float,
+    noise_std_m: float | None,
     settings: BatchSettings,
     prior: Prior | None,
     near: Array | None = None,
 ) -> _Hypothesis:
-    found = find_motions(t, x, u, noise_std_m, settings.moving_threshold_m_per_s)
+    scale_m = UNSEEN * float(np.ptp(x)) if noise_std_m is None and x.size else noise_std_m or 0.0
+    found = find_motions(t, x, u, scale_m, settings.moving_threshold_m_per_s)
     chosen = _longest_motions(found.segments)
     fit = fit_motions(list(chosen), held=interpolation != "linear", prior=prior, near=near) if chosen else None
     return _Hypothesis(interpolation, u, found, chosen, fit)
@@ -276,7 +270,7 @@ def condition(fit: LikelihoodFit) -> float:
     return float(sizes[0] / sizes[-1]) if sizes[-1] > 0 else float("inf")
 
 
-def _estimates(best: _Hypothesis, noise_std_m: float, settings: BatchSettings, time_s: float) -> Estimates:
+def _estimates(best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings, time_s: float) -> Estimates:
     """Return the estimates of a fit, each valid or with the reason why not."""
     assert best.fit is not None
     fit = _widened(best.fit, settings)

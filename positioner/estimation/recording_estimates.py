@@ -75,6 +75,7 @@ class RecordingEstimates(Result):
     def blocks(self) -> list[Block]:
         """Say what was fitted, and each estimate or why it is refused."""
         found = self.found
+        noise = "unknown" if found.noise_std_m is None else f"{found.noise_std_m:.3g} m"
         stamps = "; time stamps jitter: samples taken as even" if found.evened else ""
         rows = [
             (name, f"{each.value:.6g}", f"{each.std:.3g}", unit, "" if each.valid else f"refused: {each.reason.text}")
@@ -87,7 +88,7 @@ class RecordingEstimates(Result):
         )
         return [
             f"{self.samples} samples, {found.segments} motions fitted, {found.left_out} left out",
-            f"noise {found.noise_std_m:.3g} m; pressure taken as {found.pressure} between samples{stamps}",
+            f"noise {noise}; pressure taken as {found.pressure} between samples{stamps}",
             Table(("", "value", "std", "unit", ""), rows),
             *quality,
             f"{self.static_law.landings} landings"

@@ -69,3 +69,10 @@ def test_nothing_is_to_be_added_where_nothing_is_sure(verdict: str) -> None:
     found = diagnosed(verdict, *([("backlash",)] if verdict != "adequate" else []))
     assert extend_commands(found, asked("r.csv", "--valve", "seed")) == []
     assert not_written(Path("b.toml"), found).startswith("b.toml: not written: ")
+
+
+def test_the_noise_and_the_stretch_that_were_said_are_said_again() -> None:
+    arguments = asked("r.csv", "--valve", "seed", "--noise-m", "5e-5", "--from-s", "100.25", "--to-s", "1e5")
+    (command,) = extend_commands(diagnosed("missing", ("backlash",)), arguments)
+    read = read_by_extend(command)
+    assert (read.noise_m, read.from_s, read.to_s) == (5e-5, 100.25, 1e5)

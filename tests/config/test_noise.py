@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from config.noise import noise_by_median, noise_by_rms, quantum_m, white_noise_m
+from config.noise import noise_by_median, position_noise_m, quantum_m
 
 NOISE_M = 2e-5
 
@@ -12,30 +12,97 @@ def motion(count: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.asarray(0.05 + 0.03 * np.sin(np.linspace(0.0, 6.0, count)))
 
 
+Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+
+def noisy(position_m: Array, seed: int = 1) -> Array:
+    return np.asarray(position_m + np.random.default_rng(seed).normal(0.0, NOISE_M, position_m.size))
+
+
+def steps(every: int, count: int = 400) -> Array:
+    """Rests of so many samples between jumps of some centimetres."""
+    levels = np.random.default_rng(2).uniform(0.0, 0.1, count // every + 1)
+    return np.asarray(np.repeat(levels, every)[:count])
+
+
 def test_the_noise_is_found_under_a_smooth_motion() -> None:
-    noise = np.random.default_rng(1).normal(0.0, NOISE_M, 6000)
-    assert white_noise_m(motion(6000) + noise) == pytest.approx(NOISE_M, rel=0.1)
-    assert white_noise_m(motion(6000)) < 1e-3 * NOISE_M
+    assert position_noise_m(noisy(motion(6000))) == pytest.approx(NOISE_M, rel=0.1)
 
 
-def test_a_jerk_in_a_block_hardly_counts_by_the_median_and_does_by_the_rms() -> None:
+@pytest.mark.parametrize("every", [3, 4, 5, 20, 100])
+def test_the_noise_is_found_in_rests_however_short_and_never_in_the_jumps_between(every: int) -> None:
+    assert position_noise_m(noisy(steps(every))) == pytest.approx(NOISE_M, rel=0.2)
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_stem_that_rests_nowhere_tells_no_noise(every: int) -> None:
+    moved = noisy(steps(every))
+    assert position_noise_m(moved) is None
+    assert position_noise_m(moved, 4e5 * steps(every)) is None
+    assert position_noise_m(noisy(np.asarray(0.05 + 0.03 * np.sin(np.arange(400.0))))) is None
+
+
+@pytest.mark.parametrize("period", [11.3, 20.0, 50.0, 100.0, 200.0])
+def test_a_stem_that_swings_slowly_tells_no_noise_that_is_its_motion(period: float) -> None:
+    assert position_noise_m(noisy(np.asarray(0.05 + 0.03 * np.sin(2 * np.pi * np.arange(600.0) / period)))) is None
+
+
+@pytest.mark.parametrize("step_m", [1e-4, 1e-3])
+def test_a_stem_that_wanders_from_sample_to_sample_tells_no_noise(step_m: float) -> None:
+    walk = 0.05 + step_m * np.cumsum(np.random.default_rng(2).standard_normal(600))
+    assert position_noise_m(noisy(np.asarray(walk))) is None
+
+
+def test_steps_hardly_above_the_noise_are_not_taken_for_it() -> None:
+    levels = 0.05 + 6 * NOISE_M * np.random.default_rng(2).standard_normal(120)
+    found = position_noise_m(noisy(np.asarray(np.repeat(levels, 5))))
+    assert found is None or found == pytest.approx(NOISE_M, rel=0.2)
+
+
+def test_a_stem_at_rest_is_told_from_one_that_goes_elsewhere_at_every_sample_by_its_drive() -> None:
+    still = noisy(np.full(600, 0.05))
+    drive = np.random.default_rng(4).normal(0.0, 1e4, 600)
+    assert position_noise_m(still, drive) == pytest.approx(NOISE_M, rel=0.1)
+    assert position_noise_m(still, np.full(600, 1e4)) == pytest.approx(NOISE_M, rel=0.1)
+    assert position_noise_m(still) is None
+    follows = np.append(0.0, drive[:-1])
+    assert position_noise_m(still + 1e-7 * follows, drive) is None
+
+
+@pytest.mark.parametrize("white", [0.0, 0.2, 0.5, 2.0])
+def test_rounding_is_part_of_the_noise(white: float) -> None:
+    quantum = 1e-4
+    seen = steps(25, 2000) + np.random.default_rng(5).normal(0.0, white * quantum, 2000)
+    rounded = np.round(seen / quantum) * quantum
+    assert position_noise_m(rounded) == pytest.approx(quantum * (white**2 + 1 / 12) ** 0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 15])
+def test_too_few_samples_tell_no_noise(count: int) -> None:
+    assert position_noise_m(noisy(np.full(count, 0.05)), np.ones(count)) is None
+
+
+def test_without_noise_it_is_none_at_all() -> None:
+    assert position_noise_m(steps(5)) == 0.0
+
+
+def test_missing_samples_are_left_out() -> None:
+    seen = noisy(steps(20, 800))
+    seen[::37] = np.nan
+    assert position_noise_m(seen) == pytest.approx(NOISE_M, rel=0.2)
+
+
+def test_a_jerk_in_a_block_hardly_counts_by_the_median() -> None:
     differences = np.diff(np.random.default_rng(2).normal(0.0, NOISE_M, 67), 3)
-    quiet = float(noise_by_median(differences)), float(noise_by_rms(differences))
-    assert quiet == pytest.approx((NOISE_M, NOISE_M), rel=0.4)
+    quiet = float(noise_by_median(differences))
+    assert quiet == pytest.approx(NOISE_M, rel=0.4)
     differences[30] = 100 * NOISE_M
-    assert float(noise_by_median(differences)) < 1.2 * quiet[0]
-    assert float(noise_by_rms(differences)) > 2 * quiet[1]
+    assert float(noise_by_median(differences)) < 1.2 * quiet
 
 
 def test_every_block_has_a_noise_of_its_own() -> None:
     differences = np.diff(np.random.default_rng(3).normal(0.0, [[1e-6], [1e-4]], (2, 4000)), 3)
-    for estimator in (noise_by_median, noise_by_rms):
-        assert estimator(differences) == pytest.approx([1e-6, 1e-4], rel=0.1)
-
-
-@pytest.mark.parametrize("count", [0, 1, 7])
-def test_too_few_samples_have_no_noise(count: int) -> None:
-    assert white_noise_m(motion(count)) == 0.0
+    assert noise_by_median(differences) == pytest.approx([1e-6, 1e-4], rel=0.1)
 
 
 @pytest.mark.parametrize(("rounded_to_m", "found_m"), [(2.5e-5, 2.5e-5), (1e-4, 1e-4), (0.0, 0.0)])

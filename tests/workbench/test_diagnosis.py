@@ -42,7 +42,7 @@ def test_the_missing_effect_is_named_and_explains_all(diagnosed: Diagnosis) -> N
     assert diagnosed.verdict == "missing", diagnosed.sentence
     assert diagnosed.missing == ("ip_lag",)
     assert diagnosed.indistinguishable == ()
-    assert diagnosed.best.errors.train_rmse_m < 1.1 * diagnosed.split.floor_m < diagnosed.base.errors.train_rmse_m
+    assert diagnosed.best.errors.train_rmse_m < 1.1 * diagnosed.split.scale_m < diagnosed.base.errors.train_rmse_m
     assert diagnosed.best.fit.parameters["ip_lag.time_constant_s"].value == pytest.approx(0.05, rel=0.02)
 
 

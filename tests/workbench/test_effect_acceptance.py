@@ -68,24 +68,27 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
 
 
 @pytest.mark.parametrize(
-    ("train_rmse", "test_rmse", "train_block", "test_block", "there"),
+    ("train_rmse", "test_rest_rmse", "train_block", "test_block", "there"),
     [
         (1.0, 1.0, 1.0, 1.0, True),
         (2.0, 1.0, 1.0, 1.0, False),
-        (1.0, 20.0, 1.0, 1.0, True),
-        (1.0, 1.0, 1.3, 1.0, False),
-        (1.0, 1.0, 1.0, 1.3, False),
+        (1.0, 2.0, 1.0, 1.0, False),
+        (1.0, 1.0, 1.5, 1.0, False),
+        (1.0, 1.0, 1.0, 1.5, False),
     ],
 )
-def test_the_floor_is_missed_by_many_blocks_or_by_far_in_what_was_fitted(
-    train_rmse: float, test_rmse: float, train_block: float, test_block: float, there: bool
+def test_the_floor_is_missed_by_many_blocks_or_by_far_in_a_few(
+    train_rmse: float, test_rest_rmse: float, train_block: float, test_block: float, there: bool
 ) -> None:
     none = np.zeros(0)
-    assert BlockErrors(train_rmse, test_rmse, train_block, test_block, none, none, 0.0, 1.0).at_floor(1.0) is there
+    rmse = (train_rmse, 20.0, train_block, test_block)
+    errors = BlockErrors(*rmse, none, none, 0.0, 1.0, (), test_rest_rmse)
+    assert errors.at_floor(1.0) is there
+    assert not errors.at_floor(None), "where the floor is unknown nobody can say"
 
 
 def errors_of(logs: np.ndarray) -> BlockErrors:
-    return BlockErrors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0)
+    return BlockErrors(1e-4, 1e-4, 1e-4, 1e-4, logs[30:], logs, 0.0, 1.0, (), 1e-4)
 
 
 def test_two_are_indistinguishable_that_differ_by_a_narrowly_mistimed_slip_and_not_if_one_is_worse_throughout() -> None:

@@ -70,7 +70,7 @@ def test_a_motor_that_does_not_repeat_itself_is_not_called_explained(diagnosed: 
 def test_the_reconstructed_friction_wants_a_negative_stribeck_term(name: str) -> None:
     record = ready(recorded(name))
     found = forces(
-        MOTOR.valve, record.time_s, record.position_m, record.command_pa, np.zeros(len(record)), record.noise_m
+        MOTOR.valve, record.time_s, record.position_m, record.command_pa, np.zeros(len(record)), record.scale_m
     )
     v, d = found.velocity_m_per_s, found.direction
     for speed in (0.5, 2.0, 10.0):

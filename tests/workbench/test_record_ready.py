@@ -80,11 +80,12 @@ def test_uneven_sampling_is_told_and_is_no_gap() -> None:
 
 @pytest.mark.parametrize("quantum", [0.0, 1e-5, 1e-4])
 def test_noise_and_rounding_are_measured(quantum: float) -> None:
-    position = record_of(drawn_valve(np.random.default_rng(5)), 5).position_m
+    recording = record_of(drawn_valve(np.random.default_rng(5)), 5)
+    position = recording.position_m
     if quantum:
         position = quantum * np.round(position / quantum)
     expected = (NOISE_M**2 + quantum**2 / 12.0) ** 0.5
-    assert noise_std_m(position) == pytest.approx(expected, rel=0.15)
+    assert noise_std_m(position, recording.command_pa) == pytest.approx(expected, rel=0.15)
     assert quantum_m(position) == pytest.approx(quantum, rel=1e-3)
 
 

@@ -152,7 +152,7 @@ def test_the_error_falls_on_a_logarithmic_axis_that_shows_the_floor(
     (floor,) = axes["shapes"]
     low, high = axes["yaxis"]["range"]
     assert axes["yaxis"]["type"] == "log"
-    assert floor["y0"] == pytest.approx(1e3 * diagnosed[0].split.floor_m)
+    assert floor["y0"] == pytest.approx(1e3 * (diagnosed[0].split.floor_m or 0.0))
     assert low < np.log10(floor["y0"]) < high
 
 

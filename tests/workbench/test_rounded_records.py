@@ -7,6 +7,7 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from workbench.blind.hiding import hide
+from workbench.data.noise_floor import with_noise
 from workbench.data.record import ready
 from workbench.fit.agreement import WITHIN
 from workbench.fit.fitting import fit
@@ -34,9 +35,9 @@ def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth(seed: int) -> None:
 def test_a_quantum_finer_than_the_noise_shows_is_not_trusted_however_many_searches_agree() -> None:
     hidden = hide(52055)
     columns = {name: each[:652] for name, each in hidden.fit.columns.items()}
-    recording = Recording(columns, hidden.fit.metadata)
+    recording = with_noise(Recording(columns, hidden.fit.metadata), 1.7e-4)
     base = fit(recording, hidden.base, workers=1, profile=False)
     found = fit(recording, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)
-    assert found.parameters["quantisation.quantum_m"].value < ready(recording).noise_m
+    assert found.parameters["quantisation.quantum_m"].value < ready(recording).scale_m
     assert found.cost < base.cost / WITHIN, "though it does better than the base"
     assert not found.trusted

@@ -17,6 +17,7 @@ FOUND = Findings(
     phase=np.zeros(100, np.int64),
     direction=np.zeros(100),
     floor_m=5e-5,
+    scale_m=5e-5,
     rms_m=1e-3,
     events=SlipEvents((), (), ()),
     measured_slips=SLIPS,

@@ -33,7 +33,7 @@ def step(before: EvaluatedModel, number: int = 1, **models: EvaluatedModel) -> E
 def diagnosed(parts: Split, *steps: EffectStep) -> Diagnosis:
     added = steps[-1].added
     best = added.model if added and added.model else steps[-1].before
-    found = verdict(best, steps, parts.motion_std_m)
+    found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
     sentence = verdict_sentence(found, best, steps, LIBRARY, parts)
     return Diagnosis(
         steps=steps,
@@ -146,7 +146,10 @@ def test_a_valve_pushed_at_random_is_not_called_adequate(parts: Split) -> None:
 def test_a_model_that_leaves_a_tenth_of_the_motion_explains_nothing() -> None:
     steps = [step(EXPLAINED, ip_lag=EXPLAINED)]
     left_m = EXPLAINED.errors.test_block_m
-    assert [verdict(EXPLAINED, steps, factor * left_m) for factor in (10.1, 9.9)] == ["adequate", "unexplained"]
+    assert [verdict(EXPLAINED, steps, factor * left_m, FLOOR_M) for factor in (10.1, 9.9)] == [
+        "adequate",
+        "unexplained",
+    ]
 
 
 def test_an_adequate_valve_that_scatters_is_told_so_and_one_that_does_not_is_not(parts: Split) -> None:

@@ -1,7 +1,8 @@
 """Compare: the model in free run against the measured position, and where it fails.
 
 The model is adequate if its rms error is at most 1.5 times the floor (sensor noise, or repeatability where the
-command repeats itself), the residual does not depend on the input, and no slip is missed or spurious.
+command repeats itself), the residual does not depend on the input, and no slip is missed or spurious. Where the
+floor is unknown nothing is called adequate.
 """
 
 from collections.abc import Sequence
@@ -75,9 +76,11 @@ class Comparison(Result):
     rms_m: float
     robust_m: float
     """Median of the rms over blocks of 1 s: no single missed slip carries it."""
-    noise_m: float
+    noise_m: float | None
+    """None: unknown."""
     repeatability_m: float | None
-    floor_m: float
+    floor_m: float | None
+    """None: unknown; then `adequate` says nothing of the model."""
     phases: tuple[Phase, ...]
     slips: SlipEvents
     pressure_side: PressureSide | None
@@ -102,14 +105,20 @@ class Comparison(Result):
     def blocks(self) -> list[Block]:
         """Say where the model fails, the gravest first, and by how much in each phase."""
         return [
-            f"{'adequate' if self.adequate else 'not adequate'}: fit {self.fit_percent:.2f} %, error {_mm(self.rms_m)} "
-            f"rms, {_mm(self.robust_m)} robust, noise {_mm(self.noise_m)}"
+            f"{self._judgement}: fit {self.fit_percent:.2f} %, error {_mm(self.rms_m)} rms, {_mm(self.robust_m)} "
+            f"robust, noise {'unknown' if self.noise_m is None else _mm(self.noise_m)}"
             + ("" if self.repeatability_m is None else f", repeatability {_mm(self.repeatability_m)}"),
             *(f"  {sentence}" for sentence in self.sentences),
             _phase_table(self.phases),
             *self._slips_and_residual(),
             *(f"recording: {note}" for note in shortened(self.notes)),
         ]
+
+    @property
+    def _judgement(self) -> str:
+        if self.floor_m is None:
+            return "not judged"
+        return "adequate" if self.adequate else "not adequate"
 
     def _slips_and_residual(self) -> list[str]:
         slips, side = self.slips, self.pressure_side
@@ -179,11 +188,13 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         phase=phase[rows],
         direction=direction[rows],
         floor_m=record.floor_m,
+        scale_m=record.scale_m,
         rms_m=error_m,
         events=events,
         measured_slips=tuple(slip for each in segments for slip in each.measured),
         depends_on_input=bool(np.max(np.abs(with_input.value)) > CLEAR * with_input.band),
-        close=error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
+        close=record.floor_m is not None
+        and error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
     )
     simulated_rows = np.concatenate([np.arange(first, end) for first, end in record.segments])
     valid = rows[simulated_rows]
@@ -271,20 +282,20 @@ def _segment_findings(valve: ValveFile, record: Record, run: Run, first: int, en
     # Only for finding motion: across a bad sample the stem is taken to go straight.
     measured_m = np.interp(rows, rows[valid], record.position_m[first:end][valid])
     simulated_m = run.indicated_m[first:end]
-    measured, simulated = slips(measured_m, record.noise_m), slips(simulated_m, record.noise_m)
+    measured, simulated = slips(measured_m, record.scale_m), slips(simulated_m, record.scale_m)
     pressure_pa = _pressure(record, run)[first:end]
     load_n = np.zeros(rows.size) if record.load_n is None else record.load_n[first:end]
     direction = np.zeros(rows.size)
     for slip in measured:
         direction[slip.first :] = slip.direction
     both = [
-        forces(valve.valve, time_s, position_m, pressure_pa, load_n, record.noise_m)
+        forces(valve.valve, time_s, position_m, pressure_pa, load_n, record.scale_m)
         for position_m in (measured_m, simulated_m)
     ]
     return _SegmentFindings(
         measured,
-        matched(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.noise_m),
-        phases(measured_m, record.noise_m, measured, valve),
+        matched(time_s - record.time_s[0], (measured, measured_m), (simulated, simulated_m), record.scale_m),
+        phases(measured_m, record.scale_m, measured, valve),
         direction,
         velocity_m_per_s(time_s, measured_m),
         both[0],

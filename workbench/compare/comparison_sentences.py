@@ -16,6 +16,7 @@ from workbench.compare.measures import BLOCK_S
 from workbench.compare.phases import PHASES
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
 from workbench.data.motion import Slip
+from workbench.data.noise_floor import UNKNOWN
 
 CERTAIN = 3.5
 FEWEST = 3
@@ -34,13 +35,20 @@ class Findings:
     position_m: Column
     phase: NDArray[np.int64]
     direction: Column
-    floor_m: float
+    floor_m: float | None
+    scale_m: float
+    """What counts as motion, and as an error that matters where the floor is unknown."""
     rms_m: float
     events: SlipEvents
     measured_slips: tuple[Slip, ...]
     depends_on_input: bool
     close: bool
     """The error is at most 1.5 times the floor."""
+
+    @property
+    def matters_m(self) -> float:
+        """A mean error that matters is more."""
+        return self.scale_m if self.floor_m is None else self.floor_m
 
     @property
     def adequate(self) -> bool:
@@ -54,13 +62,14 @@ def sentences(found: Findings) -> tuple[str, ...]:
     if not found.measured_slips:
         spurious = len(found.events.spurious_s)
         tail = f", the model makes {_count(spurious, 'spurious ')}" if spurious else ""
-        return (f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion",)
+        still = f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion"
+        return (still,) if found.floor_m is not None else (still, UNKNOWN)
     said = []
     if len({each.direction for each in found.measured_slips}) == 1:
         way = "opens" if found.measured_slips[0].direction > 0 else "closes"
         said.append(f"the stem only {way} in this recording: the other direction is not judged")
     if found.adequate:
-        return (*said, f"the model holds: error {_mm(found.rms_m)}, floor {_mm(found.floor_m)}, no structure left")
+        return (*said, f"the model holds: error {_mm(found.rms_m)}, floor {_mm(found.matters_m)}, no structure left")
     graded = [*_along_motion(found), *_late(found), *_offset(found), *_trends(found)]
     said += [text for _, text in sorted(graded, key=lambda each: -each[0])]
     return (*said, *_slips(found), *_share(found), *_rest(found, bool(graded)))
@@ -78,7 +87,7 @@ def _along_motion(found: Findings) -> Iterator[tuple[float, str]]:
     for when, reversal in (("after every reversal", True), ("where it goes on in one direction", False)):
         pairs = [each for each in found.events.matched if each.reversal == reversal]
         yield from _by_direction(
-            pairs, [each.farther_m for each in pairs], found.floor_m, when, ("too far", "too short"), _mm
+            pairs, [each.farther_m for each in pairs], found.matters_m, when, ("too far", "too short"), _mm
         )
 
 
@@ -130,7 +139,7 @@ def _by_direction(
 
 def _offset(found: Findings) -> Iterator[tuple[float, str]]:
     mean, error = _block_mean(found, np.ones(found.time_s.size, np.bool_))
-    if _certain(mean, error, found.floor_m) and abs(mean) > 0.5 * found.rms_m:
+    if _certain(mean, error, found.matters_m) and abs(mean) > 0.5 * found.rms_m:
         yield abs(mean), f"it stands {_mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
 
 
@@ -152,7 +161,7 @@ def _trends(found: Findings) -> Iterator[tuple[float, str]]:
         spread = float(np.std(y - slope * x - intercept)) / (float(np.std(x)) * (independent - 2) ** 0.5)
         low, high = float(np.min(x)), float(np.max(x))
         change = float(slope) * (high - low)
-        if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.floor_m, found.rms_m):
+        if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.matters_m, found.rms_m):
             at_low, at_high = slope * low + intercept, slope * high + intercept
             yield (
                 0.5 * abs(change),
@@ -180,6 +189,9 @@ def _share(found: Findings) -> Iterator[str]:
 
 
 def _rest(found: Findings, named: bool) -> Iterator[str]:
+    if found.floor_m is None:
+        yield f"the error is {_mm(found.rms_m)} rms; {UNKNOWN}"
+        return
     times = found.rms_m / found.floor_m if found.floor_m else np.inf
     if not found.close:
         yield f"the error, {_mm(found.rms_m)} rms, is {times:.1f} times the floor of {_mm(found.floor_m)}"

@@ -12,7 +12,7 @@ import numpy as np
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.result import Brief
-from workbench.data.record import Mask, Record, ready, require_fittable
+from workbench.data.record import Mask, Record, ready, require_few_samples, require_fittable
 
 HELD_OUT = 1.0 / 3.0
 """Part of the recording that is held out where no other is given."""
@@ -35,8 +35,17 @@ class Split(Brief):
 
     train: Part
     test: Part
-    floor_m: float
-    """The error that no model undercuts: the valve's repeatability where a command repeats, else the sensor's noise."""
+    floor_m: float | None
+    """The error that no model undercuts: the valve's repeatability where a command repeats, else the sensor's noise.
+
+    None: unknown."""
+
+    @property
+    def scale_m(self) -> float:
+        """What errors are weighed by where the floor is unknown, and no verdict rests on it; else the floor."""
+        if self.floor_m is not None:
+            return self.floor_m
+        return max(each.record.floor_or_scale_m for each in (self.train, self.test))
 
     @property
     def motion_std_m(self) -> float:
@@ -56,14 +65,16 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
         InputError: no recording, too few samples, or more than can be fitted.
     """
     whole = joined(recordings)
-    require_fittable(whole)
+    require_few_samples(whole)
     end = len(whole) if test else round(len(whole) * (1.0 - HELD_OUT))
     train = _part(_head(whole, end), 0)
     held_out = _part(test, 0) if test else _part(whole, end)
     for part, what in ((train, "to fit"), (held_out, "held out")):
         if part.counted.sum() < FEWEST:
             raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {FEWEST} are needed")
-    return Split(train, held_out, max(train.record.floor_m, held_out.record.floor_m))
+    require_fittable(train.record)
+    floors_m = [each.record.floor_m for each in (train, held_out) if each.record.floor_m is not None]
+    return Split(train, held_out, max(floors_m, default=None))
 
 
 def _part(recording: Recording, first: int) -> Part:

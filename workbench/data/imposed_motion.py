@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.noise import position_noise_m
 from config.recording import Column, Recording, read_table
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.motion import PARABOLA
-from workbench.data.noise_floor import noise_std_m
-from workbench.data.record import UNITS_PA
+from workbench.data.record import UNITS_PA, UNSEEN
 
 FORCES = ("time_s", "pressure_pa", "position_m", "load_n")
 CURVE = ("branch", "pressure_pa", "position_m")
@@ -210,7 +210,8 @@ def _moved(recording: Recording, valve: ValveParameters) -> Rows:
         raise InputError("recording", f"{time_s.size} samples, at least {max(FEWEST, PARABOLA)} are needed")
     if not np.all(np.diff(time_s) > 0.0):
         raise InputError("recording", "time_s must increase strictly")
-    noise_m = noise_std_m(position_m)
+    # A rig that never rests shows no noise: then what it sweeps says what motion is.
+    noise_m = position_noise_m(position_m) or UNSEEN * float(np.ptp(position_m))
     smooth_m = savgol_filter(position_m, PARABOLA, 2)
     velocity = np.gradient(smooth_m, time_s)
     period_s = float(np.median(np.diff(time_s)))

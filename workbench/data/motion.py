@@ -15,6 +15,8 @@ from config.recording import Column
 REACH = 2
 NOTICED = 5.0 * 2**0.5
 COVERED = 6.0
+BAND, AT_ONCE, LONGEST_REST = 8.0, 4, 50
+"""Standard deviations within which a stem rests; samples of a rest, at least and at most."""
 PARABOLA = 9
 """Samples of a local parabola, from which accelerations come."""
 
@@ -56,6 +58,37 @@ def directions(position_m: Column, noise_m: float) -> Directions:
     across[REACH:-REACH] = position_m[2 * REACH :] - position_m[: -2 * REACH]
     across[~np.isfinite(across)] = 0.0
     return np.where(np.abs(across) > NOTICED * noise_m, np.sign(across), 0.0).astype(np.int64)
+
+
+def rests_first(position_m: Column, noise_m: float) -> int | None:
+    """Return the row of an unbroken stretch of positions, m, (n,), at which the stem first rests; None if nowhere.
+
+    0 where its first `AT_ONCE` samples lie in a band, or on a straight line: at rest, or at a velocity that they tell.
+    Else it rests where it stays, within that band, for as many samples as it took to get there, `AT_ONCE` to
+    `LONGEST_REST`.
+    """
+    rows = np.flatnonzero(np.isfinite(position_m))
+    x = position_m[rows]
+    band_m = BAND * noise_m
+    left = np.flatnonzero(np.abs(x[: LONGEST_REST + 1] - x[:1]) > band_m)
+    if not left.size or left[0] >= AT_ONCE or _is_straight(x[:AT_ONCE], 0.5 * band_m):
+        return 0
+    row = 1
+    while row < x.size:
+        stay = min(max(AT_ONCE, row), LONGEST_REST)
+        if row + stay > x.size:
+            return None
+        off = np.flatnonzero(np.abs(x[row : row + stay] - x[row]) > band_m)
+        if not off.size:
+            return int(rows[row])
+        row += 1
+    return None
+
+
+def _is_straight(position_m: Column, within_m: float) -> bool:
+    """Return whether samples, m, (n,), lie on a straight line, by their numbers."""
+    line = np.polynomial.Polynomial.fit(np.arange(position_m.size), position_m, 1)
+    return bool(np.max(np.abs(position_m - line(np.arange(position_m.size)))) < within_m)
 
 
 def slips(position_m: Column, noise_m: float) -> tuple[Slip, ...]:

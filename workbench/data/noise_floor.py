@@ -1,28 +1,76 @@
 """What no model can explain: the sensor's noise, its rounding, and how well the valve repeats itself.
 
-    sigma = median of the rms of blocks of 16 third differences (`config.noise`), at least q / sqrt 12 for a quantum q
-
-A record whose command repeats after a lag L shows the position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2.
+The noise is found at rest (`config.noise`), never in motion. A record whose command repeats after a lag L shows the
+position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2; and where nothing rests, what rests in the difference of
+the two tells the noise. Where neither does, it is what the recording says of itself (`# noise_m: 5e-5`, or the option
+`--noise-m`), or it is unknown.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
-from config.noise import noise_by_rms, quantum_m
-from config.recording import Column
+from config.errors import InputError
+from config.noise import position_noise_m
+from config.recording import Column, Recording
 
-BLOCK = 16
+NOISE = "noise_m"
+"""Key under which a recording says its noise."""
 REPEATS = 1e-3
 """A command repeats if its rms difference over the lag is below this part of its rms deviation."""
+UNKNOWN = (
+    "the noise of the sensor is unknown, so that no verdict rests on it: the stem rests nowhere long enough, and no "
+    "command repeats. Say it, --noise-m M, or record the stem at rest, the command held for 40 samples"
+)
 
 
-def noise_std_m(position_m: Column) -> float:
-    """Return the standard deviation of the white noise in m, rounding included; 0 for fewer than 20 samples."""
-    third = np.diff(position_m[np.isfinite(position_m)], 3)
-    blocks = third[: third.size // BLOCK * BLOCK].reshape(-1, BLOCK)
-    if not len(blocks):
-        return 0.0
-    white = float(np.median(noise_by_rms(blocks)))
-    return max(white, quantum_m(position_m) / 12**0.5)
+def told_mm(value_m: float | None) -> str:
+    """Say a noise or a floor in mm."""
+    return "unknown" if value_m is None else f"{1e3 * value_m:.4g} mm"
+
+
+def with_noise(recording: Recording, noise_m: float | None) -> Recording:
+    """Return a recording that says its noise, the standard deviation in m, rounding included; None: as it is.
+
+    Raises:
+        InputError: it is not positive.
+    """
+    if noise_m is None:
+        return recording
+    if not 0.0 < noise_m < np.inf:
+        raise InputError(NOISE, f"must be positive, it is {noise_m:g}")
+    return replace(recording, metadata={**recording.metadata, NOISE: repr(noise_m)})
+
+
+def said_noise_m(recording: Recording) -> float | None:
+    """Return the noise that a recording says it has, m; None if it says nothing.
+
+    Raises:
+        InputError: what it says is no positive number.
+    """
+    said = recording.metadata.get(NOISE)
+    if said is None:
+        return None
+    try:
+        noise_m = float(said)
+    except ValueError:
+        noise_m = np.nan
+    if not 0.0 < noise_m < np.inf:
+        raise InputError("recording", f"{NOISE}: {said}; it must be a positive number, m")
+    return noise_m
+
+
+def noise_std_m(position_m: Column, command_pa: Column) -> float | None:
+    """Return the standard deviation of the noise in m, rounding included; None where the samples do not tell.
+
+    Args:
+        position_m: m, (n,), evenly sampled or nearly so, NaN where it is missing.
+        command_pa: Pa, (n,).
+    """
+    noise_m = position_noise_m(position_m, command_pa)
+    if noise_m is None and (lag := repeat_lag(command_pa)):
+        return position_noise_m((position_m[lag:] - position_m[:-lag]) / 2.0**0.5, command_pa[lag:])
+    return noise_m
 
 
 def repeat_lag(command_pa: Column) -> int | None:
@@ -57,7 +105,7 @@ def repeatability_m(command_pa: Column, position_m: Column) -> float | None:
     lag = repeat_lag(command_pa)
     if lag is None:
         return None
-    first = lag if command_pa.size > 2.5 * lag else 0
+    first = lag if position_m.size > 2.5 * lag else 0
     difference = position_m[first + lag :] - position_m[first:-lag]
     finite = difference[np.isfinite(difference)]
     return float(np.sqrt(np.mean(finite**2) / 2.0)) if finite.size else None

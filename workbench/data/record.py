@@ -2,12 +2,13 @@
 
 The clock set back, a gap, or rows that the daemon's recorder missed begin a new segment, simulated from rest on its
 own. Samples that the daemon lost are a longer period: it wrote no command in the meantime. A position that is not a
-number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. Nothing
-else is touched, and `notes` has a sentence for each of these, samples counted from 1.
+number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. What
+begins in motion, at a velocity that its samples do not tell, begins where the stem first rests, if that is in its first
+third. Nothing else is touched, and `notes` has a sentence for each of these, samples counted from 1.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,8 @@ from config.noise import quantum_m
 from config.recording import CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
-from workbench.data.noise_floor import noise_std_m, repeatability_m
+from workbench.data.motion import rests_first, slips
+from workbench.data.noise_floor import UNKNOWN, noise_std_m, repeatability_m, said_noise_m
 
 GAP = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
@@ -29,10 +31,17 @@ SHORTEST = 4
 FEW_STEPS = 10
 """So often a clock may be set back, in however short a recording: several may have been joined."""
 LIKELY_SPIKE = 8.0
-"""Standard deviations of the noise that a spike stands off at least."""
-MOST_SAMPLES = 500_000
-LONGEST_S = 7200.0
-"""A fit simulates a recording thousands of times: with more samples, or for longer, it would take hours."""
+"""Times the least scatter that a spike stands off at least."""
+UNSEEN = 1e-3
+"""Of what the stem sweeps: where the noise is unknown, what differs by less counts as none."""
+LATEST_REST = 1.0 / 3.0
+"""Of a segment that begins in motion: by then it must have come to rest, or is simulated from where it begins."""
+MOST_WORK, SLIP_ROWS = 1_000_000, 20
+"""Rows and slips that are fitted at most: a fit simulates them thousands of times, and a slip costs as many rows."""
+ALLOWED = (
+    f"allowed are {MOST_WORK} samples, a slip counting for {SLIP_ROWS}: cut out the stretch that matters, --from-s and "
+    "--to-s"
+)
 UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
 Mask = npt.NDArray[np.bool_]
 
@@ -50,15 +59,28 @@ class Record(Brief):
     """Whether a sample's position counts in the error."""
     segments: tuple[tuple[int, int], ...]
     notes: tuple[str, ...]
-    noise_m: float
-    """Standard deviation of the sensor's noise, rounding included."""
+    noise_m: float | None
+    """Standard deviation of the sensor's noise, rounding included; None: unknown, and no verdict may rest on it."""
     repeatability_m: float | None
     """How well the valve repeats itself, None where the command does not."""
 
     @property
-    def floor_m(self) -> float:
-        """The error that no model undercuts."""
-        return max(self.noise_m, self.repeatability_m or 0.0)
+    def floor_m(self) -> float | None:
+        """The error that no model undercuts; None: unknown."""
+        known = [each for each in (self.noise_m, self.repeatability_m) if each is not None]
+        return max(known, default=None)
+
+    @property
+    def scale_m(self) -> float:
+        """What tells motion from rest and residuals are weighed by: the noise; unknown, a part of what is swept."""
+        if self.noise_m is not None:
+            return self.noise_m
+        return UNSEEN * float(np.ptp(self.position_m[self.valid]))
+
+    @property
+    def floor_or_scale_m(self) -> float:
+        """The floor, or where it is unknown what stands for it; no verdict rests on that."""
+        return self.scale_m if self.floor_m is None else self.floor_m
 
     @property
     def period_s(self) -> float:
@@ -85,39 +107,72 @@ def ready(recording: Recording) -> Record:
     segments = tuple(_segments(columns, notes))
     if not segments:
         raise InputError("recording", f"no stretch of at least {SHORTEST} samples without a gap or a step of the clock")
-    noise_m = noise_std_m(position_m[valid])
+    time_s = columns["time_s"]
+    seen_m = np.where(valid, position_m, np.nan)
+    longest = slice(*max(segments, key=lambda each: each[1] - each[0]))
+    noise_m = said_noise_m(recording)
+    if noise_m is None:
+        noise_m = noise_std_m(seen_m[longest], command_pa[longest])
+    repeated_m = repeatability_m(command_pa[longest], seen_m[longest]) if _is_even(time_s[longest]) else None
     quantum = quantum_m(position_m[valid])
     if quantum:
         notes.append(f"position_m is rounded to {quantum:.3g} m")
-    _tell_sampling(columns["time_s"], segments, notes)
-    return Record(
-        columns["time_s"],
+    if noise_m is None and repeated_m is None:
+        notes.append(UNKNOWN)
+    _tell_sampling(time_s, segments, notes)
+    record = Record(
+        time_s,
         command_pa,
         position_m,
         _whole(columns.get("pressure_pa"), "pressure_pa", notes),
         _whole(columns.get("load_n"), "load_n", notes),
         valid,
         segments,
-        tuple(notes),
+        (),
         noise_m,
-        _repeatability(columns["time_s"], command_pa, np.where(valid, position_m, np.nan), segments),
+        repeated_m,
     )
+    return replace(record, segments=tuple(_from_rest(record, notes)), notes=tuple(notes))
 
 
-def require_fittable(recording: Recording) -> None:
+def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
+    """Let the segments that begin in motion begin at rest."""
+    for first, end in record.segments:
+        rest = rests_first(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m)
+        if rest is None or rest > LATEST_REST * (end - first) or end - first - rest < SHORTEST:
+            yield first, end
+            continue
+        if rest:
+            notes.append(
+                f"the stem is in motion at sample {first + 1}: simulated and judged from sample {first + rest + 1} on, "
+                "where it first rests"
+            )
+        yield first + rest, end
+
+
+def require_few_samples(recording: Recording) -> None:
+    """Refuse, before anything is made ready, what would take hours to fit however little the stem moves.
+
+    Raises:
+        InputError: too many samples; says how many are allowed.
+    """
+    _require_columns(recording.columns)
+    if len(recording) > MOST_WORK:
+        raise InputError("recording", f"{len(recording)} samples would take hours to fit; {ALLOWED}")
+
+
+def require_fittable(record: Record) -> None:
     """Refuse what would take hours to fit.
 
     Raises:
-        InputError: too many samples, or too long a time; says how much is allowed.
+        InputError: too many samples and slips; says how many are allowed.
     """
-    _require_columns(recording.columns)
-    count, steps = len(recording), np.diff(recording.time_s)
-    most = f"allowed are {MOST_SAMPLES} samples and {LONGEST_S:g} s: cut out the stretch that matters"
-    if count > MOST_SAMPLES:
-        raise InputError("recording", f"{count} samples would take hours to fit; {most}")
-    duration_s = float(np.sum(steps, where=(steps > 0.0) & (steps <= _longest_step_s(steps))))
-    if duration_s > LONGEST_S:
-        raise InputError("recording", f"{duration_s:.6g} s would take hours to fit; {most}")
+    count = sum(
+        len(slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m))
+        for first, end in record.segments
+    )
+    if len(record) + SLIP_ROWS * count > MOST_WORK:
+        raise InputError("recording", f"{len(record)} samples with {count} slips would take hours to fit; {ALLOWED}")
 
 
 def require_units(record: Record, valve: ValveParameters) -> None:
@@ -224,11 +279,17 @@ def _spikes(position_m: Column) -> Mask:
     if here.size:
         middle_half = np.nanquantile(position_m, 0.99) - np.nanquantile(position_m, 0.01)
         off = np.minimum(np.abs(here - before), np.abs(here - after))
-        least_m = max(0.1 * middle_half, LIKELY_SPIKE * noise_std_m(position_m))
+        least_m = max(0.1 * middle_half, LIKELY_SPIKE * _typical_scatter_m(position_m))
         spikes[1:-1] = (off > least_m) & (off > 20.0 * np.abs(after - before)) & (off > 0.0)
         if middle_half == 0.0:
             spikes[:] = False
     return spikes
+
+
+def _typical_scatter_m(position_m: Column) -> float:
+    """Return what second differences typically are, in standard deviations of noise alone, m: motion may be in them."""
+    second = np.abs(np.diff(position_m[np.isfinite(position_m)], 2))
+    return float(np.median(second)) / (0.6745 * 6.0**0.5) if second.size else 0.0
 
 
 def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple[int, int]]:
@@ -292,14 +353,10 @@ def _whole(column: Column | None, name: str, notes: list[str]) -> Column | None:
     return np.interp(rows, rows[finite], column[finite])
 
 
-def _repeatability(
-    time_s: Column, command_pa: Column, position_m: Column, segments: tuple[tuple[int, int], ...]
-) -> float | None:
-    first, end = max(segments, key=lambda each: each[1] - each[0])
-    steps = np.diff(time_s[first:end])
-    if np.ptp(steps) > UNEVEN * float(np.median(steps)):
-        return None
-    return repeatability_m(command_pa[first:end], position_m[first:end])
+def _is_even(time_s: Column) -> bool:
+    """Return whether the samples of an unbroken stretch are evenly apart."""
+    steps = np.diff(time_s)
+    return bool(np.ptp(steps) <= UNEVEN * float(np.median(steps)))
 
 
 def _samples(mask: Mask) -> str:

@@ -27,7 +27,8 @@ from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
 from workbench.data.motion import slips
-from workbench.data.record import Record, ready, require_fittable, require_units
+from workbench.data.noise_floor import told_mm
+from workbench.data.record import Record, ready, require_few_samples, require_fittable, require_units
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
@@ -91,8 +92,8 @@ class Fit(Result):
     valve: ValveFile
     parameters: Mapping[str, Fitted]
     rms_m: float
-    floor_m: float
-    """The error that no model undercuts: noise, or repeatability where the command repeats itself."""
+    floor_m: float | None
+    """The error that no model undercuts: noise, or repeatability where the command repeats itself; None: unknown."""
     cost: float
     """Soft-L1 cost of scale 5, in units of the noise; half the number of samples for white residuals."""
     count: int
@@ -127,7 +128,7 @@ class Fit(Result):
         """Say the error, whether the searches agree, and each parameter with its interval."""
         agreement = "searches agree" if self.trusted else "search came to this alone, or to nothing better: not trusted"
         return [
-            f"error {1e3 * self.rms_m:.4g} mm rms, floor {1e3 * self.floor_m:.4g} mm; {self.agreement} {agreement}",
+            f"error {1e3 * self.rms_m:.4g} mm rms, floor {told_mm(self.floor_m)}; {self.agreement} {agreement}",
             parameter_table(self.parameters),
             *(f"recording: {note}" for note in shortened(self.notes)),
         ]
@@ -237,7 +238,7 @@ def _require_motion(record: Record) -> None:
     found = [
         each
         for first, end in record.segments
-        for each in slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.noise_m)
+        for each in slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m)
     ]
     if len(found) < LEAST_SLIPS:
         raise InputError(
@@ -266,8 +267,9 @@ def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTa
 
 
 def _fittable(recording: Recording, valve: ValveFile) -> Record:
-    require_fittable(recording)
+    require_few_samples(recording)
     record = ready(recording)
+    require_fittable(record)
     require_units(record, valve.valve)
     _require_motion(record)
     return record
@@ -407,7 +409,7 @@ class BegunFit:
 
     def _shows(self, z: Vector) -> bool:
         """Whether what is added makes something better than the base, a quantum by more than the noise hides."""
-        theta, noise_m = self.error.theta(z), self.error.run.record.noise_m
+        theta, noise_m = self.error.theta(z), self.error.run.record.scale_m
         quanta_m = [theta[each.index] for each in self.error.parameters if each.guess == "quantum"]
         return self.error.cost(z) < self.effort.improves_below and all(each >= FINEST * noise_m for each in quanta_m)
 

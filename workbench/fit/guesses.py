@@ -35,7 +35,7 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
     kinds = {each.guess for each in added}
     suggested: list[dict[str, float]] = []
     if kinds & {"lowest", "swept"}:
-        suggested += _ends(record.position_m[record.valid], record.noise_m)
+        suggested += _ends(record.position_m[record.valid], record.scale_m)
     if "quantum" in kinds:
         suggested += [{"quantum": each} for each in likely_quanta_m(record)]
     return [
@@ -61,9 +61,9 @@ def likely_quanta_m(record: Record) -> list[float]:
         samples_m = record.position_m[record.valid]
         places_m = samples_m[:: 1 + samples_m.size // MOST_SAMPLES]
     swept_m = float(np.ptp(places_m))
-    if swept_m < 2.0 * COARSEST * FINEST * record.noise_m:
+    if swept_m < 2.0 * COARSEST * FINEST * record.scale_m:
         return []
-    frequency = np.arange(COARSEST / swept_m, 1.0 / (FINEST * record.noise_m), 1.0 / (PER_LOBE * swept_m))
+    frequency = np.arange(COARSEST / swept_m, 1.0 / (FINEST * record.scale_m), 1.0 / (PER_LOBE * swept_m))
     height = np.abs(np.exp(2j * np.pi * np.outer(frequency, places_m)).sum(axis=1))
     peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]))
     likeliest = peaks[np.argsort(-height[peaks])[:LIKELY_QUANTA]]
@@ -85,7 +85,7 @@ def _rests_m(record: Record) -> Column:
     places = []
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
-        way = directions(position_m, record.noise_m)
+        way = directions(position_m, record.scale_m)
         edges = [0, *(1 + np.flatnonzero(np.diff(way != 0))).tolist(), way.size]
         for begin, over in pairwise(edges):
             if way[begin] == 0 and over - begin >= LEAST_REST:

@@ -101,7 +101,7 @@ def rests(record: Record) -> tuple[Rest, ...]:
     return tuple(
         rest
         for first, end in record.segments
-        for rest in _rests(np.where(record.valid, record.position_m, np.nan)[first:end], record.noise_m, first)
+        for rest in _rests(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m, first)
     )
 
 

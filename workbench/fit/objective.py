@@ -43,7 +43,7 @@ class SimulationError:
         whole = rows.size == len(record)
         self._rows = slice(None) if whole else rows
         self._measured_m = record.position_m[self._rows]
-        self.sigma_m = record.noise_m or 1e-6 * composition.valve.stroke_m
+        self.sigma_m = record.scale_m or 1e-6 * composition.valve.stroke_m
         self._theta = np.array(theta)
         self._costs: dict[tuple[bytes, float], float] = {}
         bounds = np.array([each.bounds for each in parameters]).reshape(-1, 2)

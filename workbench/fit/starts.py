@@ -222,7 +222,7 @@ def _moving(area_m2: float, record: Record, from_pressure: bool) -> tuple[Vector
     for first, end in record.segments:
         x = np.where(record.valid, record.position_m, np.nan)[first:end]
         v = velocity_m_per_s(record.time_s[first:end], x)
-        way = directions(x, record.noise_m)
+        way = directions(x, record.scale_m)
         force_n = area_m2 * drive[first:end]
         if not from_pressure:
             force_n[1:] = 0.5 * (force_n[1:] + force_n[:-1])

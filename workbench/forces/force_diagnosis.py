@@ -20,7 +20,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect, shipped_effect
 from workbench.data.imposed_motion import Rows, rows_of
 from workbench.forces.force_balance import Balance, ForceFit, ForceModel, floor_of
-from workbench.select.block_errors import AT_FLOOR, indistinguishable, relative_error_reduction
+from workbench.select.block_errors import indistinguishable, relative_error_reduction
 from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_acceptance import Gain
 from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSelection, ForwardStep, without_missing
@@ -29,6 +29,9 @@ from workbench.select.verdict_sentence import rivals_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+AT_FLOOR = 1.25
+"""A balance reaches the floor if its median error is within this of what strokes differ by among themselves."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -173,7 +173,7 @@ def initial_state(record: Record, first: int, end: int) -> InitialState:
         raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
     position_m = record.position_m[rows[:LONGEST_START]]
     time_s = record.time_s[rows[:LONGEST_START]]
-    band_m = STILL * record.noise_m
+    band_m = STILL * record.scale_m
     moving = np.abs(position_m - position_m[0]) > 2.0 * band_m
     still = int(moving.argmax()) if moving.any() else position_m.size
     if still >= SHORT or position_m.size < SHORT:

@@ -98,7 +98,7 @@ def facts(comparison: Comparison) -> str:
 def _verdict(each: Comparison) -> Html:
     if each.adequate:
         return verdict("good", "The model holds.", bullets(each.sentences))
-    if not each.over_direction.count.sum():
+    if each.floor_m is None or not each.over_direction.count.sum():
         return verdict("open", "This recording cannot judge the model.", bullets(each.sentences))
     return verdict("bad", "The model does not hold. Where it fails:", bullets(each.sentences))
 
@@ -117,7 +117,7 @@ def _key_figures(each: Comparison, stroke_m: float) -> Html:
 
 
 def _is_noise(each: Comparison) -> bool:
-    return each.repeatability_m is None or each.repeatability_m <= each.noise_m
+    return each.repeatability_m is None or (each.noise_m is not None and each.repeatability_m <= each.noise_m)
 
 
 def _model(each: Comparison) -> Simulated:
@@ -192,7 +192,7 @@ def _phases(each: Comparison, stroke_m: float) -> Html:
     )
 
 
-def _phase(part: Phase, floor_m: float, stroke_m: float) -> Row:
+def _phase(part: Phase, floor_m: float | None, stroke_m: float) -> Row:
     return Row(
         [
             part.name,
@@ -204,7 +204,7 @@ def _phase(part: Phase, floor_m: float, stroke_m: float) -> Row:
             f"{100 * part.share:.1f} %",
         ],
         MEANINGS[part.name],
-        "over" if part.rms_m > ADEQUATE * floor_m else "",
+        "over" if floor_m is not None and part.rms_m > ADEQUATE * floor_m else "",
     )
 
 

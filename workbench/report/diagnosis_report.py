@@ -59,7 +59,7 @@ class _Validation:
 
     recording: Recording
     held_out: Mask
-    floor_m: float
+    floor_m: float | None
     base: Comparison
     best: Comparison
 
@@ -306,6 +306,10 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
             "record again with slow ramps, steps of several heights and restarts in the same direction after holds"
         )
         advice.append("write the missing effect as a file of your own, where the section above says what is left")
+    if diagnosis.verdict == "unjudged":
+        advice.append(
+            "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
+        )
     if diagnosis.split.train.record.pressure_pa is None and diagnosis.verdict != "adequate":
         advice.append(
             "record the actuator pressure too: it parts what happens before the actuator from what happens at the stem"

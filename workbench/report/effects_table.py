@@ -16,6 +16,7 @@ VERDICTS = {
     "missing": ("good", "The missing effect is found."),
     "one_of": ("open", "It is one of several effects; this recording does not tell which."),
     "unexplained": ("bad", "Something is missing that the library of effects does not have."),
+    "unjudged": ("open", "The noise of this recording is unknown: nobody can say whether anything is missing."),
     "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
 }
 KINDS = {"added": "good", "as good": "set"}

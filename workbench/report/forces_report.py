@@ -9,7 +9,7 @@ from config.recording import Column
 from workbench.compare.residuals import BINS, FEWEST, Profile, profile
 from workbench.data.imposed_motion import Rows
 from workbench.forces.force_balance import ForceFit, balanced_n, carried_n
-from workbench.forces.force_diagnosis import ForceDiagnosis, ForceStep
+from workbench.forces.force_diagnosis import AT_FLOOR, ForceDiagnosis, ForceStep
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MEASURED, MODEL, QUIET, Figure, axis, layout, line, profiles
 from workbench.report.comparison_report import WORDS
@@ -34,7 +34,6 @@ from workbench.report.page import (
 from workbench.report.plot_series import rounded
 from workbench.report.ranking import RankedEffect
 from workbench.report.units import FORCE, Shown, force, parameter, times
-from workbench.select.block_errors import AT_FLOOR
 
 DRAWN = 6_000
 """Rows drawn at most."""

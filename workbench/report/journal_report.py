@@ -97,7 +97,7 @@ def _remark(number: int, step: ExtensionStep) -> str:
     )
 
 
-def _row(name: str, train_m: float, test_m: float, floor_m: float) -> Row:
+def _row(name: str, train_m: float, test_m: float, floor_m: float | None) -> Row:
     return Row([name, length(train_m), length(test_m), times(test_m, floor_m)])
 
 

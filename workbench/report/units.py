@@ -78,9 +78,9 @@ def of_stroke(value_m: float, stroke_m: float) -> str:
     return f"{100 * value_m / stroke_m:.2g} % of stroke" if isfinite(value_m) else ""
 
 
-def times(value: float, unit: float) -> str:
+def times(value: float, unit: float | None) -> str:
     """Say how many times a unit a value is."""
-    return f"{value / unit:.3g} ×" if unit > 0.0 and isfinite(value) else "–"
+    return f"{value / unit:.3g} ×" if unit and isfinite(value) else "–"
 
 
 def parameter(name: str) -> tuple[str, float, str]:

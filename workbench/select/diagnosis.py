@@ -15,6 +15,7 @@ from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import find_effect, shipped_effects
 from workbench.data.held_out import Split, split
+from workbench.data.noise_floor import told_mm
 from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
@@ -54,7 +55,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
             errors = step.before.errors
             title = (
                 f"step {number}: error {1e3 * errors.train_rmse_m:.4f} mm rms fitted, {1e3 * errors.test_rmse_m:.4f} "
-                f"held out, floor {1e3 * self.split.floor_m:.4f}"
+                f"held out, floor {told_mm(self.split.floor_m)}"
             )
             said.append(candidate_table([_tried(each) for each in step.candidates], MILLIMETRES, title))
         if self.experiment:
@@ -127,7 +128,7 @@ def diagnose(
     last = steps[-1]
     best = last.added.model if last.added and last.added.model else last.before
     base, best = search.with_intervals(steps[0].before), search.with_intervals(best)
-    found = verdict(best, steps, parts.motion_std_m)
+    found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
     return Diagnosis(
         steps=steps,
         verdict=found,

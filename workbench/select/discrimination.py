@@ -37,7 +37,7 @@ from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import joined
-from workbench.data.record import Record, ready, require_fittable
+from workbench.data.record import Record, ready, require_few_samples, require_fittable
 from workbench.fit.descent import MIDDLING, descended, settled
 from workbench.fit.fitting import Fit, fit
 from workbench.fit.objective import FINAL, SimulationError
@@ -310,12 +310,13 @@ class Race:
         self._recordings = recordings
         self._first = first or len(recordings)
         self._whole = joined(recordings)
-        require_fittable(self._whole)
+        require_few_samples(self._whole)
         self.record = ready(self._whole)
+        require_fittable(self.record)
         self._seed = seed
         self._workers = workers
         self.fits = dict(fits)
-        self._sigma_m = self.record.noise_m or np.finfo(float).tiny
+        self._sigma_m = self.record.scale_m or np.finfo(float).tiny
         weighed = {name: self._weighed(each) for name, each in fits.items()}
         self._all = weighed
         # The likeliest, by the cost and the number of its parameters.
@@ -360,7 +361,7 @@ class Race:
         """Whether the best does as well in the experiments as in the recordings before, or as the sensor allows."""
         before = sum(map(len, self._recordings[: self._first]))
         error_m = self._error_m(self.fits[self.best])
-        yardstick_m = max(self.record.floor_m, _typical_m(self.record.time_s[:before], error_m[:before]))
+        yardstick_m = max(self.record.floor_or_scale_m, _typical_m(self.record.time_s[:before], error_m[:before]))
         return _typical_m(self.record.time_s[before:], error_m[before:]) <= RARELY_OFF * yardstick_m
 
     def with_recording(self, recording: Recording) -> "Race":
@@ -429,7 +430,7 @@ class Race:
 
     def _weighed(self, found: Fit) -> Weighed:
         error_m = self._error_m(found)
-        negligible_m = NEGLIGIBLE * self.record.floor_m
+        negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
         parts = np.cumsum([0, *map(len, self._recordings)])
         logs = [block_logs(self.record.time_s[a:b], error_m[a:b], negligible_m) for a, b in pairwise(parts.tolist())]
         return Weighed(found, np.concatenate(logs), _independent_share(error_m / self._sigma_m, self.record.period_s))

@@ -64,13 +64,13 @@ def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
     if any(each.name == BACKLASH for each in valve.effect):
         return ()
     widest_m = 2.0 * valve.valve.coulomb_n / valve.valve.spring_n_per_m
-    least_m = LEAST_PLAY * split.floor_m
+    least_m = LEAST_PLAY * split.scale_m
     if not least_m < widest_m:
         return ()
     most_m = 0.0
     for width_m in np.geomspace(least_m, 0.99 * widest_m, WIDTHS).tolist():
         twin = with_backlash(valve, width_m)
-        if any(_apart_m(each, valve, twin) > DETECTABLE * split.floor_m for each in (split.train, split.test)):
+        if any(_apart_m(each, valve, twin) > DETECTABLE * split.scale_m for each in (split.train, split.test)):
             break
         most_m = width_m
     like = ("coulomb_n", "static_n")
@@ -101,7 +101,7 @@ def _apart_m(part: Part, one: ValveFile, other: ValveFile) -> float:
     record = part.record
     begun = np.zeros(len(record), np.bool_)
     for first, end in record.segments:
-        found = slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.noise_m)
+        found = slips(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m)
         if len(found) > TAKEN_UP:
             begun[first + found[TAKEN_UP].first : end] = True
     rows = part.counted & begun

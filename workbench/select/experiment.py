@@ -136,7 +136,7 @@ def _separation(fits: Sequence[Fit], time_s: Command, command_pa: Command, recor
     """Return the least error, in units of the noise, that a rival refitted to another's answer is left with."""
     return min(
         _left(answer, rival)
-        for truth, answer in _answers(fits, time_s, command_pa, record.noise_m, seed)
+        for truth, answer in _answers(fits, time_s, command_pa, record.scale_m, seed)
         for rival in fits
         if rival is not truth
     )

@@ -282,7 +282,7 @@ class Rivalry:
         self._seed = seed
         self._compositions = [Composition.from_file(each.valve) for each in fits]
         self._names = [tuple(each.parameters) for each in fits]
-        self._sigma_m = max(record.floor_m, min(each.rms_m for each in fits))
+        self._sigma_m = max(record.floor_or_scale_m, min(each.rms_m for each in fits))
         self._information = [self._known(i) for i in range(len(fits))]
 
     def score(self, course: Course) -> float:
@@ -319,13 +319,13 @@ class Rivalry:
         position_m = response.indicated_m[settled]
         if position_m.min() < self._bounds.low_m or position_m.max() > self._bounds.high_m:
             return None
-        sensed_m = position_m + self._record.noise_m * generator.standard_normal(position_m.size)
+        sensed_m = position_m + self._record.scale_m * generator.standard_normal(position_m.size)
         columns = {"time_s": time_s[settled], "command_pa": command_pa[settled], "position_m": sensed_m}
-        return replace(ready(Recording(columns)), noise_m=self._record.noise_m)
+        return replace(ready(Recording(columns)), noise_m=self._record.scale_m)
 
     def _noise_pa(self, i: int) -> float:
         theta = self._compositions[i].theta
-        spread_m = np.sqrt(max(0.0, self._sigma_m**2 - self._record.noise_m**2))
+        spread_m = np.sqrt(max(0.0, self._sigma_m**2 - self._record.scale_m**2))
         return float(theta[SPRING] / theta[AREA] * spread_m)
 
     def _error(self, i: int, record: Record) -> SimulationError:

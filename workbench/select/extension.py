@@ -70,11 +70,11 @@ class Extension(Result):
         """Say whether the effects help, the errors on the way, and the parameters of the new valve."""
         before_m, after_m = self.refitted_errors.test_rmse_m, self.extended_errors.test_rmse_m
         falls = "falls from" if self.falls else "does not fall as it must: from"
-        floor = ("floor: what no model undercuts", (self.split.floor_m, self.split.floor_m))
         rows = [
-            (what, f"{1e3 * train_m:.4f}", f"{1e3 * test_m:.4f}")
-            for what, (train_m, test_m) in (*self.stages.items(), floor)
+            (what, f"{1e3 * train_m:.4f}", f"{1e3 * test_m:.4f}") for what, (train_m, test_m) in self.stages.items()
         ]
+        floor = "unknown" if self.split.floor_m is None else f"{1e3 * self.split.floor_m:.4f}"
+        rows.append(("floor: what no model undercuts", floor, floor))
         return [
             f"with {', '.join(self.effects)} the held-out error {falls} {1e3 * before_m:.4g} to {1e3 * after_m:.4g} mm "
             "rms",

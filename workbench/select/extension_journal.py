@@ -23,7 +23,7 @@ class ExtensionStep(Schema):
     refitted_test_rmse_m: float
     extended_train_rmse_m: float
     extended_test_rmse_m: float
-    floor_m: float
+    floor_m: float | None
     parameters: dict[str, float]
     """All that was fitted."""
 

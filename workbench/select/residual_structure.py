@@ -65,7 +65,7 @@ def _regressors(record: Record) -> Matrix:
         rows = slice(first, end)
         position_m = np.where(record.valid, record.position_m, np.nan)[rows]
         time_s = record.time_s[rows]
-        way = directions(position_m, record.noise_m)
+        way = directions(position_m, record.scale_m)
         last = np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))
         velocity = velocity_m_per_s(time_s, position_m)
         change = np.gradient(record.command_pa[rows], time_s)

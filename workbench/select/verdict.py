@@ -5,6 +5,7 @@ missing       these effects, and with them all is explained
 one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
 unexplained   something is missing that the library does not have; what lowered the error so far is still named.
               Or the valve scatters so much that a tenth of the motion is left, which no model could explain
+unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named
 untrusted     the searches disagree, and the best of them explains nothing
 """
 
@@ -13,17 +14,20 @@ from typing import Literal
 
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel
 
-Verdict = Literal["adequate", "missing", "one_of", "unexplained", "untrusted"]
+Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "untrusted"]
 
 
-def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float) -> Verdict:
+def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float, floor_m: float | None) -> Verdict:
     """Return the verdict.
 
     Args:
         best: the last model accepted, or the valve as it is.
         steps: the forward steps made.
         motion_std_m: standard deviation of the position that was fitted, m.
+        floor_m: what no model undercuts; None: unknown.
     """
+    if floor_m is None:
+        return "unjudged"
     if best.explained and not best.errors.follows(motion_std_m):
         return "unexplained"
     added = [step for step in steps if step.added]

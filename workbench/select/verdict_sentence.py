@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from sim.effect import Effect
 from workbench.data.held_out import Split
+from workbench.data.noise_floor import UNKNOWN
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
@@ -31,18 +32,20 @@ def verdict_sentence(
         )
     if verdict == "adequate":
         said = f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
-        return said + _suspicion(steps[0].suspected) + _scatter(parts)
+        return said + knife_edges_sentence(best.errors) + _suspicion(steps[0].suspected) + _scatter(parts)
     if verdict == "missing":
-        return f"Missing: {names}; {fell}, and nothing is left to explain."
+        return f"Missing: {names}; {fell}, and nothing is left to explain.{knife_edges_sentence(best.errors)}"
     if verdict == "one_of":
         rivals = (tuple(each.name for each in step.indistinguishable) for step in steps)
         return f"Missing: {names}, or another that does as well; {fell}." + "".join(
-            rivals_sentence(each, library) for each in rivals
+            [*(rivals_sentence(each, library) for each in rivals), knife_edges_sentence(best.errors)]
         )
-    begun = f" {names} explains a part: {fell}." if names else f" The held-out error is {after:.3g} mm."
+    part = "lowers it" if verdict == "unjudged" else "explains a part"
+    begun = f" {names} {part}: {fell}." if names else f" The held-out error is {after:.3g} mm."
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
-    return f"Not to be trusted: searches from independent starts do not come to the same.{begun}"
+    untrusted = "Not to be trusted: searches from independent starts do not come to the same."
+    return (f"Not judged: {UNKNOWN}." if verdict == "unjudged" else untrusted) + begun
 
 
 def reduction_sentence(before: BlockErrors, after: BlockErrors) -> str:
@@ -54,6 +57,14 @@ def reduction_sentence(before: BlockErrors, after: BlockErrors) -> str:
     return (
         f"the held-out error of a typical second falls {typical}, though a narrowly mistimed slip moves the rms {whole}"
     )
+
+
+def knife_edges_sentence(errors: BlockErrors) -> str:
+    """Name the held-out slips that were excepted, with a leading space; empty if none was."""
+    if not errors.knife_edges:
+        return ""
+    named = "; ".join(each.sentence for each in errors.knife_edges)
+    return f" Excepted on what was held out: {named}; without, {1e3 * errors.test_rest_rmse_m:.3g} mm rms."
 
 
 def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
@@ -82,8 +93,9 @@ def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
 
 def _scatter(parts: Split) -> str:
     """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it."""
-    noise_m = max(each.record.noise_m for each in (parts.train, parts.test))
-    if parts.floor_m < SCATTERS * noise_m:
+    known = [each.record.noise_m for each in (parts.train, parts.test) if each.record.noise_m is not None]
+    noise_m = max(known, default=None)
+    if noise_m is None or parts.floor_m is None or parts.floor_m < SCATTERS * noise_m:
         return ""
     return (
         f" The valve itself scatters: a repeated command repeats the position to {1e3 * parts.floor_m:.3g} mm, where "

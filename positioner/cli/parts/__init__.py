@@ -7,6 +7,7 @@ A command imports from here what it needs when it runs.
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
+    noise_argument                              `--noise-m`
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out
     output_files                                what `--out` and `--json` ask for

@@ -18,6 +18,9 @@ def run_forces(arguments: argparse.Namespace) -> int:
 
     if arguments.effects is not None:
         raise InputError("--effects", "goes with recordings that hold a command; here the position is imposed")
+    for name in ("from_s", "to_s", "noise_m"):
+        if getattr(arguments, name) is not None:
+            raise InputError(f"--{name.replace('_', '-')}", "goes with recordings that hold a command")
     if arguments.report is not None:
         require_plotly(arguments.report)
     began_s = time.monotonic()

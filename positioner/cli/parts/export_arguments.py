@@ -14,7 +14,9 @@ BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet")
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare them."""
+    """Declare them, and which stretch of a recording is taken."""
+    parser.add_argument("--from-s", type=float, metavar="S", help="leave out what was before, s as in time_s")
+    parser.add_argument("--to-s", type=float, metavar="S", help="leave out what was after")
     export = parser.add_argument_group(
         "exports in place of recordings", "CSV, .xlsx, .mat, Parquet; `positioner import FILE` proposes these words"
     )
@@ -49,6 +51,8 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 def export_words(arguments: argparse.Namespace) -> list[str]:
     """Return the words of these arguments as they were given, for a command that reads the same files."""
     words: list[str] = []
+    for flag, end_s in (("--from-s", arguments.from_s), ("--to-s", arguments.to_s)):
+        words += [] if end_s is None else [flag, f"{end_s!r}"]
     for name in ("column", *BESIDES):
         given = getattr(arguments, name)
         flag = f"--{name.replace('_', '-')}"
@@ -67,7 +71,8 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     What was left out or put right, and what is odd about an export, is told on standard error, a line each.
 
     Raises:
-        InputError: as `Recording.read` and `read_export`; an option that goes with columns without any.
+        InputError: as `Recording.read` and `read_export`; an option that goes with columns without any; a stretch
+            without samples.
     """
     from config.errors import InputError
     from config.recording import Recording
@@ -75,11 +80,31 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     if arguments.column:
         recording = read_mapped(path, arguments, stroke_m)
         tell(f"positioner {arguments.command}: {path}", recording, arguments.stroke_m or stroke_m)
-        return recording
+        return _stretch(recording, arguments)
     for name in BESIDES:
         if getattr(arguments, name):
             raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
-    return Recording.read(path)
+    return _stretch(Recording.read(path), arguments)
+
+
+def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recording":
+    """Return the stretch of a recording that is asked for, its clock as it was."""
+    from dataclasses import replace
+
+    from config.errors import InputError
+
+    if arguments.from_s is None and arguments.to_s is None:
+        return recording
+    from_s = -float("inf") if arguments.from_s is None else arguments.from_s
+    to_s = float("inf") if arguments.to_s is None else arguments.to_s
+    kept = (recording.time_s >= from_s) & (recording.time_s <= to_s)
+    if not kept.any():
+        raise InputError(
+            "--from-s, --to-s",
+            f"no sample lies between {from_s:g} and {to_s:g} s; time_s goes from {recording.time_s.min():g} to "
+            f"{recording.time_s.max():g}",
+        )
+    return replace(recording, columns={name: column[kept] for name, column in recording.columns.items()})
 
 
 def read_mapped(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":

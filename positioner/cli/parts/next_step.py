@@ -36,7 +36,8 @@ def _extend(effects: Sequence[str], arguments: argparse.Namespace) -> str:
     fitted = [str(each) for each in arguments.recordings]
     held_out = ["--test", str(arguments.test)] if arguments.test else []
     words = ["positioner", "extend", arguments.valve, "--effect", *effects, "--fit", *fitted, *held_out]
-    return shlex.join([*words, *export_words(arguments), "-o", OUT])
+    noise = [] if arguments.noise_m is None else ["--noise-m", f"{arguments.noise_m:g}"]
+    return shlex.join([*words, *noise, *export_words(arguments), "-o", OUT])
 
 
 def not_written(path: Path, diagnosis: "Diagnosis") -> str:
@@ -45,6 +46,7 @@ def not_written(path: Path, diagnosis: "Diagnosis") -> str:
         "adequate": "nothing is missing",
         "one_of": "several effects do as well; choose by one of the commands",
         "unexplained": "what was found does not explain the recordings",
+        "unjudged": "the noise is unknown, and with it whether anything is missing",
         "untrusted": "what was found is not to be trusted",
     }
     return f"{path}: not written: {why[diagnosis.verdict]}"

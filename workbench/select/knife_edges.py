@@ -1,0 +1,137 @@
+"""Slips on held-out data that a model mistimes narrowly: knife edges, each by its time.
+
+Static and sliding friction are only known to an interval. A held-out slip that comes or stays away within it leaves an
+error up to the next slip, whatever the model, and with it an rms that says nothing. So each stretch of a large error is
+asked whether the same model with F_s or F_c changed by at most `MOST_CHANGE` would not make it:
+
+    |r| > 5 floors, gaps of less than 0.2 s closed                        a stretch
+    rms over it, changed, <= max(1.75 floors, a fifth of what it was)     a knife edge
+
+An error that no such change takes away is no knife edge. Nor are many: more than a tenth of the slips are the model's,
+unless one change puts all of them right.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.recording import Column
+from config.results.result import Brief
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from workbench.data.held_out import Part, residual_m
+from workbench.data.motion import slips
+from workbench.model.free_run import FreeRun
+
+LARGE = 5.0
+"""Floors from which an error is large."""
+AT_MOST, FELL = 1.75, 0.2
+"""Floors that may be left; or of the error that there was."""
+CLOSED_S = 0.2
+CHANGES, MOST_CHANGE = (0.001, 0.0025, 0.005, 0.01), 0.02
+MOST_SHARE = 0.1
+"""Of the slips held out; one may always be."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class KnifeEdge(Brief):
+    """A stretch of held-out error that a small change of friction takes away."""
+
+    from_s: float
+    to_s: float
+    """On the recording's clock."""
+    parameter: str
+    change: float
+    """By what part the parameter is changed."""
+
+    @property
+    def sentence(self) -> str:
+        """Say so."""
+        name = {"static_n": "static", "coulomb_n": "sliding"}[self.parameter]
+        return (
+            f"a slip is narrowly mistimed from {self.from_s:.6g} to {self.to_s:.6g} s: {name} friction "
+            f"{100 * abs(self.change):.2g} % {'higher' if self.change > 0 else 'lower'} puts it right"
+        )
+
+
+def knife_edges(
+    valve: ValveFile, part: Part, error_m: Column, floor_m: float, *, from_pressure: bool
+) -> tuple[KnifeEdge, ...]:
+    """Return the stretches of a held-out error that are knife edges, in order; none if they are too many.
+
+    Args:
+        valve: as fitted.
+        part: what was held out.
+        error_m: the fit's error on it, simulated less measured, m, (n,), NaN where a sample does not count.
+        floor_m: what no model undercuts.
+        from_pressure: whether the fit runs from the measured pressure.
+    """
+    stretches = list(_stretches(part, error_m, LARGE * floor_m))
+    allowed = max(1, int(MOST_SHARE * _slips(part)))
+    found: dict[tuple[int, int], KnifeEdge] = {}
+    time_s = part.record.time_s
+    for name, change in _changes():
+        if len(found) == len(stretches):
+            break
+        changed = _changed(valve, name, change)
+        if changed is None:
+            continue
+        composition = Composition.from_file(changed)
+        run = FreeRun(composition, part.record, from_pressure=from_pressure)
+        other_m = residual_m(part, run.position_m(composition.theta))
+        right = {
+            (first, end): KnifeEdge(float(time_s[first]), float(time_s[end - 1]), name, change)
+            for first, end in stretches
+            if _rms(other_m[first:end]) <= max(AT_MOST * floor_m, FELL * _rms(error_m[first:end]))
+        }
+        if len(right) == len(stretches):
+            return tuple(right.values())
+        found = right | found
+    return tuple(found[each] for each in sorted(found)) if len(found) <= allowed else ()
+
+
+def rms_without(time_s: Column, error_m: Column, edges: tuple[KnifeEdge, ...]) -> float:
+    """Return the rms, m, of an error, (n,), NaN where it does not count, without the stretches of knife edges."""
+    kept = np.isfinite(error_m)
+    for each in edges:
+        kept &= (time_s < each.from_s) | (time_s > each.to_s)
+    return _rms(error_m[kept])
+
+
+def _changes() -> Iterator[tuple[str, float]]:
+    """Yield what is changed and by what part, the smallest changes first."""
+    for size in (*CHANGES, MOST_CHANGE):
+        for name in ("static_n", "coulomb_n"):
+            yield from ((name, size), (name, -size))
+
+
+def _changed(valve: ValveFile, name: str, change: float) -> ValveFile | None:
+    """Return a valve with a parameter changed; None where static friction would be less than sliding friction."""
+    base = valve.valve
+    changed = base.model_copy(update={name: (1.0 + change) * getattr(base, name)})
+    return None if changed.static_n < changed.coulomb_n else valve.model_copy(update={"valve": changed})
+
+
+def _stretches(part: Part, error_m: Column, large_m: float) -> Iterator[tuple[int, int]]:
+    """Yield the rows, half open, over which an error is large."""
+    time_s = part.record.time_s
+    rows = np.flatnonzero(np.abs(np.nan_to_num(error_m)) > large_m)
+    if not rows.size:
+        return
+    within_s = max(CLOSED_S, 2.5 * part.record.period_s)
+    breaks = np.flatnonzero(np.abs(np.diff(time_s[rows])) > within_s)
+    for first, last in zip([0, *(breaks + 1).tolist()], [*breaks.tolist(), rows.size - 1], strict=True):
+        yield int(rows[first]), int(rows[last]) + 1
+
+
+def _slips(part: Part) -> int:
+    """Return how many slips were held out."""
+    record = part.record
+    counted = np.where(part.counted, record.position_m, np.nan)
+    return sum(len(slips(counted[first:end], record.scale_m)) for first, end in record.segments)
+
+
+def _rms(values: Column) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
