@@ -14,6 +14,7 @@ from positioner.cli.parts.next_step import extend_commands, not_written
 
 EXPORT = ["--column", "position_m=PV 1:%", "--column", "command_pa=OUT:bar", "--range-pa", "20000", "100000"]
 MORE = ["--stroke-m", "0.04", "--decimal", ",", "--status", "Quality=Good", "--sheet", "Sheet 2"]
+MORE += ["--from-s", "-3.5", "--to-s", "1234567.25", "--noise-m", "5e-05"]
 
 
 def diagnosed(verdict: str, *steps: tuple[str, ...]) -> Any:
@@ -48,7 +49,8 @@ def test_one_missing_effect_is_one_command() -> None:
     read = read_by_extend(command)
     assert (read.valve, read.effect, read.fit) == ("v.toml", ["backlash"], [Path("my rec.csv"), Path("b.csv")])
     assert read.test == Path("t.csv")
-    for name in ("column", "stroke_m", "range_pa", "decimal", "time_format", "status", "sheet"):
+    exported = ("column", "stroke_m", "range_pa", "decimal", "time_format", "status", "sheet")
+    for name in (*exported, "from_s", "to_s", "noise_m"):
         assert getattr(read, name) == getattr(arguments, name)
 
 

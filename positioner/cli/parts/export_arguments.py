@@ -51,17 +51,12 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 def export_words(arguments: argparse.Namespace) -> list[str]:
     """Return the words of these arguments as they were given, for a command that reads the same files."""
     words: list[str] = []
-    for flag, end_s in (("--from-s", arguments.from_s), ("--to-s", arguments.to_s)):
-        words += [] if end_s is None else [flag, f"{end_s!r}"]
-    for name in ("column", *BESIDES):
-        given = getattr(arguments, name)
-        flag = f"--{name.replace('_', '-')}"
+    for name in ("from_s", "to_s", "column", *BESIDES):
+        given, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"
         if name in ("column", "status"):
             words += [word for each in given for word in (flag, each)]
-        elif name == "range_pa" and given:
-            words += [flag, *(f"{each:g}" for each in given)]
         elif given is not None:
-            words += [flag, f"{given:g}" if name == "stroke_m" else given]
+            words += [flag, *map(str, given if isinstance(given, list) else [given])]
     return words
 
 

@@ -36,7 +36,7 @@ def _extend(effects: Sequence[str], arguments: argparse.Namespace) -> str:
     fitted = [str(each) for each in arguments.recordings]
     held_out = ["--test", str(arguments.test)] if arguments.test else []
     words = ["positioner", "extend", arguments.valve, "--effect", *effects, "--fit", *fitted, *held_out]
-    noise = [] if arguments.noise_m is None else ["--noise-m", f"{arguments.noise_m:g}"]
+    noise = [] if arguments.noise_m is None else ["--noise-m", str(arguments.noise_m)]
     return shlex.join([*words, *noise, *export_words(arguments), "-o", OUT])
 
 
