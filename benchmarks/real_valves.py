@@ -21,7 +21,7 @@ each with the friction of its direction and the spring at r; a packing of stiffn
 loose, play w is taken up. Whoever goes on in the direction of the last slide before turning round needs less: a ratio
 may be below 1. The first `LEARNING` steps are counted apart. Some 10 s a valve. With `--left-alone-s 3600` each is then
 left for an hour at its last reference, and changes of the command after the first minute are counted: there are none
-without a limit cycle.
+without a limit cycle. `--steps 0` only identifies, in a few seconds a valve.
 """
 
 import argparse
@@ -319,7 +319,7 @@ def outcome(seed: int, steps: int, left_alone_s: float = 0.0) -> tuple[Drawn, Ou
         tuple(errors),
         tuple(excursions),
         loop.decision.inhibit_reason.name,
-        loop.left_alone(left_alone_s),
+        loop.left_alone(left_alone_s) if left_alone_s else 0,
     )
 
 
@@ -336,9 +336,12 @@ def line(seed: int, each: Drawn, found: Outcome) -> str:
     head = f"{seed:4d} {1e3 * each.period_s:6.0f} {each.lag_s:6.2f}  {names:34s} {found.took_s:5.0f}"
     if found.reason != "accepted":
         return f"{head}  refused: {found.reason} {found.why}"
+    head = f"{head} {found.worst:16.2f} {100 * found.residual:11.3f}"
+    if not found.landed:
+        return head
     rms = 100 * np.sqrt(np.mean(np.square(found.errors)))
     return (
-        f"{head} {found.worst:16.2f} {100 * found.residual:11.3f} {np.mean(found.landed):7.2f} {rms:6.3f}"
+        f"{head} {np.mean(found.landed):7.2f} {rms:6.3f}"
         f" {np.quantile(found.excursions, 0.9):10.2f} {found.changes:8d} {found.why}"
     )
 

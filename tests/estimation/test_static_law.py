@@ -161,3 +161,17 @@ def test_one_landing_that_lies_apart_does_not_bend_the_law() -> None:
     for share, s in ((0.3, 1), (0.75, -1)):
         off_pa = landing_pa(share * STROKE_M, s, law.ratios, apart, STROKE_M) - bent_pa(share, s)
         assert abs(off_pa) < 2e-3 * SLOPE * STROKE_M
+
+
+def test_the_residual_says_how_far_a_bent_valve_lands_off_where_there_were_no_landings() -> None:
+    """Friction that grows over the travel, and landings of each direction in one part of it only."""
+
+    def true_pa(share: float, s: int) -> float:
+        return SLOPE * STROKE_M * share + s * 8e3 * (1 + 0.3 * share)
+
+    ups = [landing(each * STROKE_M, 1, true_pa(each, 1)) for each in np.linspace(0.1, 0.9, 20)]
+    downs = [landing(each * STROKE_M, -1, true_pa(each, -1)) for each in np.linspace(0.5, 0.85, 8)]
+    law = static_law([*ups, *downs], STROKE_M)
+    off_m = (law.ratios.balance_pa(0.35 * STROKE_M, -1) - true_pa(0.35, -1)) / SLOPE
+    assert abs(off_m) > 5e-3 * STROKE_M
+    assert abs(off_m) < 3 * law.residual_m

@@ -71,6 +71,14 @@ def landing_pa(
     return bent_pa(position_m, direction) + missed
 
 
+def bent_by_pa(
+    position_m: float, direction: int, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float
+) -> float:
+    """Return by how much the landings are bent away from the straight law at a position, Pa; as of `landing_pa`."""
+    bend, _ = _bend(ratios, tuple(landings), stroke_m)
+    return _bent_by_pa(bend, position_m / stroke_m, direction)
+
+
 def scatter_m(ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float) -> float:
     """Return how far slides land off the bent law, a standard deviation, m; arguments as of `landing_pa`."""
     return _bend(ratios, tuple(landings), stroke_m)[1] / -ratios.b_over_c
