@@ -156,9 +156,8 @@ class Disturbed(Late):
     def tick(self, command_pa: float) -> None:
         drift_pa = self.amplitude_pa * np.sin(2 * np.pi * 1e-6 * self.device_time_us / DRIFTS_S)
         self._device.check(command_pa)
-        self._device.tick(max(0.0, self._command_pa + drift_pa))
-        self._command_pa = command_pa
-        self._note()
+        self._device.tick(max(0.0, self.command_pa + drift_pa))
+        self.command_pa = command_pa
 
 
 class Loop:
