@@ -293,3 +293,51 @@ def test_excursions_become_as_short_as_they_can_be(period_s: float) -> None:
         beyond.append(max(min(before, at) - path.min(), path.max() - max(before, at)))
     assert max(beyond[-4:]) < 1.15 * LEAST
     assert max(beyond) < 1.5 * LEAST
+
+
+def within(position_m: float, now_s: float, rest: bool, memory: SlideMemory, interval_s: float = 0.0) -> SlideMemory:
+    """Return one step of the law, the stem at a position, m, 0.06 m wanted."""
+    at_rest = Rest(position_m, 1e-6, 1e-6, 100, 0.1) if rest else None
+    observation = StemObservation(now_s, position_m, True, at_rest, 0.0, None)
+    settings = replace(SETTINGS, excursion_interval_s=interval_s)
+    return step(memory, observation, 0.06, BALANCE, settings)
+
+
+BALANCE = Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M)
+KNOWN = Margins(*(4 * [Margin(0.0055, 0.0056)]))
+
+
+@pytest.mark.parametrize(
+    ("position_m", "lands_m"),
+    [(0.0605, 0.06), (0.062, 0.06), (0.0645, 0.06 - (1.02 * 0.0056 - 0.0045)), (0.066, 0.06)],
+    ids=["hardly away", "it stays", "it goes to the other side", "it comes back"],
+)
+def test_what_is_held_if_an_excursion_is_interrupted_brings_the_stem_as_near_as_it_can(
+    position_m: float, lands_m: float
+) -> None:
+    memory = SlideMemory(
+        target_m=0.06,
+        direction=1,
+        excursion=True,
+        aim_m=0.067,
+        last_m=position_m,
+        anchor=Anchor(0.0599, 1),
+        margins=KNOWN,
+    )
+    after = within(position_m, 1.0, False, memory)
+    if after.excursion:
+        assert after.held_pa(0.0) == pytest.approx(BALANCE.pressure_pa(lands_m, -1))
+    else:
+        assert after.level_pa == pytest.approx(BALANCE.pressure_pa(lands_m, -1)), (
+            "far enough: the second slide is given"
+        )
+
+
+@pytest.mark.parametrize(("slides", "waits"), [(0, True), (2, False)])
+def test_a_stem_that_an_excursion_left_away_does_not_wait_there(slides: int, waits: bool) -> None:
+    memory = SlideMemory(
+        target_m=0.06, direction=-1, slides=slides, excursion_s=9.0, anchor=Anchor(0.065, 1), margins=KNOWN, slide_s=9.5
+    )
+    after = within(0.065, 10.0, True, memory, interval_s=20.0)
+    assert (after.inhibit_reason is InhibitReason.EXCURSION_WAITS) is waits
+    assert (after.level_pa == memory.level_pa) is waits
