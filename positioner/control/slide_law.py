@@ -54,6 +54,8 @@ KNOWN = 1e-3
 """Of the stroke: how well an extended valve is known."""
 FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
+ROUNDED = 0.5
+"""Quanta by which a position may be rounded."""
 SLOW = 2e-3
 """Of the stroke between two samples: an excursion that creeps no faster has done its work."""
 FAR = 2.0
@@ -140,7 +142,7 @@ def step(
     if memory.margins is NO_MARGINS:
         memory = _first_margins(memory, balance, settings)
     if observation.outcome is not None:
-        memory = _learnt(memory, observation.outcome, balance, settings)
+        memory = _learnt(memory, observation.outcome, observation.quantum_m, balance, settings)
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
         memory = replace(memory, anchor=Anchor(observation.position_m, memory.direction))
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
@@ -186,7 +188,9 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
     return replace(memory, margins=margins)
 
 
-def _learnt(memory: SlideMemory, outcome: SlideOutcome, balance: Balance, settings: SlideSettings) -> SlideMemory:
+def _learnt(
+    memory: SlideMemory, outcome: SlideOutcome, quantum_m: float, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
     """Return the memory after a slide: its margin, and where the stem stands. A slide onto a stop says nothing.
 
     A stem that breaks loose lands where it is to. One that does not, though others have landed there, did not: the
@@ -201,7 +205,8 @@ def _learnt(memory: SlideMemory, outcome: SlideOutcome, balance: Balance, settin
     way_m = s * (memory.aim_m - anchor.position_m) if ours else balance.way_m(outcome)
     missed_m = abs(memory.aim_m - to_m) if ours else 0.0
     slid = outcome.moved and missed_m <= GAVE_WAY * way_m
-    hit = slid and missed_m <= max(MISSED * way_m, SURELY * balance.scatter_m, settings.dead_band_m, outcome.std_m)
+    unsure_m = max(SURELY * balance.scatter_m, settings.dead_band_m, outcome.std_m, quantum_m)
+    hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
     margin = memory.margins.own(s, turning=turning)
     if hit and anchor.direction:
         margin = margin.after_breaking(s * (to_m - anchor.position_m))
@@ -259,7 +264,7 @@ def _next_slide(
     memory = replace(memory, anchor=anchor)
     if s * (target_m - anchor.position_m) >= _way_m(memory, memory.margin(s), settings):
         return _slide(memory, observation.now_s, target_m, s, balance, settings, excursion=False)
-    return _excursion(memory, observation.now_s, balance, settings)
+    return _excursion(memory, observation, balance, settings)
 
 
 def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:
@@ -267,14 +272,19 @@ def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> floa
     return max(margin.sure_m if memory.slides >= TRIED else margin.way_m, LEAST * settings.stroke_m)
 
 
-def _excursion(memory: SlideMemory, now_s: float, balance: Balance, settings: SlideSettings) -> SlideMemory:
+def _excursion(
+    memory: SlideMemory, observation: StemObservation, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
     """Give the first of two slides, by whichever side it may."""
     target_m = memory.target_m
     assert target_m is not None
     error_m = target_m - memory.anchor.position_m
     s = 1 if error_m > 0 else -1
+    now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m
     there = {each: _way_m(memory, memory.margin(each), settings) for each in (1, -1)}
-    back = {each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) for each in (1, -1)}
+    back = {
+        each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) + rounded_m for each in (1, -1)
+    }
     ways = (
         (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
         (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
