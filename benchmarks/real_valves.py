@@ -1,6 +1,6 @@
 """Random valves as plants have them, under the law of slides: is anything wrong accepted, do small steps land?
 
-    python -m benchmarks.real_valves [--valves 50] [--steps 40] [--seed 0] [--left-alone-s 0]
+    python -m benchmarks.real_valves [--valves 50] [--steps 40] [--seed 0] [--left-alone-s 0 [--disturbance 0]]
 
 Each valve is drawn anew: stroke 20 to 100 mm, bench range 60 to 100 kPa, friction 2 to 12 % of it, F_s/F_c 1.05 to 1.4,
 stops at both ends; of preload (to 40 % of the bench range), packing asymmetry (to 30 %), presliding, I/P lag (to
@@ -21,7 +21,8 @@ each with the friction of its direction and the spring at r; a packing of stiffn
 loose, play w is taken up. Whoever goes on in the direction of the last slide before turning round needs less: a ratio
 may be below 1. The first `LEARNING` steps are counted apart. Some 10 s a valve. With `--left-alone-s 3600` each is then
 left for an hour at its last reference, and changes of the command after the first minute are counted: there are none
-without a limit cycle.
+without a limit cycle. With `--disturbance 0.01` the I/P meanwhile drifts to and fro by 1 % of the bench range, once in
+`DRIFTS_S`: what moves the stem has to be answered, what does not, not. `--steps 0` only identifies, in seconds a valve.
 """
 
 import argparse
@@ -55,7 +56,8 @@ WITHIN = 1e-3
 """Of the stroke."""
 EXCURSION, AN_EXCURSION = 1.15, 0.2
 """Of the least: what is aimed at; less than this is none."""
-SETTLED_S = 60.0
+SETTLED_S, DRIFTS_S = 60.0, 600.0
+"""Of being left alone, what does not count; period of a disturbance."""
 LEARNING = 10
 """Steps in which the shortest slides are learnt."""
 PROBES = (0.35, 0.5, 0.65)
@@ -74,6 +76,7 @@ class Drawn:
     noise_m: float
     loss: float
     maximum_pa: float
+    bench_pa: float
     lag_s: float
     present: frozenset[str]
     """The effects that are not switched off."""
@@ -125,6 +128,7 @@ def drawn(rng: np.random.Generator) -> Drawn:
         noise_m=quantum_m * rng.uniform(0.0, 0.5),
         loss=rng.uniform(0.0, 0.01),
         maximum_pa=2.5 * bench_pa,
+        bench_pa=bench_pa,
         present=frozenset(present),
         lag_s=float(str(effects[3]["time_constant_s"])),
     )
@@ -142,6 +146,18 @@ class Losing(MemoryDriver):
         if self._rng.random() < self._loss:
             raise NoReply("lost")
         return reading
+
+
+class Disturbed(Late):
+    """A late device whose I/P drifts to and fro by an amplitude, Pa, once it is told to."""
+
+    amplitude_pa = 0.0
+
+    def tick(self, command_pa: float) -> None:
+        drift_pa = self.amplitude_pa * np.sin(2 * np.pi * 1e-6 * self.device_time_us / DRIFTS_S)
+        self._device.check(command_pa)
+        self._device.tick(max(0.0, self.command_pa + drift_pa))
+        self.command_pa = command_pa
 
 
 class Loop:
@@ -167,7 +183,8 @@ class Loop:
         self.valve.rest_at(0.0, 0.0)
         device = Device(self.valve, SlaveFile.model_validate(slave), {})
         pace = DevicePace()
-        link = Link(Losing(Late(device), each.loss, rng), pace)
+        self.device = Disturbed(device)
+        link = Link(Losing(self.device, each.loss, rng), pace)
         held_pa, _ = link.open()
         controller = Controller(Settings.of(DaemonFile.model_validate(daemon)), held_pa)
         self.cycle = Cycle(link, controller, pace, Requests(mode=Mode.AUTOMATIC, mode_writes=1), recorder=None)
@@ -212,8 +229,9 @@ class Loop:
                 last_pa, since_s = self.decision.command_pa, self.time_s
         return farthest_m
 
-    def left_alone(self, duration_s: float) -> int:
-        """Return how often the command changes from now on, but for the first while."""
+    def left_alone(self, duration_s: float, disturbance: float) -> int:
+        """Return how often the command changes from now on, but for the first while, under a disturbance."""
+        self.device.amplitude_pa = disturbance * self._each.bench_pa
         changes, until_s = 0, self.time_s + duration_s
         settled_s = min(self.time_s + SETTLED_S, until_s)
         while self.time_s < until_s:
@@ -279,7 +297,7 @@ def least_excursion_m(each: Drawn, from_m: float, to_m: float) -> float:
     return max(shortest_slide_m(each, to_m, -s), shortest_slide_m(each, to_m, s) - abs(to_m - from_m))
 
 
-def outcome(seed: int, steps: int, left_alone_s: float = 0.0) -> tuple[Drawn, Outcome]:
+def outcome(seed: int, steps: int, left_alone_s: float = 0.0, disturbance: float = 0.0) -> tuple[Drawn, Outcome]:
     """Return a drawn valve and what became of it."""
     rng = np.random.default_rng(seed)
     each = drawn(rng)
@@ -319,7 +337,7 @@ def outcome(seed: int, steps: int, left_alone_s: float = 0.0) -> tuple[Drawn, Ou
         tuple(errors),
         tuple(excursions),
         loop.decision.inhibit_reason.name,
-        loop.left_alone(left_alone_s),
+        loop.left_alone(left_alone_s, disturbance) if left_alone_s else 0,
     )
 
 
@@ -336,9 +354,12 @@ def line(seed: int, each: Drawn, found: Outcome) -> str:
     head = f"{seed:4d} {1e3 * each.period_s:6.0f} {each.lag_s:6.2f}  {names:34s} {found.took_s:5.0f}"
     if found.reason != "accepted":
         return f"{head}  refused: {found.reason} {found.why}"
+    head = f"{head} {found.worst:16.2f} {100 * found.residual:11.3f}"
+    if not found.landed:
+        return head
     rms = 100 * np.sqrt(np.mean(np.square(found.errors)))
     return (
-        f"{head} {found.worst:16.2f} {100 * found.residual:11.3f} {np.mean(found.landed):7.2f} {rms:6.3f}"
+        f"{head} {np.mean(found.landed):7.2f} {rms:6.3f}"
         f" {np.quantile(found.excursions, 0.9):10.2f} {found.changes:8d} {found.why}"
     )
 
@@ -387,11 +408,12 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0, help="of the first valve")
     parser.add_argument("--left-alone-s", type=float, default=0.0)
+    parser.add_argument("--disturbance", type=float, default=0.0, help="of an I/P that drifts, over the bench range")
     arguments = parser.parse_args()
     print(HEAD)
     results = []
     for seed in range(arguments.seed, arguments.seed + arguments.valves):
-        results.append(outcome(seed, arguments.steps, arguments.left_alone_s))
+        results.append(outcome(seed, arguments.steps, arguments.left_alone_s, arguments.disturbance))
         print(line(seed, *results[-1]), flush=True)
     print("", *together(results), sep="\n")
 

@@ -8,7 +8,8 @@ real time.
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
     balance_law                                 the seed's law: the pressure that balances spring and friction
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
-    slide_law, slide_memory                     the law of slides: nothing, one or two, and how far a slide is sent
+    slide_law, slide_memory                     the law of slides: nothing, one or two
+    slide_margins                               how far a slide must be sent to break the stem loose, as learnt
     slide_inverse                               what the law of slides takes from an extended valve
     pressure_path                               lead against a slow pressure of an extended valve, and its arrival
     conventional_law                            PI on position, to compare the others with

@@ -10,7 +10,8 @@ from dataclasses import replace
 from math import isnan
 
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_memory import Margin, SlideMemory, StemObservation
+from positioner.control.slide_margins import Margin
+from positioner.control.slide_memory import SlideMemory, StemObservation
 
 SURE = 1.02
 """Factor on a margin that is known: a slide of just that length may hold."""
@@ -33,12 +34,15 @@ def with_margins_at(memory: SlideMemory, reference_m: float, valve: ExtendedValv
     """Return the memory with the margins of the valve at a reference; what slides have taught of them stays."""
     if memory.margins_at_m == reference_m:
         return memory
+    margins = memory.margins
     for s in (1, -1):
-        factor = 1.0
-        if not isnan(memory.margins_at_m):
-            factor = memory.margin(s).way_m / _margin_m(memory.margins_at_m, s, valve)
-        memory = memory.with_margin(s, Margin(factor * _margin_m(reference_m, s, valve), broke=True, held=True))
-    return replace(memory, margins_at_m=reference_m)
+        for turning in (False, True):
+            margin = Margin(_margin_m(reference_m, s, valve) / SURE, _margin_m(reference_m, s, valve))
+            if not isnan(memory.margins_at_m):
+                before_m = _margin_m(memory.margins_at_m, s, valve)
+                margin = margins.own(s, turning=turning).times(margin.broke_m / before_m)
+            margins = margins.replaced(s, margin, turning=turning)
+    return replace(memory, margins=margins, margins_at_m=reference_m)
 
 
 def _margin_m(stem_m: float, direction: int, valve: ExtendedValve) -> float:

@@ -2,7 +2,7 @@
 
     B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
                                         of an extended valve, [law] valve:        extended_balance.py)
-    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_memory.py; of an
+    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_margins.py; of an
                                                                 extended valve:   slide_inverse.py)
 
 With the stem at rest at x, e = r - x and s = sign(e):
@@ -10,11 +10,11 @@ With the stem at rest at x, e = r - x and s = sign(e):
     abs(e) <= dead band              nothing
     abs(e) >= m_s                    one slide:   u = B(r, s)
     else                             two slides:  u = B(r + s M, s), wait until it rests, u = B(r, -s)
-                                                  M = max(1.05 m_-s, m_s - abs(e))
+                                                  M = max(1.02 m_-s, m_s - abs(e))
 
 The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
 farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round, by r - s M with
-M = max(1.05 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. Only resting times
+M = max(1.02 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. Only resting times
 depend on the period of the loop, not where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest.
@@ -25,26 +25,37 @@ reference changes, or something else has visibly moved the stem.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isnan
+from math import isnan, nan
 
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_memory import DAY_S, Margin, SlideMemory, SlideSettings, StemObservation
+from positioner.control.slide_margins import NO_MARGINS, Margin
+from positioner.control.slide_memory import DAY_S, NOWHERE, Anchor, SlideMemory, SlideSettings, StemObservation
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import landing_pa
+from positioner.estimation.landings.local_balance import landing_pa, scatter_m
 
-RETURN = 1.05
+RETURN = 1.02
 """Margins that the second slide is given, for a stem must not stay where the first took it."""
-NEARLY = 0.6
-"""Of the shortest slide: a way that held the stem and is longer says that no much shorter one breaks loose."""
 UNLIKE = 2.0
 """Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
-MISSED = 0.1
-"""Of its way: a slide that misses its aim by more."""
+MISSED, SURELY, GAVE_WAY = 0.05, 2.0, 0.5
+"""Of its way, and of the deviation of landings: by which a slide may miss its aim; of its way: beyond it was none."""
+PRECISELY = 3.0
+"""Of its own deviation, which is large where it crept to rest: a slide that misses by less may have slid."""
+NEAR = 0.02
+"""Of the stroke: so far from a landing the balance is known."""
+LEAST = 5.1e-3
+"""Of the stroke: a slide shorter than this would not be seen for one."""
+TRIED = 2
+"""Slides of a move that may be as short as may break loose."""
+KNOWN = 1e-3
+"""Of the stroke: how well an extended valve is known."""
 FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
+ROUNDED = 0.5
+"""Quanta by which a position may be rounded."""
 SLOW = 2e-3
 """Of the stroke between two samples: an excursion that creeps no faster has done its work."""
 FAR = 2.0
@@ -87,6 +98,21 @@ class Balance:
             return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
         return s * (each.command_pa - from_pa) / -self.ratios.b_over_c
 
+    def known_at(self, position_m: float, outcome: SlideOutcome) -> bool:
+        """Whether slides had landed near a position, m, before an outcome, as it did."""
+        near_m = NEAR * self.stroke_m
+        return any(
+            each.direction == outcome.direction
+            and each.time_s < outcome.time_s
+            and abs(each.position_m - position_m) < near_m
+            for each in self.landings
+        )
+
+    @property
+    def scatter_m(self) -> float:
+        """How far slides land off the balance, a standard deviation, m."""
+        return scatter_m(self.ratios, self.landings, self.stroke_m) if self.valve is None else KNOWN * self.stroke_m
+
     @property
     def friction_m(self) -> float:
         """F_c/k_s, m."""
@@ -96,7 +122,14 @@ class Balance:
 def while_not_commanding(memory: SlideMemory, command_pa: float) -> SlideMemory:
     """Return the memory while another state commands: nothing of a move."""
     return replace(
-        memory, level_pa=command_pa, target_m=None, direction=0, excursion=False, inhibit_reason=InhibitReason.NOTHING
+        memory,
+        level_pa=command_pa,
+        target_m=None,
+        direction=0,
+        aim_m=nan,
+        excursion=False,
+        anchor=NOWHERE,
+        inhibit_reason=InhibitReason.NOTHING,
     )
 
 
@@ -106,12 +139,15 @@ def step(
     """Return what is remembered after one step of the law; its `level_pa` is the pressure asked for."""
     if not observation.usable:
         return memory
-    if not memory.up.way_m:
+    if memory.margins is NO_MARGINS:
         memory = _first_margins(memory, balance, settings)
     if observation.outcome is not None:
-        memory = _learnt(memory, observation.outcome, balance)
+        memory = _learnt(memory, observation.outcome, observation.quantum_m, balance, settings)
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
+        memory = replace(memory, anchor=Anchor(observation.position_m, memory.direction))
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
+    if memory.excursion and observation.rest is None:
+        memory = replace(memory, return_pa=_return_pa(memory, observation.position_m, balance, settings))
     memory = replace(memory, last_m=observation.position_m)
     if observation.rest is None:
         return _redirected(memory, observation, reference_m, balance, settings)
@@ -126,11 +162,14 @@ def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: 
         return False
     s, slow_m = memory.direction, SLOW * settings.stroke_m + observation.quantum_m
     beyond_m = min(s * (each - reference_m) for each in (observation.position_m, memory.last_m))
-    return beyond_m > memory.margin(-s).way_m and abs(observation.position_m - memory.last_m) < slow_m
+    return (
+        beyond_m > _way_m(memory, memory.margins.of(-s, turning=True), settings)
+        and abs(observation.position_m - memory.last_m) < slow_m
+    )
 
 
 def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSettings) -> SlideMemory:
-    """Return the memory with a first margin each way: the shortest slide seen, or what the data sheet says."""
+    """Return the memory with first margins: the shortest slide seen, and the longest way before that held."""
     guess_m = FIRST_MARGIN * balance.friction_m
     if settings.breakaway_pa is not None:
         guess_m = max(guess_m, (settings.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
@@ -140,32 +179,41 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
         )
         for s in (1, -1)
     }
+    margins = memory.margins
     for s in (1, -1):
-        held_m = max((balance.way_m(each) for each in balance.held if each.direction == s), default=0.0)
         shortest_m = min(slid_m[s], UNLIKE * slid_m[-s])
-        held = NEARLY * shortest_m < held_m < shortest_m
-        memory = memory.with_margin(s, Margin(shortest_m, broke=shortest_m == slid_m[s], held=held))
-    return memory
+        ways_m = (balance.way_m(each) for each in balance.held if each.direction == s)
+        held_m = max((way_m for way_m in ways_m if way_m < shortest_m), default=0.0)
+        margins = margins.replaced(s, Margin(max(0.0, held_m), shortest_m), turning=False)
+    return replace(memory, margins=margins)
 
 
-def _learnt(memory: SlideMemory, outcome: SlideOutcome, balance: Balance) -> SlideMemory:
-    """Return the memory after a slide: its margin. A slide onto a stop says nothing of it.
+def _learnt(
+    memory: SlideMemory, outcome: SlideOutcome, quantum_m: float, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
+    """Return the memory after a slide: its margin, and where the stem stands. A slide onto a stop says nothing.
 
-    A short slide that lands far from its aim was none: the packing that holds the stem, soft, gave way before it broke
-    loose.
+    A stem that breaks loose lands where it is to. One that does not, though others have landed there, did not: the
+    packing that holds it gave way, not as far, or farther.
     """
+    s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
-        return memory
-    s = outcome.direction
-    margin = memory.margin(s)
-    if not outcome.moved:
-        return memory.with_margin(s, margin.after(balance.way_m(outcome), moved=False))
-    way_m = s * (outcome.position_m - outcome.from_m)
-    if memory.target_m is not None and not memory.excursion and s == memory.direction:
-        missed_m = abs(outcome.position_m - memory.target_m)
-        if missed_m > MISSED * way_m:
-            return memory.with_margin(s, margin.after_miss(way_m))
-    return memory.with_margin(s, margin.after(way_m, moved=True))
+        return replace(memory, anchor=NOWHERE)
+    ours = s == memory.direction and not isnan(memory.aim_m)
+    anchor = memory.anchor.at(outcome.from_m, settings.stroke_m)
+    turning = s != anchor.direction
+    way_m = s * (memory.aim_m - anchor.position_m) if ours else balance.way_m(outcome)
+    missed_m = abs(memory.aim_m - to_m) if ours else 0.0
+    slid = outcome.moved and missed_m <= GAVE_WAY * way_m
+    unsure_m = max(SURELY * balance.scatter_m, settings.dead_band_m, outcome.std_m, quantum_m)
+    hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
+    margin = memory.margins.own(s, turning=turning)
+    if hit and anchor.direction:
+        margin = margin.after_breaking(s * (to_m - anchor.position_m))
+    elif not slid or (not hit and missed_m > PRECISELY * outcome.std_m and balance.known_at(memory.aim_m, outcome)):
+        margin = margin.after_holding(way_m)
+    margins = memory.margins.replaced(s, margin, turning=turning)
+    return replace(memory, margins=margins, anchor=Anchor(to_m, s) if slid else anchor)
 
 
 def _redirected(
@@ -177,7 +225,7 @@ def _redirected(
         return replace(memory, target_m=reference_m)
     s = 1 if reference_m > observation.position_m else -1
     way_m = abs(reference_m - observation.position_m)
-    if way_m < FAR * memory.margin(s).way_m:
+    if way_m < FAR * memory.margins.of(s, turning=True).sure_m:
         return memory
     level_pa = min(max(balance.pressure_pa(reference_m, s), settings.minimum_pa), settings.maximum_pa)
     return replace(
@@ -185,6 +233,7 @@ def _redirected(
         level_pa=level_pa,
         target_m=reference_m,
         direction=s,
+        aim_m=nan,
         excursion=False,
         slides=1,
         slide_s=observation.now_s,
@@ -208,28 +257,41 @@ def _next_slide(
     again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0
     memory = replace(memory, slides=max(0, memory.slides - 2 * again)) if again else memory
     if memory.slides >= MOST_SLIDES:
-        stuck = max(memory.up.way_m, memory.down.way_m) > STUCK_MARGIN * balance.friction_m
+        stuck = max(each.sure_m for each in memory.margins.all) > STUCK_MARGIN * balance.friction_m
         return replace(memory, inhibit_reason=InhibitReason.STUCK if stuck else InhibitReason.TRIM_ENDED)
     s = 1 if error_m > 0 else -1
-    if abs(error_m) >= memory.margin(s).way_m:
+    anchor = memory.anchor.at(rest.position_m, settings.stroke_m)
+    memory = replace(memory, anchor=anchor)
+    if s * (target_m - anchor.position_m) >= _way_m(memory, memory.margin(s), settings):
         return _slide(memory, observation.now_s, target_m, s, balance, settings, excursion=False)
-    return _excursion(memory, rest.position_m, observation.now_s, balance, settings)
+    return _excursion(memory, observation, balance, settings)
+
+
+def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:
+    """Return how far a slide must be sent, m: at first in a move as short as may do, then as surely does."""
+    return max(margin.sure_m if memory.slides >= TRIED else margin.way_m, LEAST * settings.stroke_m)
 
 
 def _excursion(
-    memory: SlideMemory, position_m: float, now_s: float, balance: Balance, settings: SlideSettings
+    memory: SlideMemory, observation: StemObservation, balance: Balance, settings: SlideSettings
 ) -> SlideMemory:
     """Give the first of two slides, by whichever side it may."""
     target_m = memory.target_m
     assert target_m is not None
-    error_m = target_m - position_m
+    error_m = target_m - memory.anchor.position_m
     s = 1 if error_m > 0 else -1
-    there, back = memory.margin(s).way_m, memory.margin(-s).way_m
+    now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m
+    there = {each: _way_m(memory, memory.margin(each), settings) for each in (1, -1)}
+    back = {
+        each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) + rounded_m for each in (1, -1)
+    }
     ways = (
-        (s, target_m + s * max(RETURN * back, there - abs(error_m))),
-        (-s, target_m - s * max(RETURN * there, back + abs(error_m))),
+        (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
+        (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
     )
-    if now_s - memory.excursion_s < settings.excursion_interval_s:
+    # A stem that the first of two slides has left away, for the second was too short, does not wait there.
+    left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]
+    if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
         return replace(memory, inhibit_reason=InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     for direction, by_m in ways:
@@ -239,14 +301,28 @@ def _excursion(
             why = InhibitReason.LAW_BEYOND_LIMITS
             continue
         spent_m = memory.spent_at_m(now_s, settings) + 2 * abs(by_m - target_m)
-        if 0.0 < settings.budget_m_per_s * DAY_S < spent_m:
+        if 0.0 < settings.budget_m_per_s * DAY_S < spent_m and not left_away:
             why = InhibitReason.EXCURSION_BUDGET_SPENT
             continue
-        return_pa = balance.pressure_pa(target_m, -direction)
-        return_pa = min(max(return_pa, settings.minimum_pa), settings.maximum_pa)
-        memory = replace(memory, excursion_s=now_s, spent_m=spent_m, return_pa=return_pa)
-        return _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
+        memory = replace(memory, excursion_s=now_s, spent_m=spent_m)
+        memory = _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
+        return replace(memory, return_pa=_return_pa(memory, memory.anchor.position_m, balance, settings))
     return replace(memory, inhibit_reason=why)
+
+
+def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, settings: SlideSettings) -> float:
+    """Return what to hold, Pa, if something interrupts the first of two slides now.
+
+    From beyond its margin the stem comes back to its target. From nearer it would not break loose: it goes as far
+    beyond the target on the other side as it lacks, if that is nearer than where it is.
+    """
+    assert memory.target_m is not None
+    s, target_m = memory.direction, memory.target_m
+    goes_on_m = 0.0 if isnan(memory.last_m) else position_m - memory.last_m
+    beyond_m = s * (position_m + goes_on_m - target_m)
+    lacks_m = RETURN * memory.margins.of(-s, turning=True).way_m - beyond_m
+    to_m = target_m - s * max(0.0, lacks_m) if beyond_m > lacks_m else target_m
+    return min(max(balance.pressure_pa(to_m, -s), settings.minimum_pa), settings.maximum_pa)
 
 
 def _slide(
@@ -267,6 +343,7 @@ def _slide(
         memory,
         level_pa=level_pa,
         direction=direction,
+        aim_m=to_m if level_pa == wanted_pa else nan,
         excursion=excursion,
         slides=memory.slides + 1,
         slide_s=now_s,

@@ -1,21 +1,16 @@
 """The memory of the law of slides: the move, the slide in progress, and how far a stem at rest must be sent."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, nan
 
 from config.codes import InhibitReason
+from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
 
-MARGIN_RAISE, MARGIN_LOWER = 1.06, 0.999
-"""Factors on a margin after a slide that did not break loose, and after one that did."""
-MARGIN_CLIMB, MARGIN_DESCEND = 1.3, 0.85
-"""The same as long as no slide has done either."""
-MARGIN_LENGTHEN, SHORT = 1.2, 2.0
-"""Factor after a short slide that missed its aim; margins up to which a slide is short."""
 DAY_S = 86400.0
-NEAR = 1.1
-"""Margins: a slide longer than this says nothing of the margin."""
+CREEP = 0.03
+"""Of the stroke: a packing gives way no farther."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,30 +46,18 @@ class StemObservation:
 
 
 @dataclass(frozen=True, slots=True)
-class Margin:
-    """The shortest slide that breaks loose in one direction: (F_s - F_c)/k_s as learnt, m."""
+class Anchor:
+    """Where the last slide ended, m, and its direction, 0: not known. A packing that gives way does not change it."""
 
-    way_m: float = 0.0
-    """0: unknown."""
-    broke: bool = False
-    held: bool = False
-    """Whether a slide about as long has broken loose, and whether one has not."""
+    position_m: float = nan
+    direction: int = 0
 
-    def after(self, way_m: float, moved: bool) -> "Margin":
-        """Return the margin after a slide meant to go a way, m."""
-        if moved:
-            shorter = min(self.way_m, way_m) if self.way_m else way_m
-            lower = (MARGIN_LOWER if self.held else MARGIN_DESCEND) if way_m <= NEAR * shorter else 1.0
-            return Margin(lower * shorter, True, self.held)
-        if way_m < self.way_m / NEAR:
-            return self
-        return Margin((MARGIN_RAISE if self.broke else MARGIN_CLIMB) * max(way_m, self.way_m), self.broke, True)
+    def at(self, rest_m: float, stroke_m: float) -> "Anchor":
+        """Return the anchor of a stem that rests at a position, m: if it lies far off, something else has moved it."""
+        return self if abs(rest_m - self.position_m) <= CREEP * stroke_m else Anchor(rest_m)
 
-    def after_miss(self, way_m: float) -> "Margin":
-        """Return the margin after a slide of a way, m, that landed far from its aim: longer, if it was short."""
-        if way_m > SHORT * self.way_m:
-            return self
-        return Margin(MARGIN_LENGTHEN * max(way_m, self.way_m), self.broke, True)
+
+NOWHERE = Anchor()
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +72,18 @@ class SlideMemory:
     excursion: bool = False
     """Whether it is the first of two."""
     return_pa: float = nan
-    """The pressure of the second of two, from where the first was to land."""
+    """What is held if something interrupts the first of two: under it the stem comes back."""
+    aim_m: float = nan
+    """Where the slide in progress is to land; nan where the pressure limits do not let it."""
+    anchor: Anchor = NOWHERE
+    """Where the last slide ended."""
     slides: int = 0
     """Given since the reference changed ..."""
     slide_s: float = -inf
     """... and when the last was."""
     last_m: float = nan
     """The sample before."""
-    up: Margin = Margin()
-    down: Margin = Margin()
+    margins: Margins = NO_MARGINS
     margins_at_m: float = nan
     """Where the margins are those of the extended valve; nan: none is known."""
     excursion_s: float = -inf
@@ -111,14 +97,10 @@ class SlideMemory:
         return self.return_pa if self.excursion else command_pa
 
     def margin(self, direction: int) -> Margin:
-        """Return the margin in a direction."""
-        return self.up if direction > 0 else self.down
+        """Return the margin of the next slide in a direction from where the stem stands."""
+        return self.margins.of(direction, turning=direction != self.anchor.direction)
 
     def spent_at_m(self, now_s: float, settings: SlideSettings) -> float:
         """Return what is spent now of a day's travel, m: what has come back since is taken off."""
         back_m = settings.budget_m_per_s * (now_s - self.excursion_s) if self.spent_m else 0.0
         return max(0.0, self.spent_m - back_m)
-
-    def with_margin(self, direction: int, margin: Margin) -> "SlideMemory":
-        """Return the memory with another margin in a direction."""
-        return replace(self, up=margin) if direction > 0 else replace(self, down=margin)

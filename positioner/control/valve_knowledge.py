@@ -10,7 +10,8 @@ from math import isfinite, sqrt
 from config.extended_valve import ExtendedValve
 from positioner.control.breakaway_memory import BreakawayMemory, LearntPush
 from positioner.control.law_memory import LawMemory
-from positioner.control.slide_memory import Margin, SlideMemory
+from positioner.control.slide_margins import Margins
+from positioner.control.slide_memory import SlideMemory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, Estimates
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
@@ -37,7 +38,7 @@ class ValveKnowledge:
         residual_m: how far landings lie off these, a standard deviation.
         landings, held: slides that landed and changes of the command that moved nothing, the latest first.
         answers: how long the stem takes to answer.
-        margins: of the law of slides, up and down.
+        margins: of the law of slides.
         pushes: of the law for small moves by pulses, up and down.
         tracked: what else is followed, by name, for whoever knows the name.
     """
@@ -48,7 +49,7 @@ class ValveKnowledge:
     landings: tuple[SlideOutcome, ...] = ()
     held: tuple[SlideOutcome, ...] = ()
     answers: Answers = UNANSWERED
-    margins: tuple[Margin, Margin] | None = None
+    margins: Margins | None = None
     pushes: tuple[LearntPush, LearntPush] | None = None
     tracked: Mapping[str, float] = field(default_factory=dict)
 
@@ -69,8 +70,8 @@ class ValveKnowledge:
 
     def shortest_m(self, direction: int) -> float:
         """Return the shortest slide that breaks loose in a direction as far as is known, m: no more than friction."""
-        if self.margins is not None and (margin := self.margins[0 if direction > 0 else 1]).way_m:
-            return margin.way_m
+        if self.margins is not None and (way_m := self.margins.of(direction, turning=True).way_m):
+            return way_m
         slid_m = (abs(each.position_m - each.from_m) for each in self.landings if each.direction == direction)
         return min(slid_m, default=self.friction_m)
 
@@ -113,7 +114,7 @@ def known(
         landings=statics.landings,
         held=statics.held,
         answers=statics.detector.answers,
-        margins=(law.up, law.down) if isinstance(law, SlideMemory) else None,
+        margins=law.margins if isinstance(law, SlideMemory) else None,
         pushes=(law.up, law.down) if isinstance(law, BreakawayMemory) else None,
     )
 
@@ -122,7 +123,7 @@ def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None) -> LawM
     """Return the memory of a law with what it had learnt, if it is the same law."""
     match law:
         case SlideMemory() if knowledge is not None and knowledge.margins is not None:
-            return replace(law, up=knowledge.margins[0], down=knowledge.margins[1])
+            return replace(law, margins=knowledge.margins)
         case BreakawayMemory() if knowledge is not None and knowledge.pushes is not None:
             return replace(law, up=knowledge.pushes[0], down=knowledge.pushes[1])
         case _:

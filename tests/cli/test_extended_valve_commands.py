@@ -8,6 +8,8 @@ from config.valve_file import load_valve, shipped_valve
 from positioner.cli.main import main
 
 HARD = '\n[[effect]]\nname = "spring_hardening"\ncubic_n_per_m3 = 1e6\n'
+PLAY = '\n[[effect]]\nname = "backlash"\nwidth_m = 5e-4\n'
+"""What landings do not show, for the sensor does not."""
 DAEMON = '[valve]\nstroke_m = 0.1016\n[law]\nvalve = "better.toml"\n[device]\nport = 1\n'
 Capture = pytest.CaptureFixture[str]
 
@@ -21,7 +23,7 @@ def written(path: Path, more: str, stroke: str = "0.1016") -> Path:
 
 
 def test_play_prints_what_either_law_leaves(tmp_path: Path, capsys: Capture) -> None:
-    valve = written(tmp_path / "better.toml", HARD)
+    valve = written(tmp_path / "better.toml", PLAY)
     reference = tmp_path / "reference.csv"
     steps_m = (0.06, 0.064, 0.061, 0.07, 0.066, 0.066)
     reference.write_text("\n".join(["time_s,reference_m", *(f"{i},{x}" for i, x in enumerate(steps_m)), ""]))

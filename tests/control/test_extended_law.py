@@ -43,11 +43,13 @@ def test_the_first_slide_to_a_place_lands_there() -> None:
 def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:
     _, extended = switched_on("position_friction")
     first = with_margins_at(SlideMemory(), 0.2 * STROKE_M, extended)
-    assert first.up.way_m == pytest.approx(1.02 * extended.margin_m(0.2 * STROKE_M, 1))
-    learnt = first.with_margin(1, replace(first.up, way_m=1.06 * first.up.way_m))
+    up = first.margins.turning_up
+    assert up.way_m == pytest.approx(1.02 * extended.margin_m(0.2 * STROKE_M, 1))
+    learnt = replace(first, margins=first.margins.replaced(1, up.times(1.06), turning=True))
     there = with_margins_at(learnt, 0.8 * STROKE_M, extended)
-    assert there.up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1))
-    assert there.down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
+    up, down = there.margins.turning_up, there.margins.turning_down
+    assert up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1))
+    assert down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
     assert with_margins_at(there, 0.8 * STROKE_M, extended) is there
 
 

@@ -207,7 +207,8 @@ def test_a_reference_waits_for_the_landing_that_is_to_confirm(knowledge: ValveKn
 
 def hardened(strength_n_per_m3: float) -> ValveFile:
     effect = {"name": "spring_hardening", "cubic_n_per_m3": strength_n_per_m3}
-    return ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": [effect]})
+    damped = {**VALVE.model_dump(), "viscous_ns_per_m": 2 * VALVE.viscous_ns_per_m}  # so that it does not swing
+    return ValveFile.model_validate({"valve": damped, "effect": [effect]})
 
 
 @pytest.mark.parametrize(("true_n_per_m3", "trust"), [(4e6, Restored.CONFIRMED), (3.5e6, Restored.DROPPED)])

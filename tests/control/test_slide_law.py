@@ -13,7 +13,8 @@ from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller import Decision
 from positioner.control.requests import Requests
 from positioner.control.slide_law import Balance, step
-from positioner.control.slide_memory import DAY_S, Margin, SlideMemory, SlideSettings, StemObservation
+from positioner.control.slide_margins import Margin, Margins
+from positioner.control.slide_memory import DAY_S, Anchor, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -217,27 +218,126 @@ def test_the_staircase_turns_round_before_it_leaves_the_window() -> None:
     assert stairs.counted(outcome(1, 0.065, 0.075)).stepped(0.075, LIMITS).direction == 1
 
 
-@pytest.mark.parametrize(("landed_m", "longer"), [(0.06, False), (0.0585, True)])
-def test_a_short_slide_that_misses_its_aim_makes_the_margin_longer(landed_m: float, longer: bool) -> None:
-    """Held elastically, a stem gives way by some per cent before it breaks loose: that was no slide."""
-    margin = Margin(0.005, broke=True, held=True)
-    memory = SlideMemory(target_m=0.06, direction=-1, up=margin, down=margin)
-    rest = Rest(landed_m, 1e-6, 1e-6, 100, 0.1)
-    came = SlideOutcome(1.0, -1, 0.0655, 27e3, landed_m, 1e-6, True, True)
-    observation = StemObservation(1.0, landed_m, True, rest, 0.0, came)
-    balance = Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M)
-    settings = SlideSettings(STROKE_M, 5e-5, 0.0, 420e3, None, 0.5 * STROKE_M, 0.0)
-    after = step(memory, observation, 0.06, balance, settings)
-    assert (after.down.way_m > 0.006) is longer
-    assert after.up == margin
+MARGIN_M = 0.006
+SETTINGS = SlideSettings(STROKE_M, 5e-5, 0.0, 420e3, None, 0.5 * STROKE_M, 0.0)
 
 
-def test_a_margin_falls_while_slides_break_loose_and_rises_when_one_does_not() -> None:
-    margin = Margin().after(0.06, moved=True)
-    assert margin.way_m == pytest.approx(0.85 * 0.06)
-    assert margin.after(0.2, moved=True).way_m == margin.way_m, "a long slide says nothing of it"
-    assert margin.after_miss(margin.way_m).way_m == pytest.approx(1.2 * margin.way_m)
-    assert margin.after_miss(0.2).way_m == margin.way_m, "a long slide that misses is the balance's error"
-    raised = margin.after(margin.way_m, moved=False)
-    assert raised.way_m == pytest.approx(1.06 * margin.way_m)
-    assert raised.after(raised.way_m, moved=True).way_m == pytest.approx(0.999 * raised.way_m)
+def after(landed_m: float, *, moved: bool = True, anchored: int = 1) -> SlideMemory:
+    """Return what a slide down to 0.06 m teaches that ended somewhere, the stem having stood at 0.0655 m."""
+    margins = Margins(*(4 * [Margin(broke_m=MARGIN_M)]))
+    anchor = Anchor(0.0655, anchored)
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=anchor, margins=margins)
+    came = SlideOutcome(1.0, -1, 0.0655, 27e3, landed_m, 1e-6, moved, moved)
+    observation = StemObservation(1.0, landed_m, True, Rest(landed_m, 1e-6, 1e-6, 100, 0.1), 0.0, came)
+    return step(memory, observation, 0.06, Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M), SETTINGS)
+
+
+def test_a_slide_that_lands_where_it_aims_makes_the_margin_of_its_kind_shorter() -> None:
+    turned, went_on = after(0.06), after(0.06, anchored=-1)
+    assert turned.margins.turning_down.broke_m == pytest.approx(0.0055)
+    assert went_on.margins.onward_down.broke_m == pytest.approx(0.0055)
+    assert turned.margins.onward_down == went_on.margins.turning_down == Margin(broke_m=MARGIN_M)
+    assert turned.anchor == Anchor(0.06, -1)
+
+
+@pytest.mark.parametrize(("landed_m", "moved"), [(0.0635, True), (0.0655, False)], ids=["gave way", "held"])
+def test_a_packing_that_gives_way_is_no_slide(landed_m: float, moved: bool) -> None:
+    """Held elastically, a stem gives way by some per cent before it breaks loose: it still stands where it stood."""
+    held = after(landed_m, moved=moved)
+    assert held.margins.turning_down.held_m == pytest.approx(0.0055)
+    assert held.anchor == Anchor(0.0655, 1)
+
+
+def test_one_that_goes_too_far_broke_loose_the_balance_is_at_fault() -> None:
+    assert after(0.058).margins.turning_down.held_m == 0.0
+    assert after(0.058).anchor == Anchor(0.058, -1)
+
+
+def test_the_margin_is_halved_between_what_held_and_what_broke_loose() -> None:
+    margin = Margin().after_breaking(0.016)
+    assert margin.way_m == pytest.approx(0.008)
+    margin = margin.after_holding(0.004)
+    assert margin.way_m == pytest.approx(0.008)
+    assert margin.after_breaking(0.2) == margin, "a long slide says nothing of it"
+    near = Margin(0.0099, 0.0101)
+    assert near.way_m == near.broke_m
+    assert near.after_holding(0.0101).way_m > 0.0101, "what held is not tried again"
+    assert near.after_breaking(0.005).way_m == pytest.approx(0.005)
+
+
+def test_a_margin_that_keeps_breaking_loose_is_tried_shorter_in_time() -> None:
+    margin = Margin(0.0099, 0.0101)
+    for _ in range(200):
+        margin = margin.after_breaking(margin.way_m)
+    assert margin.way_m < 0.97 * 0.0101
+
+
+def test_a_margin_of_which_nothing_is_known_is_that_of_its_next_of_kin() -> None:
+    margins = Margins(onward_up=Margin(0.005, 0.0055))
+    assert margins.of(1, turning=True) == margins.of(-1, turning=True) == margins.onward_up
+    long = replace(margins, turning_up=Margin(broke_m=0.03))
+    assert long.of(1, turning=True) == margins.onward_up, "a long slide says less"
+    assert replace(margins, turning_up=Margin(0.006)).of(1, turning=True) == Margin(0.006), "it holds longer ones"
+    assert replace(margins, turning_up=Margin(0.0052)).of(1, turning=True) == Margin(0.0052, 0.0055)
+
+
+@pytest.mark.parametrize("period_s", [0.01, 0.2])
+def test_excursions_become_as_short_as_they_can_be(period_s: float) -> None:
+    loop = Loop(period_s)
+    loop.step_to(0.6)
+    beyond = []
+    for at in (0.603, 0.598, 0.602, 0.6, 0.604, 0.597, 0.603, 0.599):
+        before = loop.valve.indicated_m / STROKE_M
+        path = loop.step_to(at)
+        assert abs(path[-1] - at) < 1e-3
+        beyond.append(max(min(before, at) - path.min(), path.max() - max(before, at)))
+    assert max(beyond[-4:]) < 1.15 * LEAST
+    assert max(beyond) < 1.5 * LEAST
+
+
+def within(position_m: float, now_s: float, rest: bool, memory: SlideMemory, interval_s: float = 0.0) -> SlideMemory:
+    """Return one step of the law, the stem at a position, m, 0.06 m wanted."""
+    at_rest = Rest(position_m, 1e-6, 1e-6, 100, 0.1) if rest else None
+    observation = StemObservation(now_s, position_m, True, at_rest, 0.0, None)
+    settings = replace(SETTINGS, excursion_interval_s=interval_s)
+    return step(memory, observation, 0.06, BALANCE, settings)
+
+
+BALANCE = Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M)
+KNOWN = Margins(*(4 * [Margin(0.0055, 0.0056)]))
+
+
+@pytest.mark.parametrize(
+    ("position_m", "lands_m"),
+    [(0.0605, 0.06), (0.062, 0.06), (0.0645, 0.06 - (1.02 * 0.0056 - 0.0045)), (0.066, 0.06)],
+    ids=["hardly away", "it stays", "it goes to the other side", "it comes back"],
+)
+def test_what_is_held_if_an_excursion_is_interrupted_brings_the_stem_as_near_as_it_can(
+    position_m: float, lands_m: float
+) -> None:
+    memory = SlideMemory(
+        target_m=0.06,
+        direction=1,
+        excursion=True,
+        aim_m=0.067,
+        last_m=position_m,
+        anchor=Anchor(0.0599, 1),
+        margins=KNOWN,
+    )
+    after = within(position_m, 1.0, False, memory)
+    if after.excursion:
+        assert after.held_pa(0.0) == pytest.approx(BALANCE.pressure_pa(lands_m, -1))
+    else:
+        assert after.level_pa == pytest.approx(BALANCE.pressure_pa(lands_m, -1)), (
+            "far enough: the second slide is given"
+        )
+
+
+@pytest.mark.parametrize(("slides", "waits"), [(0, True), (2, False)])
+def test_a_stem_that_an_excursion_left_away_does_not_wait_there(slides: int, waits: bool) -> None:
+    memory = SlideMemory(
+        target_m=0.06, direction=-1, slides=slides, excursion_s=9.0, anchor=Anchor(0.065, 1), margins=KNOWN, slide_s=9.5
+    )
+    after = within(0.065, 10.0, True, memory, interval_s=20.0)
+    assert (after.inhibit_reason is InhibitReason.EXCURSION_WAITS) is waits
+    assert (after.level_pa == memory.level_pa) is waits

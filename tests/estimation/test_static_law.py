@@ -7,7 +7,7 @@ from config.codes import Refusal
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimate, Estimates
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.local_balance import landing_pa
+from positioner.estimation.landings.local_balance import landing_pa, scatter_m
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.static_law import StaticLaw, static_law
 
@@ -135,3 +135,43 @@ def test_a_local_landing_corrects_the_straight_law() -> None:
     assert abs(landing_pa(place_m, 1, law.ratios, (), STROKE_M) - true_pa) > 100
     assert abs(landing_pa(place_m, 1, law.ratios, (near,), STROKE_M) - true_pa) < 30
     assert landing_pa(place_m, -1, law.ratios, (near,), STROKE_M) == law.ratios.balance_pa(place_m, -1)
+
+
+def bent_pa(share: float, s: int) -> float:
+    """The pressure of a spring that hardens by 30 % and of friction that grows by 30 %, Pa."""
+    return SLOPE * STROKE_M * (share + 0.3 * share**3) + s * 8e3 * (1 + 0.3 * share)
+
+
+def test_landings_bend_the_law_as_the_valve_is_bent() -> None:
+    """Eight slides in all, none where the law is asked: a straight law is off there by 1.5 % of stroke."""
+    shares = (0.2, 0.4, 0.6, 0.8)
+    landed = [landing(each * STROKE_M, s, bent_pa(each, s)) for s in (1, -1) for each in shares]
+    law = static_law(landed, STROKE_M)
+    for share, s in ((0.5, 1), (0.5, -1), (0.3, 1), (0.75, -1)):
+        off_pa = landing_pa(share * STROKE_M, s, law.ratios, law.slides, STROKE_M) - bent_pa(share, s)
+        assert abs(off_pa) < 1e-3 * SLOPE * STROKE_M
+    assert scatter_m(law.ratios, law.slides, STROKE_M) < 1e-3 * STROKE_M < law.residual_m
+
+
+def test_one_landing_that_lies_apart_does_not_bend_the_law() -> None:
+    shares = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+    landed = [landing(each * STROKE_M, s, bent_pa(each, s)) for s in (1, -1) for each in shares]
+    apart = [landed[3]._replace(command_pa=landed[3].command_pa + 0.02 * SLOPE * STROKE_M), *landed[:3], *landed[4:]]
+    law = static_law(landed, STROKE_M)
+    for share, s in ((0.3, 1), (0.75, -1)):
+        off_pa = landing_pa(share * STROKE_M, s, law.ratios, apart, STROKE_M) - bent_pa(share, s)
+        assert abs(off_pa) < 2e-3 * SLOPE * STROKE_M
+
+
+def test_the_residual_says_how_far_a_bent_valve_lands_off_where_there_were_no_landings() -> None:
+    """Friction that grows over the travel, and landings of each direction in one part of it only."""
+
+    def true_pa(share: float, s: int) -> float:
+        return SLOPE * STROKE_M * share + s * 8e3 * (1 + 0.3 * share)
+
+    ups = [landing(each * STROKE_M, 1, true_pa(each, 1)) for each in np.linspace(0.1, 0.9, 20)]
+    downs = [landing(each * STROKE_M, -1, true_pa(each, -1)) for each in np.linspace(0.5, 0.85, 8)]
+    law = static_law([*ups, *downs], STROKE_M)
+    off_m = (law.ratios.balance_pa(0.35 * STROKE_M, -1) - true_pa(0.35, -1)) / SLOPE
+    assert abs(off_m) > 5e-3 * STROKE_M
+    assert abs(off_m) < 3 * law.residual_m

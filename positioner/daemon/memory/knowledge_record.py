@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from positioner.control.breakaway_memory import LearntPush
-from positioner.control.slide_memory import Margin
+from positioner.control.slide_margins import Margin, Margins
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
@@ -33,9 +33,8 @@ class _Slide(_Record):
 
 
 class _Margin(_Record):
-    way_m: float = Field(ge=0.0)
-    broke: bool
-    held: bool
+    held_m: float = Field(ge=0.0)
+    broke_m: float = Field(ge=0.0)
 
 
 class _Push(_Record):
@@ -54,7 +53,7 @@ class KnowledgeRecord(_Record):
     landings: list[_Slide] = Field(max_length=MOST)
     held: list[_Slide] = Field(max_length=MOST)
     answers: list[float] = Field(min_length=3, max_length=3)
-    margins: list[_Margin] | None = Field(min_length=2, max_length=2)
+    margins: list[_Margin] | None = Field(min_length=4, max_length=4)
     pushes: list[_Push] | None = Field(min_length=2, max_length=2)
     tracked: dict[str, float]
 
@@ -71,8 +70,8 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "landings": [each._asdict() for each in knowledge.landings[:MOST] if _finite(each)],
         "held": [each._asdict() for each in knowledge.held[:MOST] if _finite(each)],
         "answers": list(knowledge.answers),
-        "margins": _pair(knowledge.margins, "way_m", "broke", "held"),
-        "pushes": _pair(knowledge.pushes, "push_m", "moved"),
+        "margins": _each(None if knowledge.margins is None else knowledge.margins.all, "held_m", "broke_m"),
+        "pushes": _each(knowledge.pushes, "push_m", "moved"),
         "tracked": dict(knowledge.tracked),
     }
 
@@ -103,15 +102,12 @@ def knowledge_in(content: object) -> ValveKnowledge:
     )
 
 
-def _pair(learnt: Sequence[Margin] | Sequence[LearntPush] | None, *names: str) -> list[dict[str, Any]] | None:
+def _each(learnt: Sequence[Margin] | Sequence[LearntPush] | None, *names: str) -> list[dict[str, Any]] | None:
     return None if learnt is None else [{name: getattr(each, name) for name in names} for each in learnt]
 
 
-def _margins(both: list[_Margin] | None) -> tuple[Margin, Margin] | None:
-    if both is None:
-        return None
-    up, down = (Margin(each.way_m, each.broke, each.held) for each in both)
-    return up, down
+def _margins(four: list[_Margin] | None) -> Margins | None:
+    return None if four is None else Margins(*(Margin(each.held_m, each.broke_m) for each in four))
 
 
 def _pushes(both: list[_Push] | None) -> tuple[LearntPush, LearntPush] | None:

@@ -7,6 +7,9 @@ landings that leaves the four unknowns apart is tried; the one that leaves the l
 
     t = |δ| / std δ,   s^2 = max(Σ e^2 / (n - 4), (κ 2e-4 stroke)^2)
 
+A spring that hardens, or friction that grows over the travel, looks like a shift to a straight law, for S3 goes over
+the travel in time. So where there are landings enough, a law bent by x^2 and s x must be parted by the shift as well.
+
 An instant between all landings up and all landings down cannot be told from unlike friction: somebody has to land once
 more in the first direction (the staircase does).
 """
@@ -16,6 +19,7 @@ from math import sqrt
 
 import numpy as np
 
+from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_law import DEVIATIONS, FINEST, columns, t_of_three_deviations
 
@@ -23,6 +27,8 @@ SURE = 2.0
 """Times three deviations, for the instant is sought, and a law that is bent looks like a small shift."""
 LEAST_SHIFT = 2e-3
 """Of the stroke: a smaller shift counts as none."""
+ENOUGH = 10
+"""Landings: fewer say nothing of a bend."""
 APART = 1e-3
 """Least singular value of what tells the unknowns apart."""
 
@@ -35,21 +41,31 @@ def shifted(landings: Iterable[SlideOutcome], stroke_m: float) -> bool:
         stroke_m: full travel, m.
     """
     ordered = sorted(landings, key=lambda each: each.time_s)
-    free = len(ordered) - 4
+    X, p = columns(ordered, stroke_m)
+    if not _shift_in(X, p):
+        return False
+    share, way = X[:, 0], X[:, 1] + X[:, 2]
+    bent = np.column_stack((X, share**2, way * share))
+    return len(ordered) < ENOUGH or _shift_in(bent, p)
+
+
+def _shift_in(X: Array, p: Array) -> bool:
+    """Return whether some instant parts landings beyond what they scatter by, the law being that of X."""
+    count, known = X.shape
+    free = count - known - 1
     if free < 1:
         return False
-    X, p = columns(ordered, stroke_m)
     least, found = np.inf, (0.0, np.inf, 1.0)
-    for first in range(1, len(ordered)):
-        after = (np.arange(len(ordered)) >= first).astype(float)
+    for first in range(1, count):
+        after = (np.arange(count) >= first).astype(float)
         with_shift = np.column_stack((X, after))
         if np.linalg.svd(with_shift, compute_uv=False)[-1] < APART:
             continue
         theta, _, _, _ = np.linalg.lstsq(with_shift, p)
         left = float(np.square(p - with_shift @ theta).sum())
         if left < least:
-            std = sqrt(float(np.linalg.inv(with_shift.T @ with_shift)[3, 3]))
-            least, found = left, (float(theta[3]), std, abs(float(theta[0])))
+            std = sqrt(float(np.linalg.inv(with_shift.T @ with_shift)[known, known]))
+            least, found = left, (float(theta[known]), std, abs(float(theta[0])))
     shift_pa, std_per_pa, stroke_pa = found
     s_pa = max(sqrt(least / free), FINEST * stroke_pa) if np.isfinite(least) else np.inf
     surely_pa = SURE * DEVIATIONS * t_of_three_deviations(free) * s_pa * std_per_pa

@@ -1,16 +1,24 @@
-"""The pressure that lands a slide at a position: the straight law, corrected by the landings near it.
+"""The pressure that lands a slide at a position: the straight law, bent as its landings are, and what is left near it.
 
-    B(x, s) = κ x + s φ + offset + Σ w_j e_j / (w_0 + Σ w_j)       e_j = p_j - (κ x_j + s φ + offset),  s_j = s
-    w_j = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
+    B(x, s) = κ x + s φ + offset + q_1 + q_2 s + q_3 t + q_4 t^2 + q_5 t^3 + q_6 s t + n_s(x)      t = 2 x/stroke - 1
+    q       = (Q' W Q/σ^2 + P^-1)^-1 Q' W e/σ^2             e_j = p_j - (κ x_j + s_j φ + offset)
+    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q leaves of e_j,  s_j = s
+    w_j     = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
 
-Where spring or friction change over the travel no straight law holds, but a slide to x that missed says what is
-missing there: the next one lands. w_0 holds the correction back where there is little to go by.
+A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
+or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
+that lies apart for less, and σ is what the others scatter by. A slide to x that missed all the same says what is
+missing there: the next one lands. w_0 holds that correction back where there is little to go by.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from math import copysign, exp
 
+import numpy as np
+
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
 WIDTH = 0.04
@@ -19,9 +27,18 @@ FADING = 0.7
 """ρ"""
 HELD_BACK = 0.1
 """w_0"""
+BENDS = (0.05, 0.05, 0.05, 0.1, 0.04, 0.03)
+"""Of the pressure over the stroke: standard deviations of q, the root of P."""
+FINEST = 2e-4
+"""Of the stroke: no landing says more."""
+FEWEST = 5
+"""Landings: fewer do not say how they are bent."""
+FADES = 0.97
+"""Factor on the weight from landing to landing."""
+HUBER, ROUNDS = 2.0, 4
 
 
-def ahead_m(each: SlideOutcome, ratios: Ratios, landings: Iterable[SlideOutcome], stroke_m: float) -> float:
+def ahead_m(each: SlideOutcome, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float) -> float:
     """Return how far a change of the command sends a stem that breaks loose, m, by the balance where it starts from.
 
     Args:
@@ -33,7 +50,7 @@ def ahead_m(each: SlideOutcome, ratios: Ratios, landings: Iterable[SlideOutcome]
 
 
 def landing_pa(
-    position_m: float, direction: int, ratios: Ratios, landings: Iterable[SlideOutcome], stroke_m: float
+    position_m: float, direction: int, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float
 ) -> float:
     """Return the pressure, Pa, under which a slide up (+1) or down (-1) lands at a position, m.
 
@@ -44,9 +61,57 @@ def landing_pa(
         landings: the latest first.
         stroke_m: full travel.
     """
+    bend, _ = _bend(ratios, tuple(landings), stroke_m)
+
+    def bent_pa(position_m: float, direction: int) -> float:
+        return ratios.balance_pa(position_m, direction) + _bent_by_pa(bend, position_m / stroke_m, direction)
+
     landed = (each for each in landings if each.direction == direction)
-    missed = missed_pa(position_m, landed, ratios.balance_pa, WIDTH * stroke_m)
-    return ratios.balance_pa(position_m, direction) + missed
+    missed = missed_pa(position_m, landed, bent_pa, WIDTH * stroke_m)
+    return bent_pa(position_m, direction) + missed
+
+
+def bent_by_pa(
+    position_m: float, direction: int, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float
+) -> float:
+    """Return by how much the landings are bent away from the straight law at a position, Pa; as of `landing_pa`."""
+    bend, _ = _bend(ratios, tuple(landings), stroke_m)
+    return _bent_by_pa(bend, position_m / stroke_m, direction)
+
+
+def scatter_m(ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float) -> float:
+    """Return how far slides land off the bent law, a standard deviation, m; arguments as of `landing_pa`."""
+    return _bend(ratios, tuple(landings), stroke_m)[1] / -ratios.b_over_c
+
+
+def _bent_by_pa(bend: tuple[float, ...], share: float, direction: int) -> float:
+    t, s = 2.0 * share - 1.0, direction
+    level, friction, slope, square, cube, parting = bend
+    return level + friction * s + t * (slope + t * (square + t * cube) + parting * s)
+
+
+@lru_cache(maxsize=4)
+def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> tuple[tuple[float, ...], float]:
+    """Return q, Pa, zeros where there are too few landings, and what they scatter by, Pa."""
+    if len(landings) < FEWEST:
+        return (0.0,) * len(BENDS), FINEST * -ratios.b_over_c * stroke_m
+    s = np.array([float(each.direction) for each in landings])
+    t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
+    e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
+    Q = np.column_stack((np.ones(s.size), s, t, t**2, t**3, s * t))
+    stroke_pa = -ratios.b_over_c * stroke_m
+    known: Array = np.power(FADES, np.arange(s.size, dtype=float))
+    held = np.diag((np.array(BENDS) * stroke_pa) ** -2.0)
+    weights: Array = known
+    sigma_pa = max(FINEST * stroke_pa, float(np.sqrt(np.mean(e**2))))
+    q: Array = np.zeros(len(BENDS))
+    for _ in range(ROUNDS):
+        normal = (Q.T * weights) / sigma_pa**2
+        q = np.linalg.solve(normal @ Q + held, normal @ e)
+        off = np.abs(e - Q @ q)
+        sigma_pa = max(FINEST * stroke_pa, 1.4826 * float(np.median(off)))
+        weights = known * np.minimum(1.0, HUBER * sigma_pa / np.maximum(off, 1e-9))
+    return tuple(q.tolist()), sigma_pa
 
 
 def missed_pa(

@@ -12,14 +12,15 @@ from config.codes import Refusal
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings import local_balance
 from positioner.estimation.landings.extended_balance import contradicted
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
 from positioner.estimation.landings.landing_shift import shifted
-from positioner.estimation.landings.local_balance import ahead_m
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
 
-LONGEST_WAY, OFF = 0.03, 3e-3
-"""Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should."""
+LONGEST_WAY, OFF, LIKE = 0.03, 1e-3, 0.15
+"""Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should, or by a share of its
+way."""
 IN_A_ROW = 4
 EACH = 20
 """Landings remembered in a direction."""
@@ -129,8 +130,9 @@ class StaticIdentification:
         if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
             self._elsewhere = 0
             return False
-        should_m = ahead_m(outcome, law.ratios, self.landings, self._stroke_m)
-        allowed_m = max(0.5 * abs(should_m), OFF * self._stroke_m + 3.0 * law.residual_m)
+        should_m = local_balance.ahead_m(outcome, law.ratios, self.landings, self._stroke_m)
+        scatter_m = local_balance.scatter_m(law.ratios, self.landings, self._stroke_m)
+        allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (scatter_m + outcome.std_m))
         elsewhere = abs(went_m - should_m) > allowed_m
         self._elsewhere = self._elsewhere + 1 if elsewhere else 0
         return 0 < self._elsewhere < IN_A_ROW

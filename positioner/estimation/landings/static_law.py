@@ -29,6 +29,7 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.local_balance import bent_by_pa
 
 FEWEST, FEWEST_EACH = 5, 2
 """Landings in all, and in each direction."""
@@ -43,6 +44,8 @@ LARGEST_RESIDUAL = 0.05
 HUBER, ROUNDS = 2.0, 6
 """Deviations beyond which a landing counts less."""
 DEVIATIONS = 3.0
+MIDDLE = (0.3, 0.4, 0.5, 0.6, 0.7)
+"""Of the stroke: where it is asked how far the landings are bent."""
 LEAST_SHIFT = 2e-3
 """Of the stroke: two laws nearer to each other than this agree."""
 
@@ -56,7 +59,8 @@ class StaticLaw:
         up: φ_up, Pa.
         down: φ_down, Pa.
         slides: the landings that it was taken from.
-        residual_m: standard deviation of where a slide lands about the law, m.
+        residual_m: standard deviation of where a slide lands about the law, m: of the landings, or what a valve bent as
+            they are (`local_balance`) does over the middle of the travel, whichever is more.
         covariance: of (κ, φ_up, φ_down); (3, 3).
     """
 
@@ -154,14 +158,26 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     slope, up_pa, down_pa = (scale @ theta).tolist()
     std = np.sqrt(np.diag(covariance))
     reason = _refusal(slope, up_pa + down_pa, std, s, stroke_m)
+    bent_pa = _bent_by_pa(Ratios(-slope, -(up_pa + down_pa) / 2, (up_pa - down_pa) / 2), slides, stroke_m)
     return StaticLaw(
         slope=Estimate(slope, float(std[0]), reason),
         up=Estimate(up_pa, float(std[1]), reason),
         down=Estimate(down_pa, float(std[2]), reason),
         slides=slides,
-        residual_m=s / abs(slope) if slope else inf,
+        residual_m=max(s, bent_pa) / abs(slope) if slope else inf,
         covariance=covariance,
     )
+
+
+def _bent_by_pa(ratios: Ratios, slides: Sequence[SlideOutcome], stroke_m: float) -> float:
+    """Return how far the landings are bent away from the straight law over the middle of the travel, Pa.
+
+    A standard deviation, of the direction in which it is more: landings may crowd where the law holds.
+    """
+    if ratios.b_over_c >= 0.0:
+        return 0.0
+    off_pa = [[bent_by_pa(x * stroke_m, s, ratios, slides, stroke_m) for x in MIDDLE] for s in (1, -1)]
+    return max(sqrt(sum(each**2 for each in one) / len(one)) for one in off_pa)
 
 
 def _slides(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: float) -> npt.NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import pytest
 
 from config.daemon_file import DaemonFile
 from positioner.control.breakaway_memory import LearntPush
-from positioner.control.slide_memory import Margin
+from positioner.control.slide_margins import Margin, Margins
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
@@ -27,7 +27,7 @@ KNOWLEDGE = ValveKnowledge(
     landings=(SLIDE,),
     held=(SLIDE._replace(moved=False, landing=False, time_s=-3.5),),
     answers=Answers(0.04, 1e-7, 2e4),
-    margins=(Margin(5e-3, True, True), Margin(6e-3, False, True)),
+    margins=Margins(Margin(5e-3, 6e-3), turning_down=Margin(0.0, 7e-3)),
     pushes=(LearntPush(1e-3, True), LearntPush(2e-3, False)),
     tracked={"friction_up_n": 1.5e3},
 )
@@ -106,7 +106,7 @@ def test_a_part_of_a_new_file_beside_the_old_one_is_never_read(path: Path) -> No
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda file: file.update(version=2), "version: allowed is 1, got 2"),
+        (lambda file: file.update(version=3), "version: allowed is 2, got 3"),
         (lambda file: file.update(version=True), "has no version"),
         (lambda file: file.update(more=1), "must hold version, sha256 and a content"),
         (lambda file: file["content"].pop("knowledge"), "must hold version, sha256 and a content"),
@@ -144,7 +144,7 @@ def test_another_valves_is_set_aside(path: Path) -> None:
         (replace(KNOWLEDGE, ratios=Ratios(814542.6, -22068.2)), "knowledge.b_over_c_pa_per_m: "),
         (replace(KNOWLEDGE, landings=(SLIDE._replace(time_s=3.0),)), "knowledge.landings.0.time_s: "),
         (replace(KNOWLEDGE, residual_m=-1.0), "knowledge.residual_m: "),
-        (replace(KNOWLEDGE, margins=(Margin(-1.0), Margin())), "knowledge.margins.0.way_m: "),
+        (replace(KNOWLEDGE, margins=Margins(Margin(-1.0))), "knowledge.margins.0.held_m: "),
         (replace(KNOWLEDGE, landings=(SLIDE._replace(direction=0),)), "knowledge.direction: "),
     ],
 )

@@ -1,0 +1,112 @@
+"""Margins: the shortest slides that break a stem loose, as slides teach them.
+
+    m = (F_s - F_c)/k_s               of a slide that goes on in the direction of the last
+      + (F_s + F_c)/k_p - w           of one that turns round: a packing of stiffness k_p gives way, play w is taken up
+
+F_s, F_c of the direction. So there are four: up and down, going on and turning round. None of what stands above is
+known; what is, are the longest way that held the stem and the shortest that broke it loose:
+
+    held < m <= broke                 tried next: sqrt(held broke), until broke is within 10 % of held; then broke
+
+A margin of which little is known is taken for its next of kin.
+"""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+
+LOWER, RAISE = 0.5, 1.3
+"""Factors on a margin as long as no slide has held, and as long as none has broken loose."""
+CLOSE = 1.1
+"""Broke over held: near enough."""
+BESIDE = 1.05
+"""Factor to a bound that an outcome has contradicted."""
+FADES = 0.999
+"""Factor on the longest way that held, with each short slide that breaks loose: friction changes, so in time a shorter
+one is tried again."""
+SHORT = 2.0
+"""Margins: a slide longer than this says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """The longest way that held the stem and the shortest that broke it loose, m; 0: none has."""
+
+    held_m: float = 0.0
+    broke_m: float = 0.0
+
+    @property
+    def way_m(self) -> float:
+        """The way to give, m; 0: nothing is known."""
+        if not self.held_m:
+            return LOWER * self.broke_m
+        if not self.broke_m:
+            return RAISE * self.held_m
+        return sqrt(self.held_m * self.broke_m) if self.broke_m > CLOSE * self.held_m else self.broke_m
+
+    @property
+    def sure_m(self) -> float:
+        """The way that has broken loose, m; where none has, the way to give."""
+        return self.broke_m or self.way_m
+
+    def after_breaking(self, way_m: float) -> "Margin":
+        """Return the margin after a slide of a way, m, that broke loose."""
+        if self.broke_m and way_m > SHORT * self.broke_m:
+            return self
+        held_m = FADES * self.held_m if way_m > self.held_m else way_m / BESIDE
+        return Margin(held_m, min(self.broke_m, way_m) if self.broke_m else way_m)
+
+    def after_holding(self, way_m: float) -> "Margin":
+        """Return the margin after a slide meant to go a way, m, that did not break loose."""
+        if way_m <= 0.0:
+            return self
+        contradicted = 0.0 < self.broke_m <= BESIDE * way_m
+        return Margin(max(self.held_m, way_m), RAISE * way_m if contradicted else self.broke_m)
+
+    def times(self, factor: float) -> "Margin":
+        """Return it so much longer."""
+        return Margin(factor * self.held_m, factor * self.broke_m)
+
+
+UNTRIED = Margin()
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """The four margins: of slides that go on in the direction of the last, and of slides that turn round."""
+
+    onward_up: Margin = UNTRIED
+    onward_down: Margin = UNTRIED
+    turning_up: Margin = UNTRIED
+    turning_down: Margin = UNTRIED
+
+    def own(self, direction: int, *, turning: bool) -> Margin:
+        """Return a margin as it was learnt."""
+        if turning:
+            return self.turning_up if direction > 0 else self.turning_down
+        return self.onward_up if direction > 0 else self.onward_down
+
+    def of(self, direction: int, *, turning: bool) -> Margin:
+        """Return a margin; of one that is known from one side only, the next of kin that agrees says the other."""
+        own = self.own(direction, turning=turning)
+        if own.held_m and own.broke_m:
+            return own
+        kin = ((direction, not turning), (-direction, turning), (-direction, not turning))
+        for s, t in kin:
+            like = self.own(s, turning=t)
+            if like.broke_m > own.held_m and (not own.broke_m or CLOSE * like.way_m < own.broke_m):
+                return Margin(max(like.held_m, own.held_m), like.broke_m)
+        return own
+
+    def replaced(self, direction: int, margin: Margin, *, turning: bool) -> "Margins":
+        """Return them with another in place of one."""
+        if turning:
+            return replace(self, turning_up=margin) if direction > 0 else replace(self, turning_down=margin)
+        return replace(self, onward_up=margin) if direction > 0 else replace(self, onward_down=margin)
+
+    @property
+    def all(self) -> tuple[Margin, Margin, Margin, Margin]:
+        """In the order of the fields."""
+        return self.onward_up, self.onward_down, self.turning_up, self.turning_down
+
+
+NO_MARGINS = Margins()
