@@ -16,7 +16,7 @@ from config.loading import validated
 from config.valve_file import ValveFile, ValveParameters
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
-from sim.kernel import Kernel, kernel
+from sim.kernel import Kernel, QuasiStaticKernel, kernel, quasi_static_kernel
 
 BASE = (
     "mass_kg",
@@ -65,6 +65,11 @@ class Composition:
     def names(self) -> tuple[str, ...]:
         """Name the entries of theta."""
         return BASE + tuple(f"{each.name}.{key}" for each in self.effects for key in each.parameters)
+
+    @property
+    def quasi_static(self) -> QuasiStaticKernel:
+        """The kernel without inertia; compiled when it is first asked for."""
+        return quasi_static_kernel(self.effects)
 
     @property
     def step_s(self) -> float:
