@@ -132,6 +132,7 @@ class FreeRun:
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
         if self.by.slow:
+            self._glide = self._composition.quasi_static.glide
             self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure)
             return
         longest_s = accuracy.steps * self._composition.step_s
@@ -180,7 +181,7 @@ class FreeRun:
             drive_pa = each.drive_pa if each.load_n is None else each.drive_pa + each.load_n / vector[AREA]
             state = self._begin(vector, each.begin, float(self.record.time_s[each.rows[0]]), float(drive_pa[0]))
             path = np.empty((PATH_ROWS, each.rows.size))
-            self._composition.quasi_static.glide(vector, state, drive_pa, each.periods_s, each.told, each.step_s, path)
+            self._glide(vector, state, drive_pa, each.periods_s, each.told, each.step_s, path)
             yield each, path
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
