@@ -105,7 +105,8 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     floor_m = split.floor_m
     if floor_m is None or found.at_floor(floor_m) or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
-    edges = knife_edges(fit.valve, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
+    slow = train if fit.by.slow else None
+    edges = knife_edges(fit.valve, test, held_out_m, floor_m, from_pressure=fit.from_pressure, slow_fit=slow)
     return replace(found, knife_edges=edges, test_rest_rmse_m=rms_without(test.record.time_s, held_out_m, edges))
 
 
