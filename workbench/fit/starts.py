@@ -38,6 +38,7 @@ STATIC_RATIO = (0.0, 0.4)
 DRAWS_REGRESSED, DRAWS_FILE = 40, 12
 ENOUGH_MOVING, ENOUGH_LANDINGS, FEWEST_JUDGED = 20, 6, 12
 REWEIGHED = 3
+SLOWER = 10.0
 STATIC_FACTORS = (1.0, 1.05, 1.2, 1.5)
 EXCESSES = (1.0, 0.5, 0.1)
 """Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
@@ -91,6 +92,8 @@ def effect_starts(
     """
     guesses = guessed_values(added, error.run.record)
     points = [*strengths(added), *guesses]
+    if error.run.by.slow:
+        points += [tuple(_slower(each, value) for each, value in zip(added, values, strict=True)) for values in points]
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
     rounds = any(each.guess == "quantum" for each in added)
     solved = (rounds and guesses[:1]) or points
@@ -105,6 +108,15 @@ def effect_starts(
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
     return starts
+
+
+def _slower(parameter: Parameter, value: float) -> float:
+    """Return a value ten times as slow: where samples lie far apart, effects that show are slower than declared."""
+    if parameter.name.endswith("_per_s"):
+        value /= SLOWER
+    elif parameter.name.endswith("_s"):
+        value *= SLOWER
+    return min(max(value, parameter.least), parameter.most)
 
 
 def weakest_start(error: SimulationError, added: Sequence[Parameter], seed: Vector) -> Place:
