@@ -39,4 +39,5 @@ def eventful(record: Record, drive_pa: Column, first: int, end: int) -> Mask:
     later = np.unique((FIRST * LONGER ** np.arange(MOST_LATER)).astype(np.int64))
     keep = (age < FIRST) | np.isin(age, later[later < count])
     keep[:-1] |= happens[1:]
+    keep[-1] = True
     return np.asarray(keep)

@@ -244,7 +244,7 @@ def _slow_segments(
         keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
         if by.held:
             keep |= eventful(record, drive_pa, first, end)
-        keep[[0, -1]] = True
+        keep[[0, -1]] = True  # a segment has its ends
         rows = first + np.flatnonzero(keep)
         counted = np.flatnonzero(judged[rows])
         following = rows[1:] if at_end else rows[:-1]
