@@ -3,6 +3,7 @@
 Its files:
 
     karnopp, first_order_lag             the equations, and how a step is taken
+    quasi_static                         the same without inertia, for samples farther apart than a slide lasts
     effect, effects                      how an effect is written; those that come along
     kernel, kernel_source                the equations with effects in their places, compiled; the text of that
     interpreted                          the same uncompiled, for what asks a single place

@@ -4,19 +4,19 @@ The parameter vector theta holds the base model's parameters in the order of BAS
 the file; an effect's parameter is named `effect.parameter`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from config.errors import InputError
 from config.loading import validated
 from config.valve_file import ValveFile, ValveParameters
-from sim.effect import Effect, find_effect
-from sim.karnopp import Vector
-from sim.kernel import Kernel, kernel
+from sim.effect import SHIPPED, Effect, find_effect
+from sim.karnopp import MEMORY, Vector
+from sim.kernel import Kernel, QuasiStaticKernel, kernel, quasi_static_kernel
 
 BASE = (
     "mass_kg",
@@ -28,6 +28,7 @@ BASE = (
     "stribeck_velocity_m_per_s",
     "deadzone_ratio",
 )
+T = TypeVar("T")
 MASS, AREA, SPRING, VISCOUS, COULOMB, STATIC, STRIBECK, DEADZONE = range(len(BASE))
 """Where they stand in theta."""
 
@@ -39,9 +40,10 @@ class Composition:
     valve: ValveParameters
     effects: tuple[Effect, ...]
     theta: Vector = field(repr=False)
-    kernel: Kernel = field(repr=False)
     source: str
     """What errors name: the valve file."""
+    _compiled: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    """The kernels that have been asked for."""
 
     @classmethod
     def from_file(cls, file: ValveFile, source: str = "valve file") -> Self:
@@ -59,12 +61,42 @@ class Composition:
         Raises:
             InputError: an effect that stands twice or does not compile, a parameter unknown, missing or out of range.
         """
-        return cls(file.valve, tuple(effects), parameter_vector(file, effects, source), kernel(effects), source)
+        composed = cls(file.valve, tuple(effects), parameter_vector(file, effects, source), source)
+        if any(each.path.parent != SHIPPED for each in effects):
+            # What comes along is known to compile, and is compiled when it is first asked for.
+            kernel(effects)
+        return composed
 
     @property
     def names(self) -> tuple[str, ...]:
         """Name the entries of theta."""
         return BASE + tuple(f"{each.name}.{key}" for each in self.effects for key in each.parameters)
+
+    @property
+    def kernel(self) -> Kernel:
+        """The kernel; compiled when it is first asked for."""
+        return self._kernel("kernel", kernel)
+
+    @property
+    def quasi_static(self) -> QuasiStaticKernel:
+        """The kernel without inertia; compiled when it is first asked for."""
+        return self._kernel("quasi-static", quasi_static_kernel)
+
+    @property
+    def state_size(self) -> int:
+        """Entries of the state vector."""
+        return MEMORY + sum(each.memory for each in self.effects)
+
+    def rest(self, theta: Vector, state: Vector, time_s: float, position_m: float, command_pa: float) -> None:
+        """Set a state at rest, by whichever kernel is there."""
+        ready = self._compiled.get("quasi-static") or self.kernel
+        ready.rest(theta, state, time_s, position_m, command_pa)
+
+    def _kernel(self, name: str, compiled: Callable[[Sequence[Effect]], T]) -> T:
+        if name not in self._compiled:
+            self._compiled[name] = compiled(self.effects)
+        found: T = self._compiled[name]
+        return found
 
     @property
     def step_s(self) -> float:

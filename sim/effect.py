@@ -152,6 +152,17 @@ class Effect:
         return tuple(place for place in PLACES if place in self.functions)
 
     @property
+    def only_in_motion(self) -> bool:
+        """Whether it is a force or friction of the velocity alone: where the stem rests and lands it does not show."""
+        named = {argument for place in AT_STEM for argument in self.functions.get(place, ())}
+        return "v" in named and not self.memory and not named & {"t", "x", "p"}
+
+    @property
+    def in_time(self) -> bool:
+        """Whether its memory is carried on by time: it follows what enters it, late."""
+        return "h" in self.functions.get("advance", ())
+
+    @property
     def written(self) -> str:
         """How a valve file names it: an own effect by its path."""
         return self.name if self.path.parent == SHIPPED else str(self.path)

@@ -25,30 +25,38 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import numba
 
 from config.errors import InputError
-from sim import first_order_lag, karnopp
+from sim import first_order_lag, karnopp, quasi_static
 from sim.effect import Effect, execute
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import kernel_source
 
 BASE = Path(karnopp.__file__)
+SLOW = Path(quasi_static.__file__)
+KARNOPP_IMPORT = re.compile(r"^from sim\.karnopp import \([^)]*\)\n", re.MULTILINE)
+"""What stands in one text with `karnopp.py` need not be imported from it."""
 SHARED = (first_order_lag,)
 """Elements that effects may import; compiled with them."""
 OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
 """numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
 INNER: Mapping[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Of functions that only compiled ones call: to make them callable from Python would take a third of the time."""
-NOT_INLINED = ("bogacki_shampine",)
-"""Left to the compiler to inline: large, and called from two places."""
+NOT_INLINED = ("bogacki_shampine", "push", "balanced", "breaks", "landed", "passed")
+"""Left to the compiler to inline: large, and called from several places."""
 NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
+REST = (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER)
 ENTRIES: Mapping[str, tuple[str, ...]] = {
-    "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
+    "rest": REST,
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
+}
+SLOW_ENTRIES: Mapping[str, tuple[str, ...]] = {
+    "rest": REST,
+    "glide": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
 }
 
 
@@ -70,6 +78,20 @@ class _Respond(Protocol):
     ) -> None: ...
 
 
+class _Glide(Protocol):
+    def __call__(
+        self,
+        theta: Vector,
+        state: Vector,
+        commands: Vector,
+        periods: Vector,
+        told: Vector,
+        longest_step: float,
+        path: Vector,
+        /,
+    ) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Kernel:
     """`rest` and `respond` of `karnopp.py`, compiled with the effects in their places."""
@@ -80,18 +102,52 @@ class Kernel:
     respond: _Respond
 
 
+@dataclass(frozen=True, slots=True)
+class QuasiStaticKernel:
+    """`rest` of `karnopp.py` and `glide` of `quasi_static.py`, compiled with the effects in their places."""
+
+    digest: str
+    state_size: int
+    rest: _Rest
+    glide: _Glide
+
+
 def kernel(effects: Sequence[Effect]) -> Kernel:
     """Return the kernel of the bare valve with these effects, compiled or from the cache.
 
     Raises:
         InputError: an effect's function is not what numba can compile; names its file.
     """
-    sources = tuple((each.path, each.source) for each in effects)
-    return _compiled(_text(effects), sources, MEMORY + sum(each.memory for each in effects))
+    text = _text(effects, BASE.read_text(encoding="utf-8"))
+    digest, compiled = _compiled(text, _sources(effects), tuple(ENTRIES.items()))
+    return Kernel(digest, _state_size(effects), **compiled)
+
+
+def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
+    """Return the same without inertia, for samples farther apart than a slide lasts.
+
+    Raises:
+        InputError: as `kernel`.
+    """
+    slow = KARNOPP_IMPORT.sub("", SLOW.read_text(encoding="utf-8"))
+    text = _text(effects, "\n".join([BASE.read_text(encoding="utf-8"), slow]))
+    digest, compiled = _compiled(text, _sources(effects), tuple(SLOW_ENTRIES.items()))
+    return QuasiStaticKernel(digest, _state_size(effects), **compiled)
+
+
+def _sources(effects: Sequence[Effect]) -> tuple[tuple[Path, str], ...]:
+    return tuple((each.path, each.source) for each in effects)
+
+
+def _state_size(effects: Sequence[Effect]) -> int:
+    return MEMORY + sum(each.memory for each in effects)
 
 
 @cache
-def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int) -> Kernel:
+def _compiled(
+    text: str, sources: tuple[tuple[Path, str], ...], signatures: tuple[tuple[str, tuple[str, ...]], ...]
+) -> tuple[str, dict[str, Any]]:
+    """Return the text's digest and its compiled entries by name."""
     digest = hashlib.sha256(text.encode()).hexdigest()
     module = _module(f"valve_kernel_{digest}")
     file = kernel_file(digest, text)
@@ -101,20 +157,19 @@ def _compiled(text: str, sources: tuple[tuple[Path, str], ...], state_size: int)
         execute(source, path, part.__dict__)
         _inlined(part.__dict__)
         module.__dict__.update({f"{name}_{i}": value for name, value in part.__dict__.items() if name[0] != "_"})
-    entries = {name: getattr(module, name) for name in ENTRIES}
+    entries = {name: getattr(module, name) for name, _ in signatures}
     _inlined(module.__dict__)
     try:
         with _locked(file):
-            compiled = {
-                name: numba.njit(f"void({','.join(ENTRIES[name])})", cache=True, nogil=True, **OPTIONS)(entry)
-                for name, entry in entries.items()
+            return digest, {
+                name: numba.njit(f"void({','.join(signature)})", cache=True, nogil=True, **OPTIONS)(entries[name])
+                for name, signature in signatures
             }
     except Exception as error:
         if not sources:
             raise
         where = ", ".join(str(path) for path, _ in sources)
         raise InputError(where, f"cannot be compiled: {_reason(error)}") from None
-    return Kernel(digest, state_size, **{name: cast(Any, each) for name, each in compiled.items()})
 
 
 def _reason(error: Exception) -> str:
@@ -178,10 +233,10 @@ def _temporary_folder() -> Path:
     return Path(folder.name)
 
 
-def _text(effects: Sequence[Effect]) -> str:
-    """Return the kernel's text."""
+def _text(effects: Sequence[Effect], laws: str) -> str:
+    """Return a kernel's text: the laws, and their places filled."""
     digests = {each.name: hashlib.sha256(each.source.encode()).hexdigest() for each in effects}
     files = (__file__, *(str(each.__file__) for each in SHARED))
     parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
     head = f"# numba {numba.__version__}, {parts}, effects {digests}"
-    return "\n".join([head, BASE.read_text(encoding="utf-8"), kernel_source(effects) if effects else "", ""])
+    return "\n".join([head, laws, kernel_source(effects) if effects else "", ""])

@@ -33,15 +33,17 @@ def kernel_source(effects: Sequence[Effect]) -> str:
             lines += [f"{signal} = {call(place, i, **{signal: signal})}"]
         return lines
 
-    def passed(place: str, signal: str, begins: str, middle: str, ends: str) -> list[str]:
+    def passed(place: str, signal: str, begins: str, middle: str | None, ends: str) -> list[str]:
         lines = []
         for i in at[place]:
-            lines += [f"shown = {call(place, i, **{signal: 'start', 't': begins, 'middle': middle})}"]
+            lines += [f"shown = {call(place, i, **{signal: 'start', 't': begins, 'middle': middle or begins})}"]
             lines += [call("advance", i, before="start", after="end", h="h")] if i in remembering else []
-            lines += [f"end = {call(place, i, **{signal: 'end', 't': ends, 'middle': middle})}", "start = shown"]
+            lines += [f"end = {call(place, i, **{signal: 'end', 't': ends, 'middle': middle or ends})}"]
+            lines += ["start = shown"]
         return lines
 
     through_pressure = passed("pressure", "u", "stem.t", "stem.t + 0.5 * h", "stem.t + h")
+    ends_of_pressure = passed("pressure", "u", "stem.t", None, "stem.t + h")
     through_sensor = passed("sensor", "y", "stem.t - h", "stem.t - 0.5 * h", "stem.t")
 
     return "\n".join(
@@ -55,6 +57,7 @@ def kernel_source(effects: Sequence[Effect]) -> str:
                 "y",
             ),
             _function("pressure(u, h, stem, q, z)", ["start, end = u, u", *through_pressure], "start, end"),
+            _function("pressure_ends(u, h, stem, q, z)", ["start, end = u, u", *ends_of_pressure], "start, end"),
             _function("force(stem, q, z)", [], " + ".join(["0.0", *(call("force", i) for i in at["force"])])),
             _function(
                 "friction(F_c, F_s, direction, stem, q, z)",

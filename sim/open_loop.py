@@ -71,8 +71,8 @@ def at_rest(composition: Composition, theta: Vector, time_s: float, position_m: 
     """
     if not (isfinite(time_s) and isfinite(position_m) and isfinite(pressure_pa)):
         raise ValueError(f"position and pressure must be finite, got {position_m} m and {pressure_pa} Pa")
-    state = np.zeros(composition.kernel.state_size)
-    composition.kernel.rest(theta, state, time_s, position_m, pressure_pa)
+    state = np.zeros(composition.state_size)
+    composition.rest(theta, state, time_s, position_m, pressure_pa)
     return state
 
 

@@ -170,8 +170,9 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
     record = ready(recording)
     require_units(record, valve.valve)
     composition = Composition.from_file(valve)
-    run = FreeRun(composition, record).run(composition.theta)
-    rows = valid_rows(record, run.indicated_m)
+    free = FreeRun(composition, record)
+    run = free.run(composition.theta)
+    rows = valid_rows(record, run.indicated_m) & (free.by.held | free.judged)
     residual_m = np.where(rows, run.indicated_m - record.position_m, np.nan)
     segments = [_segment_findings(valve, record, run, first, end) for first, end in record.segments]
     phase, direction = _spread(record, segments)
@@ -201,8 +202,8 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
     return Comparison(
         adequate=found.adequate,
         sentences=sentences(found),
-        notes=record.notes,
-        fit_percent=fit_percent(record, run.indicated_m),
+        notes=(*record.notes, *([free.by.sentence] if free.by.slow else [])),
+        fit_percent=fit_percent(record, np.where(rows, run.indicated_m, np.nan)),
         rms_m=error_m,
         robust_m=robust(record.time_s[rows], residual_m[rows]),
         noise_m=record.noise_m,

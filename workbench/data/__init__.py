@@ -6,5 +6,7 @@ Its files:
     held_out          what is fitted, and what judges
     noise_floor       what no model explains: noise, rounding, how well the valve repeats itself
     motion            velocity, and the slips
+    plateaus          where the stem rests, of few samples a move
+    stillness         which rows tell something, and which only say it again
     imposed_motion    a bench where a rig imposes the position, and static curves
 """

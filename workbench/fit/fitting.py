@@ -39,7 +39,8 @@ from workbench.fit.strewing import proved, strewn
 from workbench.fit.threads import on_threads
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
-from workbench.model.parameters import DEFAULT, free_parameters
+from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
+from workbench.model.sampling import DYNAMIC, Motion, Sampling, sampling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,6 +110,8 @@ class Fit(Result):
     from_pressure: bool
     seeds: tuple[Vector, ...] = field(repr=False)
     """Parameter vectors at which an effect is added: the best search's, another's that ended elsewhere, the origins."""
+    by: Sampling = DYNAMIC
+    """How the recording was simulated."""
 
     @property
     def trusted(self) -> bool:
@@ -130,6 +133,7 @@ class Fit(Result):
         return [
             f"error {1e3 * self.rms_m:.4g} mm rms, floor {told_mm(self.floor_m)}; {self.agreement} {agreement}",
             parameter_table(self.parameters),
+            *([self.by.sentence] if self.by.slow else []),
             *(f"recording: {note}" for note in shortened(self.notes)),
         ]
 
@@ -143,7 +147,8 @@ class Fit(Result):
 
     def _run(self, record: Record) -> Column:
         composition = Composition.from_file(self.valve)
-        return FreeRun(composition, record, from_pressure=self.from_pressure).position_m(composition.theta)
+        by = self.by.of(record, self.valve.valve)
+        return FreeRun(composition, record, from_pressure=self.from_pressure, by=by).position_m(composition.theta)
 
 
 def fit(
@@ -185,8 +190,8 @@ def fit(
         )
         return _begun(record, valve, effects, ground, free, workers, progress).finished(profile=profile)
     composition = Composition.from_file(valve)
-    error = _error(composition, record, free, from_pressure)
-    origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
+    error = _error(composition, record, free, from_pressure, sampling(record, valve.valve))
+    origins = composition.theta, forces_regressed(composition.theta, record, valve.valve, from_pressure)
     begins = base_starts(error, origins, seed, DRAWS)
     found = _carried(composition, error, begins, OF_BASE, workers, progress).finished(profile=profile)
     return replace(found, seeds=(*found.seeds, *origins))
@@ -208,25 +213,36 @@ def begun_fit(
 def profiled(found: Fit, recording: Recording) -> Fit:
     """Return a fit with the intervals that following its cost gives."""
     composition = Composition.from_file(found.valve)
-    error = _error(composition, ready(recording), tuple(found.parameters), found.from_pressure)
+    error = _error(composition, ready(recording), tuple(found.parameters), found.from_pressure, found.by)
     z = error.coordinates(composition.theta)
     determined = uncertainty(error, z)
     parameters = {each.name: _fitted(error, z, determined, i) for i, each in enumerate(error.parameters)}
     return replace(found, parameters=parameters, condition=determined.condition, undetermined=determined.undetermined)
 
 
+FREE = {Motion.DYNAMIC: DEFAULT, Motion.QUASI_STATIC: AT_REST, Motion.LANDINGS: LANDED}
+"""What of the bare valve is fitted by default."""
+
+
+def _require_shown(effects: Sequence[Effect], by: Sampling) -> None:
+    for each in effects:
+        why = by.left_out(each)
+        if why:
+            raise InputError("recording", f"{each.name} cannot be fitted: it {why}")
+
+
 def _error(
-    composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool
+    composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool, by: Sampling
 ) -> SimulationError:
-    run = FreeRun(composition, record, from_pressure=from_pressure)
+    run = FreeRun(composition, record, from_pressure=from_pressure, by=by)
     reached = [
         f"{each.name}.{key}"
         for each in composition.effects
-        if not (from_pressure and "pressure" in each.functions)
+        if not (from_pressure and "pressure" in each.functions) and not by.left_out(each)
         for key, declared in each.parameters.items()
         if not declared.given
     ]
-    parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free)
+    parameters = free_parameters(composition, [*FREE[by.motion], *reached] if free is None else free)
     return SimulationError(run, composition, parameters, composition.theta)
 
 
@@ -288,7 +304,8 @@ def _begun(
 ) -> "BegunFit":
     """Search with effects added to a base fit, as far as the middling scale."""
     composition = _extended(base.valve, effects, valve.valve)
-    error = _error(composition, record, free, base.from_pressure)
+    _require_shown(composition.effects[len(base.valve.effect) :], base.by)
+    error = _error(composition, record, free, base.from_pressure, base.by)
     names = {find_effect(name, "effects").name for name in effects}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
@@ -398,6 +415,7 @@ class BegunFit:
             error.run.record.notes,
             error.run.from_pressure,
             tuple(error.theta(z) for z in (best, *_elsewhere(found))),
+            error.run.by,
         )
 
     def _never_worse(self) -> "BegunFit":

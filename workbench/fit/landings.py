@@ -176,7 +176,7 @@ class Landings:
         self._landed = tuple(each for each in self._rests if each.direction)
         effects = error.composition.effects
         self._laws = interpreted(effects)
-        self._state = np.zeros(error.composition.kernel.state_size)
+        self._state = np.zeros(error.composition.state_size)
         self._senses = any("sensor" in each.functions for each in effects)
         self._remembers = any(each.memory and "friction" in each.functions for each in effects)
         self.behind_path = any("pressure" in each.functions for each in effects)

@@ -34,10 +34,7 @@ class SimulationError:
         self.composition = composition
         self.parameters = parameters
         self.run = run
-        simulated = np.zeros(len(record), dtype=np.bool_)
-        for first, end in record.segments:
-            simulated[first:end] = True
-        rows = np.flatnonzero(simulated & record.valid)
+        rows = np.flatnonzero(run.judged & record.valid)
         self.count = rows.size
         """Number of valid samples."""
         whole = rows.size == len(record)
@@ -51,8 +48,12 @@ class SimulationError:
 
     @cached_property
     def rough(self) -> "SimulationError":
-        """The same over a simulation of longer steps."""
-        run = FreeRun(self.composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH)
+        """The same over a simulation of longer steps; itself where steps are of a sample."""
+        if self.run.by.slow:
+            return self
+        run = FreeRun(
+            self.composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH, by=self.run.by
+        )
         return SimulationError(run, self.composition, self.parameters, self._theta)
 
     def theta(self, z: Vector) -> Vector:

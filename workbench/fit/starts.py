@@ -5,7 +5,8 @@ draws round both. An effect begins at landings with each of its strengths, and o
 none of them too, so that the extended valve is never worse than the base it extends. What the record's positions
 suggest is in `guesses`.
 
-    A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected
+    A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected; where these
+                                                  say nothing of v (`sampling`), over the landings, without F_v v
 
 Landings say nothing of motion: what they do not hold, F_v, F_s inside its interval and the effect's own dynamics, is
 scanned with the rest kept. Every other rest and those between solve for themselves: two starts without a common
@@ -16,23 +17,29 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from config.valve_file import ValveParameters
 from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.data.motion import directions, velocity_m_per_s
 from workbench.data.record import Record
 from workbench.fit.agreement import Place
-from workbench.fit.descent import MIDDLING, descended, scanned
+from workbench.fit.descent import MIDDLING, WIDE, descended, scanned
 from workbench.fit.guesses import guessed_values
 from workbench.fit.landings import Landings, Rest, rests
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
+from workbench.model.free_run import FreeRun
 from workbench.model.parameters import Parameter, strengths
+from workbench.model.sampling import TOLD, Sampling, landings, sampling
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
 STATIC_RATIO = (0.0, 0.4)
 """Range of the draws of log(F_s / F_c)."""
 DRAWS_REGRESSED, DRAWS_FILE = 40, 12
-ENOUGH_MOVING = 20
+ENOUGH_MOVING, ENOUGH_LANDINGS, FEWEST_JUDGED = 20, 6, 12
+REWEIGHED = 3
+SLOWER = 10.0
+STATIC_FACTORS = (1.0, 1.05, 1.2, 1.5)
 EXCESSES = (1.0, 0.5, 0.1)
 """Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
 AT_BEST, EACH_SEED = 2, 1
@@ -85,6 +92,8 @@ def effect_starts(
     """
     guesses = guessed_values(added, error.run.record)
     points = [*strengths(added), *guesses]
+    if error.run.by.slow:
+        points += [tuple(_slower(each, value) for each, value in zip(added, values, strict=True)) for values in points]
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
     rounds = any(each.guess == "quantum" for each in added)
     solved = (rounds and guesses[:1]) or points
@@ -99,6 +108,15 @@ def effect_starts(
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
     return starts
+
+
+def _slower(parameter: Parameter, value: float) -> float:
+    """Return a value ten times as slow: where samples lie far apart, effects that show are slower than declared."""
+    if parameter.name.endswith("_per_s"):
+        value /= SLOWER
+    elif parameter.name.endswith("_s"):
+        value *= SLOWER
+    return min(max(value, parameter.least), parameter.most)
 
 
 def weakest_start(error: SimulationError, added: Sequence[Parameter], seed: Vector) -> Place:
@@ -130,12 +148,52 @@ def landed_starts(
         added: the parameters of the effects to be added.
         count: how many at most.
     """
+    if error.run.by.slow:
+        return told_starts(error, seeds, points, added, count)
     moving = [i for i, each in enumerate(error.parameters) if each.index in (VISCOUS, STATIC) or each in added]
     return [
         Place(_in_motion(smoothed(error.rough, z), z, moving), origin)
         for origin, chosen in _halves(rests(error.run.record)).items()
         for z in error.screened(_landed(error, Landings(error, chosen), seeds, points, added), count)
     ]
+
+
+def told_starts(
+    error: SimulationError,
+    seeds: Sequence[Vector],
+    points: Sequence[tuple[float, ...]],
+    added: Sequence[Parameter],
+    count: int,
+) -> list[Place]:
+    """Return the same where samples lie farther apart than slides last: each landing by itself, then static friction.
+
+    Told which way the stem went, the model lands by the static balance whatever static friction is: no stairs, so that
+    every strength leads down to the landings' solution. Where landings are all that is judged, that is the search.
+    """
+    if not error.run.by.held:
+        return []
+    run = FreeRun(error.composition, error.run.record, from_pressure=error.run.from_pressure, by=TOLD)
+    landing = tuple(each for each in error.parameters if each.index != STATIC)
+    solved = []
+    for theta in seeds:
+        there = SimulationError(run, error.composition, landing, theta)
+        if there.count < FEWEST_JUDGED:
+            return []
+        for values in points:
+            begin = there.coordinates(_changed(theta, added, values))
+            solved.append(there.theta(descended(there, descended(there, begin, WIDE), MIDDLING)))
+    static = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
+    ratios = [_scaled(theta, STATIC, factor) for theta in solved for factor in STATIC_FACTORS]
+    return [
+        Place(_in_motion(error, z, static), "landings") for z in error.screened(map(error.coordinates, ratios), count)
+    ]
+
+
+def _changed(theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
+    changed = theta.copy()
+    for parameter, value in zip(added, values, strict=True):
+        changed[parameter.index] = value
+    return changed
 
 
 def _halves(found: Sequence[Rest]) -> dict[str, Sequence[Rest]]:
@@ -196,14 +254,14 @@ def _sticking(theta: Vector, part: float) -> Vector:
 
 
 def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
-    changed = theta.copy()
-    for parameter, value in zip(added, values, strict=True):
-        changed[parameter.index] = value
-    return error.coordinates(changed)
+    return error.coordinates(_changed(theta, added, values))
 
 
-def forces_regressed(theta: Vector, record: Record, from_pressure: bool) -> Vector:
+def forces_regressed(theta: Vector, record: Record, valve: ValveParameters, from_pressure: bool) -> Vector:
     """Return theta with k_s, F_v and F_c from the regression where it gives positive ones, F_s in proportion."""
+    by = sampling(record, valve)
+    if by.slow:
+        return _landings_regressed(theta, record, valve, by)
     regressed = theta.copy()
     matrix, force_n = _moving(theta[AREA], record, from_pressure)
     if len(force_n) < ENOUGH_MOVING:
@@ -212,6 +270,28 @@ def forces_regressed(theta: Vector, record: Record, from_pressure: bool) -> Vect
         if value > 0.0:
             regressed[index] = value
     regressed[STATIC] = regressed[COULOMB] * max(1.0, theta[STATIC] / theta[COULOMB]) if theta[COULOMB] else 0.0
+    return regressed
+
+
+def _landings_regressed(theta: Vector, record: Record, valve: ValveParameters, by: Sampling) -> Vector:
+    """Return theta with k_s and F_c from the bare balance of the settled landings, least squares thrice reweighed."""
+    regressed = theta.copy()
+    landed = [each for each, settled in landings(record, valve) if settled]
+    if len(landed) < ENOUGH_LANDINGS:
+        return regressed
+    rows = np.array([max(each.first - by.held, 0) for each in landed])
+    matrix = np.array([(each.position_m, float(each.direction)) for each in landed])
+    force_n = theta[AREA] * record.command_pa[rows]
+    if record.load_n is not None:
+        force_n = force_n + record.load_n[rows]
+    weights = np.ones(rows.size)
+    for _ in range(REWEIGHED):
+        found = np.linalg.lstsq(weights[:, None] * matrix, weights * force_n)[0]
+        left = np.abs(force_n - matrix @ found)
+        weights = (1.0 + (left / max(float(np.median(left)), np.finfo(float).tiny)) ** 2) ** -0.25
+    if (found > 0.0).all():
+        regressed[[SPRING, COULOMB]] = found
+        regressed[STATIC] = found[1] * max(1.0, theta[STATIC] / theta[COULOMB]) if theta[COULOMB] else found[1]
     return regressed
 
 

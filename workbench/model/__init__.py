@@ -3,5 +3,6 @@
 Its files:
 
     free_run      simulates it whole, on the command alone
+    sampling      with inertia, without, or landing by landing: by how far apart the samples are
     parameters    the coordinates of a fit
 """

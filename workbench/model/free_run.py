@@ -10,13 +10,21 @@ rate, begins with the pressure nearest to the first command of those that balanc
 
 Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
 of the measurements at its ends. A measured load acts as the pressure load / A besides.
+
+Where samples lie farther apart than slides last (`sampling`), the stem has no inertia, the pressure of a period is the
+measured one at its end, and rows in which nothing happens are passed over (`stillness`): between a command long held
+and the next one, with the measured stem at rest, only some are simulated and judged. Where the command changed between
+samples, that of a period is the one at its end, the measured positions say which way the stem went, and only rests that
+a slide ended in are judged.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from config.errors import InputError
 from config.recording import Column
@@ -25,7 +33,10 @@ from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from sim.karnopp import SLIP, Vector, read, write
 from sim.open_loop import INDICATED, PATH_ROWS, at_rest, checked_commands, checked_periods, checked_step
-from workbench.data.record import Record
+from sim.quasi_static import FREE
+from workbench.data.record import Mask, Record
+from workbench.data.stillness import eventful
+from workbench.model.sampling import Motion, Sampling, landings, sampling
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +63,12 @@ LONGEST_START = 50
 """Samples of the start that are averaged at most."""
 SHORT = 4
 """Samples within which a stem that leaves its place is in motion from the start."""
+
+
+CASCADE = 16
+"""Steps to a sample where effects of the pressure path with a memory follow each other, without inertia."""
+JUDGED = 10
+"""Samples of a landing that are judged at most: a long rest knows no more than its beginning."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -97,32 +114,75 @@ class FreeRun:
     """
 
     def __init__(
-        self, composition: Composition, record: Record, *, from_pressure: bool = False, accuracy: Accuracy = FINE
+        self,
+        composition: Composition,
+        record: Record,
+        *,
+        from_pressure: bool = False,
+        accuracy: Accuracy = FINE,
+        by: Sampling | None = None,
     ) -> None:
         self.record = record
+        self.by = by or sampling(record, composition.valve)
         self._tolerance = accuracy.tolerance
         self.from_pressure = from_pressure
         everything = (composition, list(range(len(composition.names))))
         self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
-        drive_pa = _measured(record) if from_pressure else record.command_pa
+        drive_pa = _measured(record, self.by) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
+        if self.by.slow:
+            self._glide = self._composition.quasi_static.glide
+            self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure)
+            return
         longest_s = accuracy.steps * self._composition.step_s
         self._segments = [_segment(record, drive_pa, first, end, longest_s) for first, end in record.segments]
+
+    @property
+    def judged(self) -> Mask:
+        """Which rows are simulated and tell how good the model is, (n,)."""
+        rows = np.zeros(len(self.record), dtype=np.bool_)
+        for first, end in self.record.segments:
+            rows[first:end] = True
+        if self.by.slow:
+            rows[:] = False
+            for each in self._slow:
+                rows[each.judged] = True
+        return rows
 
     def run(self, theta: Vector) -> Run:
         """Simulate; theta, (parameters,), as `composition.names`."""
         rows = np.full((4, len(self.record)), np.nan)
+        if self.by.slow:
+            for each, (_, pressure_pa, stem_m, velocity_m_per_s, indicated_m) in self._glides(theta):
+                held = np.searchsorted(each.rows, np.arange(each.rows[0], each.rows[-1] + 1), side="right") - 1
+                path = np.array([indicated_m, stem_m, velocity_m_per_s, pressure_pa])
+                rows[:, each.rows[0] : each.rows[-1] + 1] = path[:, held]
+            return Run(*rows)
         for first, end, (_, pressure_pa, stem_m, velocity_m_per_s, indicated_m) in self._paths(theta):
             rows[:, first:end] = indicated_m, stem_m, velocity_m_per_s, pressure_pa
         return Run(*rows)
 
     def position_m(self, theta: Vector) -> Column:
-        """Return the indicated position, m, (n,)."""
+        """Return the indicated position, m, (n,); NaN where it is not simulated or not judged."""
         indicated_m = np.full(len(self.record), np.nan)
+        if self.by.slow:
+            for each, path in self._glides(theta):
+                indicated_m[each.judged] = path[INDICATED, each.at]
+            return indicated_m
         for first, end, path in self._paths(theta):
             indicated_m[first:end] = path[INDICATED]
         return indicated_m
+
+    def _glides(self, theta: Vector) -> Iterator[tuple["SlowSegment", Vector]]:
+        """Simulate each segment without inertia: it, and what the kernel writes, (5, rows kept)."""
+        vector = np.array(theta[self._kept])
+        for each in self._slow:
+            drive_pa = each.drive_pa if each.load_n is None else each.drive_pa + each.load_n / vector[AREA]
+            state = self._begin(vector, each.begin, float(self.record.time_s[each.rows[0]]), float(drive_pa[0]))
+            path = np.empty((PATH_ROWS, each.rows.size))
+            self._glide(vector, state, drive_pa, each.periods_s, each.told, each.step_s, path)
+            yield each, path
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
         """Simulate each segment: its rows and what the kernel writes, (5, rows)."""
@@ -149,6 +209,64 @@ class FreeRun:
         return state
 
 
+class SlowSegment(NamedTuple):
+    """A stretch of a record without a gap, as it is simulated without inertia."""
+
+    rows: npt.NDArray[np.int64]
+    """Of the record that are simulated, ascending."""
+    judged: npt.NDArray[np.int64]
+    """Of the record that count in the error,"""
+    at: npt.NDArray[np.int64]
+    """and where they stand among those that are simulated."""
+    begin: InitialState
+    drive_pa: Vector
+    """Of each period from one of the rows to the next, Pa."""
+    load_n: Vector | None
+    """The same of a measured load, N."""
+    periods_s: Vector
+    told: Vector
+    """Of each period, as `sim.quasi_static` takes it."""
+    step_s: float
+    """Longest, s."""
+
+
+def _slow_segments(
+    record: Record, composition: Composition, drive_pa: Column, by: Sampling, from_pressure: bool
+) -> list[SlowSegment]:
+    at_end = from_pressure or not by.held
+    remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
+    step_s = record.period_s / CASCADE if remembering > 1 else inf
+    told, judged = np.full(len(record), FREE), np.ones(len(record), np.bool_)
+    if by.motion is Motion.LANDINGS:
+        told, judged = _told(record, composition)
+    found = []
+    for first, end in record.segments:
+        keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
+        if by.held:
+            keep |= eventful(record, drive_pa, first, end)
+        keep[[0, -1]] = True  # a segment has its ends
+        rows = first + np.flatnonzero(keep)
+        counted = np.flatnonzero(judged[rows])
+        following = rows[1:] if at_end else rows[:-1]
+        held_pa = checked_commands(drive_pa[following])
+        load_n = None if record.load_n is None else checked_commands(record.load_n[following])
+        periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
+        begin = initial_state(record, first, end, moving=False)
+        found.append(
+            SlowSegment(rows, rows[counted], counted, begin, held_pa, load_n, periods_s, told[rows[1:]], step_s)
+        )
+    return found
+
+
+def _told(record: Record, composition: Composition) -> tuple[Column, Mask]:
+    """Return the direction in which the stem went in the sample before each row, and which rows are judged, (n,)."""
+    told, judged = np.zeros(len(record)), np.zeros(len(record), np.bool_)
+    for plateau, settled in landings(record, composition.valve):
+        told[plateau.first] = plateau.direction
+        judged[plateau.first : min(plateau.end, plateau.first + JUDGED)] = settled
+    return told, judged
+
+
 def _segment(record: Record, drive_pa: Column, first: int, end: int, longest_s: float) -> Segment:
     held_pa = checked_commands(drive_pa[first : end - 1])
     load_n = None if record.load_n is None else checked_commands(record.load_n[first : end - 1])
@@ -166,17 +284,17 @@ def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, co
     return float(min(max(command_pa, least_pa), most_pa))
 
 
-def initial_state(record: Record, first: int, end: int) -> InitialState:
-    """Return where a segment begins, from its first valid samples."""
+def initial_state(record: Record, first: int, end: int, *, moving: bool = True) -> InitialState:
+    """Return where a segment begins, from its first valid samples; at rest unless it may be moving."""
     rows = first + np.flatnonzero(record.valid[first:end])
     if not rows.size:
         raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
     position_m = record.position_m[rows[:LONGEST_START]]
     time_s = record.time_s[rows[:LONGEST_START]]
     band_m = STILL * record.scale_m
-    moving = np.abs(position_m - position_m[0]) > 2.0 * band_m
-    still = int(moving.argmax()) if moving.any() else position_m.size
-    if still >= SHORT or position_m.size < SHORT:
+    away = np.abs(position_m - position_m[0]) > 2.0 * band_m
+    still = int(away.argmax()) if away.any() else position_m.size
+    if still >= SHORT or position_m.size < SHORT or not moving:
         return InitialState(float(np.median(position_m[: max(1, still - 1)])), 0.0)
     slope, place = np.polyfit(time_s[:SHORT] - time_s[0], position_m[:SHORT], 1)
     return InitialState(float(place), float(slope))
@@ -194,9 +312,11 @@ def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:
     return bare, [composition.names.index(name) for name in bare.names]
 
 
-def _measured(record: Record) -> Column:
+def _measured(record: Record, by: Sampling) -> Column:
     if record.pressure_pa is None:
         raise InputError("recording", "has no measured pressure_pa to simulate from")
+    if by.slow:
+        return record.pressure_pa
     following = np.append(record.pressure_pa[1:], record.pressure_pa[-1])
     return np.asarray(0.5 * (record.pressure_pa + following))
 

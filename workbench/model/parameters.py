@@ -19,6 +19,8 @@ from sim.karnopp import Vector
 
 DEFAULT = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
 """What is free of the base model by default. A is fixed: pressure and position give only ratios of forces."""
+AT_REST, LANDED = ("spring_n_per_m", "coulomb_n", "static_n"), ("spring_n_per_m", "coulomb_n")
+"""The same where the stem has no inertia, and where only its landings are judged."""
 FACTOR = 50.0
 """A base parameter is sought within this factor of the valve file's."""
 MOST_STATIC = 5.0

@@ -1,6 +1,7 @@
 """How far a fit is off, on what was fitted and on what was held out, second by second.
 
-    l_b = log rms of the error in block b      blocks of 1 s: within one the errors hang together
+    l_b = log rms of the error in block b      blocks of 1 s, and of ten samples at least: within one the errors hang
+                                               together
     d_b = l_b(base) - l_b(candidate)           held within +-log 2
     reduction = 1 - exp(-mean d_b),            its standard error from the spread of d_b over the blocks
     rho = corr(r_i, r_i+1),  (1 - rho) / (1 + rho) of the samples are independent
@@ -17,12 +18,12 @@ import numpy as np
 
 from config.recording import Column
 from config.results.result import Brief
-from workbench.data.held_out import Split, residual_m
+from workbench.data.held_out import Part, Split, residual_m
 from workbench.fit.fitting import Fit
 from workbench.select.knife_edges import KnifeEdge, knife_edges, rms_without
 from workbench.select.residual_structure import clipped, structure
 
-BLOCK_S = 1.0
+BLOCK_S, BLOCK_SAMPLES = 1.0, 10
 AT_FLOOR, RARELY_OFF = 1.4, 1.75
 """A model reaches the floor if its block error, and its plain error fitted and held out, are within these of it.
 
@@ -86,8 +87,8 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     fitted_m = residual_m(train, fit.predict(train.recording))
     held_out_m = residual_m(test, fit.predict(test.recording))
     rows = np.isfinite(held_out_m)
-    fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m)
-    logs = block_logs(test.record.time_s, held_out_m, negligible_m)
+    fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m, _block_s(train))
+    logs = block_logs(test.record.time_s, held_out_m, negligible_m, _block_s(test))
     test_rmse_m = float(np.sqrt(np.mean(held_out_m[rows] ** 2)))
     found = BlockErrors(
         train_rmse_m=fit.rms_m,
@@ -104,20 +105,26 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     floor_m = split.floor_m
     if floor_m is None or found.at_floor(floor_m) or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
-    edges = knife_edges(fit.valve, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
+    slow = train if fit.by.slow else None
+    edges = knife_edges(fit.valve, test, held_out_m, floor_m, from_pressure=fit.from_pressure, slow_fit=slow)
     return replace(found, knife_edges=edges, test_rest_rmse_m=rms_without(test.record.time_s, held_out_m, edges))
 
 
-def block_logs(time_s: Column, error_m: Column, negligible_m: float) -> Column:
-    """Return l_b, the log rms of the error in each block of 1 s that has samples which count, (blocks,).
+def _block_s(part: Part) -> float:
+    return max(BLOCK_S, BLOCK_SAMPLES * part.record.period_s)
+
+
+def block_logs(time_s: Column, error_m: Column, negligible_m: float, block_s: float = BLOCK_S) -> Column:
+    """Return l_b, the log rms of the error in each block that has samples which count, (blocks,).
 
     Args:
         time_s: time, s, (samples,).
         error_m: simulated less measured position, m, (samples,); NaN where a sample does not count.
         negligible_m: added in quadrature, m, so that what is far below it makes no difference.
+        block_s: length of a block, s.
     """
     rows = np.flatnonzero(np.isfinite(error_m))
-    _, block = np.unique(np.floor((time_s[rows] - time_s[0]) / BLOCK_S), return_inverse=True)
+    _, block = np.unique(np.floor((time_s[rows] - time_s[0]) / block_s), return_inverse=True)
     squares = np.bincount(block, error_m[rows] ** 2) / np.bincount(block)
     return np.asarray(0.5 * np.log(squares + negligible_m**2 + np.finfo(float).tiny))
 

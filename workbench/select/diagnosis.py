@@ -4,8 +4,8 @@ The search (`effect_search`) adds effects one after another. From the fit and th
 accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all steps the verdict and its sentence.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from os import cpu_count
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from config.valve_file import ValveFile
 from sim.effect import find_effect, shipped_effects
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
+from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
@@ -41,6 +42,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     experiment: Experiment | None
     split: Split
     sentence: str
+    unseen: Mapping[str, str] = field(default_factory=dict)
+    """Effects that were not tried, and why a recording sampled like this one cannot show them."""
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -51,6 +54,9 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         """Say the verdict, what was tried in each step, and what the recordings would not show."""
         sentence = self.sentence.removeprefix("Missing: ") if self.verdict == "missing" else self.sentence
         said: list[Block] = [f"{self.verdict}: {sentence}"]
+        if self.best.fit.by.slow:
+            said.append(self.best.fit.by.sentence)
+        said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         for number, step in enumerate(self.steps, start=1):
             errors = step.before.errors
             title = (
@@ -75,6 +81,13 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
         tried = [_tried(each) for each in step.candidates]
         return draw_race(tried, chosen, step.before.errors.test_rmse_m, self.split.floor_m, MILLIMETRES)
+
+
+def _by_reason(unseen: Mapping[str, str]) -> dict[str, list[str]]:
+    reasons: dict[str, list[str]] = {}
+    for name, why in unseen.items():
+        reasons.setdefault(why, []).append(name)
+    return reasons
 
 
 def _tried(each: EffectCandidate) -> Tried:
@@ -114,7 +127,9 @@ def diagnose(
     parts = split([recording] if isinstance(recording, Recording) else recording, test)
     there = {each.name for each in valve.effect}
     named = [find_effect(name, "effects") for name in (shipped_effects() if effects is None else effects)]
-    library = {each.written: each for each in named if each.written not in there}
+    by = sampling(parts.train.record, valve.valve)
+    unseen = {each.written: by.left_out(each) for each in named if by.left_out(each)}
+    library = {each.written: each for each in named if each.written not in there and each.written not in unseen}
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
     search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell)
@@ -138,4 +153,5 @@ def diagnose(
         experiment=search.experiment(steps) if found == "one_of" else None,
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts),
+        unseen=unseen,
     )

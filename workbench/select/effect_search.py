@@ -163,7 +163,7 @@ class EffectSearch:
     def _local_minimum(self, base: Fit, valve: ValveFile) -> float:
         """Return the cost at which a search from this valve's parameters ends."""
         composition = Composition.from_file(valve)
-        run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure)
+        run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure, by=base.by)
         parameters = free_parameters(composition, tuple(base.parameters))
         error = SimulationError(run, composition, parameters, composition.theta)
         return error.cost(descended(error, error.coordinates(composition.theta), NARROW))

@@ -22,6 +22,7 @@ from workbench.data.held_out import Part, Split, residual_m, split
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import Fit, fit
 from workbench.model.free_run import FreeRun
+from workbench.model.sampling import Sampling
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import Gain, gain
@@ -80,6 +81,7 @@ class Extension(Result):
             "rms",
             Table(("error, mm rms", "fitted", "held out"), rows),
             parameter_table(self.extended.parameters),
+            *([self.extended.by.sentence] if self.extended.by.slow else []),
         ]
 
     def frame_columns(self) -> dict[str, list[object]]:
@@ -100,8 +102,7 @@ class Extension(Result):
             ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
             (f"with {', '.join(self.effects)}", self.extended, self.extended_errors, BETTER),
         ):
-            composition = Composition.from_file(found.valve)
-            error_m = residual_m(part, FreeRun(composition, part.record).position_m(composition.theta))
+            error_m = residual_m(part, found.predict(part.recording))
             label = f"{name}: {1e3 * errors.test_rmse_m:.3g} mm rms"
             line(axes, part.record.time_s - part.record.time_s[0], 1e3 * error_m, colour, label)
         axes.set_xlabel("time, s")
@@ -154,8 +155,8 @@ def extend(
     before_errors, after_errors = block_errors(before, on), block_errors(after, on)
     return Extension(
         effects=tuple(effects),
-        given_train_rmse_m=_rmse_m(valve, on.train),
-        given_test_rmse_m=_rmse_m(valve, on.test),
+        given_train_rmse_m=_rmse_m(valve, on.train, before.by),
+        given_test_rmse_m=_rmse_m(valve, on.test, before.by),
         refitted=before,
         refitted_errors=before_errors,
         extended=after,
@@ -175,8 +176,8 @@ def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
     before, after, on = diagnosis.base, diagnosis.best, diagnosis.split
     return Extension(
         effects=diagnosis.missing,
-        given_train_rmse_m=_rmse_m(valve, on.train),
-        given_test_rmse_m=_rmse_m(valve, on.test),
+        given_train_rmse_m=_rmse_m(valve, on.train, before.fit.by),
+        given_test_rmse_m=_rmse_m(valve, on.test, before.fit.by),
         refitted=before.fit,
         refitted_errors=before.errors,
         extended=after.fit,
@@ -186,7 +187,8 @@ def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
     )
 
 
-def _rmse_m(valve: ValveFile, part: Part) -> float:
+def _rmse_m(valve: ValveFile, part: Part, by: Sampling) -> float:
     composition = Composition.from_file(valve)
-    error_m = residual_m(part, FreeRun(composition, part.record).position_m(composition.theta))
+    run = FreeRun(composition, part.record, by=by.of(part.record, valve.valve))
+    error_m = residual_m(part, run.position_m(composition.theta))
     return float(np.sqrt(np.nanmean(error_m**2)))

@@ -30,6 +30,8 @@ AT_MOST, FELL = 1.75, 0.2
 """Floors that may be left; or of the error that there was."""
 CLOSED_S = 0.2
 CHANGES, MOST_CHANGE = (0.001, 0.0025, 0.005, 0.01), 0.02
+WIDEST, INTERVAL = 0.1, 2.0
+"""Of static friction: its interval at the most, and times the number of slips."""
 MOST_SHARE = 0.1
 """Of the slips held out; one may always be."""
 
@@ -56,7 +58,7 @@ class KnifeEdge(Brief):
 
 
 def knife_edges(
-    valve: ValveFile, part: Part, error_m: Column, floor_m: float, *, from_pressure: bool
+    valve: ValveFile, part: Part, error_m: Column, floor_m: float, *, from_pressure: bool, slow_fit: Part | None = None
 ) -> tuple[KnifeEdge, ...]:
     """Return the stretches of a held-out error that are knife edges, in order; none if they are too many.
 
@@ -66,12 +68,15 @@ def knife_edges(
         error_m: the fit's error on it, simulated less measured, m, (n,), NaN where a sample does not count.
         floor_m: what no model undercuts.
         from_pressure: whether the fit runs from the measured pressure.
+        slow_fit: what was fitted where samples lie farther apart than slides last: static friction is known to an
+            interval that falls with the number of its slips, 2 / slips of it.
     """
+    widest = min(WIDEST, INTERVAL / max(1, _slips(slow_fit))) if slow_fit else 0.0
     stretches = list(_stretches(part, error_m, LARGE * floor_m))
     allowed = max(1, int(MOST_SHARE * _slips(part)))
     found: dict[tuple[int, int], KnifeEdge] = {}
     time_s = part.record.time_s
-    for name, change in _changes():
+    for name, change in _changes(widest):
         if len(found) == len(stretches):
             break
         changed = _changed(valve, name, change)
@@ -99,11 +104,13 @@ def rms_without(time_s: Column, error_m: Column, edges: tuple[KnifeEdge, ...]) -
     return _rms(error_m[kept])
 
 
-def _changes() -> Iterator[tuple[str, float]]:
-    """Yield what is changed and by what part, the smallest changes first."""
+def _changes(widest: float) -> Iterator[tuple[str, float]]:
+    """Yield what is changed and by what part, the smallest changes first; static friction up to the widest."""
     for size in (*CHANGES, MOST_CHANGE):
         for name in ("static_n", "coulomb_n"):
             yield from ((name, size), (name, -size))
+    for size in (size for size in (0.5 * widest, widest) if size > MOST_CHANGE):
+        yield from (("static_n", size), ("static_n", -size))
 
 
 def _changed(valve: ValveFile, name: str, change: float) -> ValveFile | None:

@@ -44,7 +44,7 @@ def preview(
     """Rank the effects by their tangents on the fitted part, best first, on so many threads, by default one a core."""
     record = split.train.record
     composition = Composition.from_file(base.valve)
-    run = FreeRun(composition, record, from_pressure=base.from_pressure)
+    run = FreeRun(composition, record, from_pressure=base.from_pressure, by=base.by)
     parameters = free_parameters(composition, tuple(base.parameters))
     error = SimulationError(run, composition, parameters, composition.theta)
     z = error.coordinates(composition.theta)
@@ -77,6 +77,6 @@ def _tangents(base: Fit, effect: Effect, name: str, record: Record, bare: Series
     for values in effect.strengths(valve.valve)[:TRIED]:
         table = EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, values, strict=True))})
         extended = Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, table)))
-        run = FreeRun(extended, record, from_pressure=base.from_pressure)
+        run = FreeRun(extended, record, from_pressure=base.from_pressure, by=base.by)
         tangents.append(np.nan_to_num(run.position_m(extended.theta) - bare))
     return tangents

@@ -1,0 +1,156 @@
+"""How a record is simulated: by how far apart its samples are, and by whether its command changed between them.
+
+    t_s = tau log(L / sigma)      a slide over the stroke L comes to within the noise sigma of its end in that time
+    tau = F_v / k_s, or 2 m / F_v where that is longer
+
+dynamic       samples closer than t_s: with inertia
+quasi-static  samples farther apart: without (`sim.quasi_static`), a step a sample
+landings      the same, and the command changed between samples, perhaps several times: a stem that moves in the very
+              sample in which the recorded command changes began before it could have known. What the pressure did
+              meanwhile is not known, so the measured positions say when the stem went which way, and the model where
+              it lands, by the pressure of the rest. Only rests are judged.
+
+A movement that begins from rest is early if the recorded command goes its way by more in this sample than it did in the
+two before together: as a held command that acts from its sample on never makes it.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import log
+from typing import NamedTuple
+
+import numpy as np
+
+from config.recording import Column
+from config.valve_file import ValveParameters
+from sim.effect import Effect
+from workbench.data.plateaus import Plateau, plateaus
+from workbench.data.record import Record
+
+EARLY, FEWEST_EARLY = 0.3, 3
+"""Share and number of movements that begin early, from which the command changed between samples."""
+MOVED = 6.0
+"""Noises by which a stem that left its rest has moved."""
+NEGLIGIBLE_N = 0.02
+"""Of F_c: a change of the pressure force that moves nothing."""
+ALIKE = 0.05
+"""Relative difference of the periods of records that are sampled alike."""
+SETTLED_M = 3.0
+"""Noises, or that share of F_c, that a rest may shift with what the pressure still does in its first samples."""
+
+
+class Motion(StrEnum):
+    """How it is simulated."""
+
+    DYNAMIC = "dynamic"
+    QUASI_STATIC = "quasi-static"
+    LANDINGS = "landings"
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """How a record is simulated, and a sentence why."""
+
+    motion: Motion
+    sentence: str
+    held: bool = True
+    """Whether a command acts from its sample on until the next; else it is known at its sample alone."""
+    period_s: float = 0.0
+    """Of the record that it was chosen for."""
+
+    @property
+    def slow(self) -> bool:
+        """Whether the stem is simulated without inertia."""
+        return self.motion is not Motion.DYNAMIC
+
+    def of(self, other: Record, valve: ValveParameters) -> "Sampling":
+        """Return how another record is simulated: as this one if it is sampled alike."""
+        return self if abs(other.period_s - self.period_s) <= ALIKE * self.period_s else sampling(other, valve)
+
+    def left_out(self, effect: Effect) -> str:
+        """Say why an effect cannot show in a record of such a sampling; empty if it can."""
+        if self.slow and effect.only_in_motion:
+            return "acts on a moving stem alone, and the samples lie farther apart than slides last"
+        if not self.held and effect.in_time:
+            return "acts in time, and what happened between samples is not known"
+        return ""
+
+
+DYNAMIC = Sampling(Motion.DYNAMIC, "")
+TOLD = Sampling(Motion.LANDINGS, "every rest judged by itself")
+"""Of a held command: where the stem lands if it went as the measured one did."""
+
+
+def sampling(record: Record, valve: ValveParameters) -> Sampling:
+    """Choose how a record of a valve is simulated."""
+    period_s, slide_s = record.period_s, slide_time_s(valve, record.scale_m)
+    if not period_s > slide_s:
+        return replace(DYNAMIC, period_s=period_s)
+    why = f"samples every {period_s:.3g} s cannot see slides of {slide_s:.2g} s"
+    early, begun = _early(record, valve)
+    if early < max(FEWEST_EARLY, EARLY * begun):
+        return Sampling(Motion.QUASI_STATIC, f"simulated without inertia, a step a sample: {why}", True, period_s)
+    found = landings(record, valve)
+    judged = sum(each.settled for each in found)
+    return Sampling(
+        Motion.LANDINGS,
+        f"the command changed between samples ({early} of {begun} movements began before the command that is recorded "
+        f"with their start): the pressure in between is not known, so the model is held against {judged} landings of "
+        f"{len(found)}, by the pressure at rest, without inertia: {why}",
+        False,
+        period_s,
+    )
+
+
+def slide_time_s(valve: ValveParameters, noise_m: float) -> float:
+    """Return t_s, s; infinite for a stem that nothing damps or brings back."""
+    if not (valve.viscous_ns_per_m > 0.0 and valve.spring_n_per_m > 0.0):
+        return np.inf
+    slowest_s = max(valve.viscous_ns_per_m / valve.spring_n_per_m, 2.0 * valve.mass_kg / valve.viscous_ns_per_m)
+    return slowest_s * log(max(valve.stroke_m / (noise_m or 1e-6 * valve.stroke_m), np.e))
+
+
+def _early(record: Record, valve: ValveParameters) -> tuple[int, int]:
+    """Return how many movements from rest begin early, and how many there are."""
+    early = begun = 0
+    least_pa = NEGLIGIBLE_N * valve.coulomb_n / valve.diaphragm_area_m2
+    for each in _plateaus(record):
+        last = each.end - 1
+        end = _segment_end(record, last)
+        if each.end >= end or each.first > last - 2:
+            continue
+        way = np.sign(record.position_m[each.end] - each.position_m)
+        if not abs(record.position_m[each.end] - each.position_m) > MOVED * record.scale_m:
+            continue
+        now_pa = way * float(record.command_pa[last + 1] - record.command_pa[last])
+        before_pa = way * float(record.command_pa[last] - record.command_pa[last - 2])
+        begun += 1
+        early += now_pa > max(before_pa, 0.0) + least_pa
+    return early, begun
+
+
+def _segment_end(record: Record, row: int) -> int:
+    return next(end for first, end in record.segments if first <= row < end)
+
+
+class Landing(NamedTuple):
+    """A plateau that a slide ended in; whether the pressure had settled then."""
+
+    plateau: Plateau
+    settled: bool
+
+
+def landings(record: Record, valve: ValveParameters) -> tuple[Landing, ...]:
+    """Return the landings of a record, in order."""
+    allowed_n = max(SETTLED_M * record.scale_m * valve.spring_n_per_m, NEGLIGIBLE_N * valve.coulomb_n)
+    pressure_pa = record.command_pa if record.pressure_pa is None else record.pressure_pa
+    return tuple(
+        Landing(each, float(np.ptp(pressure_pa[each.first : each.first + 2])) * valve.diaphragm_area_m2 <= allowed_n)
+        for each in _plateaus(record)
+        if each.direction
+    )
+
+
+def _plateaus(record: Record) -> list[Plateau]:
+    position_m: Column = np.where(record.valid, record.position_m, np.nan)
+    return [each for first, end in record.segments for each in plateaus(position_m[first:end], record.scale_m, first)]
