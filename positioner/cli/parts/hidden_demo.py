@@ -1,10 +1,11 @@
 """`demo --hidden`: what the workbench finds in the daemon's own recording, put to work on the stem.
 
 The simulated valve is the seed's with an effect that only its own file names. The daemon, which knows the stroke,
-identifies it by slides and makes some steps; its recording is diagnosed, starting from the seed's valve file, with a
-few effects to choose among; the valve file is extended by what was found; a daemon with `[law] valve` makes the same
-steps, identifying nothing. Slave and daemons are processes on the bus that `--bus` names, in lockstep: a busy machine
-changes nothing. The sensor has no effect of its own, so that the mean of what is indicated is where the stem is.
+identifies it by slides and makes some steps by the seed's law (that of slides finds such an effect by where its slides
+land, and needs no file); its recording is diagnosed, starting from the seed's valve file, with a few effects to choose
+among; the valve file is extended by what was found; a daemon with `[law] valve` makes the same steps, identifying
+nothing. Slave and daemons are processes on the bus that `--bus` names, in lockstep: a busy machine changes nothing. The
+sensor has no effect of its own, so that the mean of what is indicated is where the stem is.
 """
 
 import time
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 HIDDEN = {"name": "position_friction", "growth": 0.6, "travel_m": STROKE_M}
 CANDIDATES = ("position_friction", "spring_hardening", "asymmetric_friction", "preload")
-STEPS = (0.65, 0.642, 0.50, 0.512, 0.72, 0.70, 0.45, 0.46, 0.60, 0.597)
+STEPS = (0.65, 0.50, 0.72, 0.45, 0.60, 0.35, 0.55, 0.40, 0.68, 0.52)
 PERIOD_S = 5e-3
 STEP_S, SETTLED_S = 0.8, 0.1
 """Time for each; its error is the mean over the last part of it."""
@@ -34,7 +35,9 @@ BETTER_BY = 3.0
 LARGEST_AFTER = 1e-3
 """Of the stroke, rms: what must be left at the most once the effect is known."""
 DAEMON = """[control]
-law = "slides"
+law = "seed"
+[excitation]
+kind = "staircase"
 [recorder]
 folder = "{recordings}"
 """
