@@ -10,6 +10,8 @@ It defines
     STEP_S = h                      longest step over which its memory comes out well, s; FINE_STEP_S if not given, and
                                     any step without a memory
     LOOKS = text                    what it looks like in a record
+    AFTER = name                    effect that a search tries first: this one only where that has evidence and leaves
+                                    something to explain
     CONFOUNDED = {name: text}       effects and parameters of the bare valve that look alike, and what record tells
                                     them apart; an empty text: none of pressure and position does
 
@@ -139,6 +141,8 @@ class Effect:
     """The first indented lines of its docstring."""
     looks: str
     confounded: Mapping[str, str]
+    after: str
+    """The effect that a search tries before it; empty: it is tried from the first."""
     in_balance: bool
     """Whether solving the balance at rest undoes it ..."""
     inverse: Callable[[Sequence[float]], Inverse] | None
@@ -214,6 +218,11 @@ def shipped_effects() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob("[!_]*.py"))
 
 
+def first_effects() -> list[str]:
+    """Return the names of those of them that a search tries from the first."""
+    return [name for name in shipped_effects() if not shipped_effect(name, "shipped effects").after]
+
+
 def shipped_effect(name: str, source: str) -> Effect:
     """Return an effect that comes with the package.
 
@@ -270,6 +279,7 @@ def _declared(path: Path, source: str) -> Effect:
         equation=_equation(said),
         looks=namespace.get("LOOKS", ""),
         confounded=namespace.get("CONFOUNDED", {}),
+        after=namespace.get("AFTER", ""),
         in_balance="INVERSE" in namespace,
         inverse=_inverse(path, namespace),
         path=path,
@@ -349,8 +359,9 @@ def _check_step(effect: Effect) -> None:
 
 
 def _check_words(effect: Effect) -> None:
-    if not isinstance(effect.looks, str):
-        raise InputError(str(effect.path), f"LOOKS: must be a text, got {effect.looks!r}")
+    for key, text in (("LOOKS", effect.looks), ("AFTER", effect.after)):
+        if not isinstance(text, str):
+            raise InputError(str(effect.path), f"{key}: must be a text, got {text!r}")
     is_table = isinstance(effect.confounded, dict)
     if not is_table or not all(isinstance(text, str) for pair in effect.confounded.items() for text in pair):
         raise InputError(str(effect.path), f"CONFOUNDED: must give a text for each name, got {effect.confounded!r}")

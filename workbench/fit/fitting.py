@@ -216,7 +216,11 @@ def profiled(found: Fit, recording: Recording) -> Fit:
 
 
 def _error(
-    composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool
+    composition: Composition,
+    record: Record,
+    free: Sequence[str] | None,
+    from_pressure: bool,
+    scale: ValveParameters | None = None,
 ) -> SimulationError:
     run = FreeRun(composition, record, from_pressure=from_pressure)
     reached = [
@@ -226,7 +230,7 @@ def _error(
         for key, declared in each.parameters.items()
         if not declared.given
     ]
-    parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free)
+    parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free, scale)
     return SimulationError(run, composition, parameters, composition.theta)
 
 
@@ -261,6 +265,12 @@ def _extended(valve: ValveFile, effects: Sequence[str], known: ValveParameters) 
     return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
 
 
+def _scale(base: Fit, known: ValveParameters) -> ValveParameters:
+    """Return the valve by which an effect's starts are scaled: the base fit's, but where that ran into its bounds."""
+    at_bound = [name for name in DEFAULT if name in base.parameters and base.parameters[name].at_bound]
+    return base.valve.valve.model_copy(update={name: getattr(known, name) for name in at_bound if name != BASE[STATIC]})
+
+
 def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTable:
     """Return an effect's table as it vanishes, drawing data as declared."""
     return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
@@ -288,7 +298,7 @@ def _begun(
 ) -> "BegunFit":
     """Search with effects added to a base fit, as far as the middling scale."""
     composition = _extended(base.valve, effects, valve.valve)
-    error = _error(composition, record, free, base.from_pressure)
+    error = _error(composition, record, free, base.from_pressure, _scale(base, valve.valve))
     names = {find_effect(name, "effects").name for name in effects}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]

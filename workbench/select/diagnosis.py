@@ -120,7 +120,8 @@ def diagnose(
     search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell)
 
     base = search.base(valve)
-    scores = preview(base.fit, parts, library, threads)
+    first = {name: each for name, each in library.items() if each.after not in library}
+    scores = preview(base.fit, parts, first, threads)
     if on_preview:
         on_preview(scores)
     steps = search.steps(base)
