@@ -12,6 +12,7 @@ It defines
     LOOKS = text                    what it looks like in a record
     AFTER = name                    effect that a search tries first: this one only where that has evidence and leaves
                                     something to explain
+    INPUT = "setpoint"              what enters its pressure path is a set point, m, and not a pressure: a positioner
     CONFOUNDED = {name: text}       effects and parameters of the bare valve that look alike, and what record tells
                                     them apart; an empty text: none of pressure and position does
 
@@ -82,6 +83,7 @@ FINE_STEP_S = 2.5e-4
 """For a memory of which nothing is known."""
 SHIPPED = Path(__file__).parent / "effects"
 BALANCE = "balance"
+SETPOINT = "setpoint"
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +145,8 @@ class Effect:
     confounded: Mapping[str, str]
     after: str
     """The effect that a search tries before it; empty: it is tried from the first."""
+    by_setpoint: bool
+    """Whether what enters is a set point, m: it must be the first of the pressure path."""
     in_balance: bool
     """Whether solving the balance at rest undoes it ..."""
     inverse: Callable[[Sequence[float]], Inverse] | None
@@ -218,9 +222,14 @@ def shipped_effects() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob("[!_]*.py"))
 
 
+def tried_effects() -> list[str]:
+    """Return the names of those of them that may be missing in a valve file: a positioner is there or not."""
+    return [name for name in shipped_effects() if not shipped_effect(name, "shipped effects").by_setpoint]
+
+
 def first_effects() -> list[str]:
-    """Return the names of those of them that a search tries from the first."""
-    return [name for name in shipped_effects() if not shipped_effect(name, "shipped effects").after]
+    """Return the names of those of these that a search tries from the first."""
+    return [name for name in tried_effects() if not shipped_effect(name, "shipped effects").after]
 
 
 def shipped_effect(name: str, source: str) -> Effect:
@@ -280,6 +289,7 @@ def _declared(path: Path, source: str) -> Effect:
         looks=namespace.get("LOOKS", ""),
         confounded=namespace.get("CONFOUNDED", {}),
         after=namespace.get("AFTER", ""),
+        by_setpoint=_by_setpoint(path, namespace),
         in_balance="INVERSE" in namespace,
         inverse=_inverse(path, namespace),
         path=path,
@@ -328,6 +338,14 @@ def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:
             raise InputError(str(path), f"Parameters.{name}: guess must be one of {allowed}, got {parameter.guess!r}")
         declared[name] = parameter
     return declared
+
+
+def _by_setpoint(path: Path, namespace: dict[str, Any]) -> bool:
+    entering = namespace.get("INPUT", "")
+    if entering not in {"", SETPOINT} or (entering and "pressure" not in namespace):
+        problem = f'INPUT: allowed is "{SETPOINT}", of an effect of the pressure path, got {entering!r}'
+        raise InputError(str(path), problem)
+    return bool(entering)
 
 
 def _inverse(path: Path, namespace: dict[str, Any]) -> Callable[[Sequence[float]], Inverse] | None:

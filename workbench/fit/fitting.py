@@ -34,6 +34,7 @@ from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.guesses import FINEST
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
+from workbench.fit.setpoint_starts import FREE, setpoint_starts
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
 from workbench.fit.strewing import proved, strewn
 from workbench.fit.threads import on_threads
@@ -186,8 +187,13 @@ def fit(
         return _begun(record, valve, effects, ground, free, workers, progress).finished(profile=profile)
     composition = Composition.from_file(valve)
     error = _error(composition, record, free, from_pressure)
-    origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
-    begins = base_starts(error, origins, seed, DRAWS)
+    tell = progress or (lambda _: None)
+    if record.by_setpoint and not from_pressure:
+        origins = composition.theta, composition.theta
+        begins = setpoint_starts(error, composition.theta, seed, workers, lambda done: tell(0.5 * done))
+    else:
+        origins = composition.theta, forces_regressed(composition.theta, record, from_pressure)
+        begins = base_starts(error, origins, seed, DRAWS)
     found = _carried(composition, error, begins, OF_BASE, workers, progress).finished(profile=profile)
     return replace(found, seeds=(*found.seeds, *origins))
 
@@ -230,7 +236,8 @@ def _error(
         for key, declared in each.parameters.items()
         if not declared.given
     ]
-    parameters = free_parameters(composition, [*DEFAULT, *reached] if free is None else free, scale)
+    of_base = FREE if record.by_setpoint and not from_pressure else DEFAULT
+    parameters = free_parameters(composition, [*of_base, *reached] if free is None else free, scale)
     return SimulationError(run, composition, parameters, composition.theta)
 
 
@@ -303,7 +310,7 @@ def _begun(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    starts = effect_starts(error, added, seeds, landed=landed)
+    starts = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint)
     begun = _carried(composition, error, starts, effort, workers, progress)
     return replace(begun, weakest=weakest_start(error, added, seeds[0]))
 

@@ -13,7 +13,7 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import find_effect, shipped_effects
+from sim.effect import find_effect, tried_effects
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
 from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
@@ -22,6 +22,7 @@ from workbench.select.effect_search import EffectSearch, Progress
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
+from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
 from workbench.select.verdict import Verdict, verdict
 from workbench.select.verdict_sentence import verdict_sentence
@@ -41,6 +42,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     experiment: Experiment | None
     split: Split
     sentence: str
+    positioner: PositionerOrPacking | None = None
+    """Of a recording of set point and travel: what holds the stem."""
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -51,6 +54,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         """Say the verdict, what was tried in each step, and what the recordings would not show."""
         sentence = self.sentence.removeprefix("Missing: ") if self.verdict == "missing" else self.sentence
         said: list[Block] = [f"{self.verdict}: {sentence}"]
+        if self.positioner:
+            said.append(self.positioner.sentence)
         for number, step in enumerate(self.steps, start=1):
             errors = step.before.errors
             title = (
@@ -113,7 +118,7 @@ def diagnose(
     """
     parts = split([recording] if isinstance(recording, Recording) else recording, test)
     there = {each.name for each in valve.effect}
-    named = [find_effect(name, "effects") for name in (shipped_effects() if effects is None else effects)]
+    named = [find_effect(name, "effects") for name in (tried_effects() if effects is None else effects)]
     library = {each.written: each for each in named if each.written not in there}
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
@@ -121,6 +126,10 @@ def diagnose(
 
     base = search.base(valve)
     first = {name: each for name, each in library.items() if each.after not in library}
+    held = None
+    if parts.train.record.by_setpoint:
+        tell("positioner or packing", 0.0)
+        held = positioner_or_packing(parts, base, seed=seed, workers=threads)
     scores = preview(base.fit, parts, first, threads)
     if on_preview:
         on_preview(scores)
@@ -139,4 +148,5 @@ def diagnose(
         experiment=search.experiment(steps) if found == "one_of" else None,
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts),
+        positioner=held,
     )
