@@ -32,7 +32,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from sim.composition import Composition
-from sim.effect import Effect, shipped_effect, first_effects
+from sim.effect import Effect, first_effects, shipped_effect
 from sim.slave.simulated_device import Device
 from sim.static_inverse import extended_valve
 from sim.valve import Valve

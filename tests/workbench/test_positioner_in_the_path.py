@@ -12,6 +12,7 @@ from config.valve_file import ValveFile
 from sim.simulation import simulate
 from tests.sim.test_positioner import PA_PER_M, valve_file
 from workbench import compare, fit
+from workbench.report import Subject, report_comparison
 from workbench.select.effect_acceptance import Gain
 from workbench.select.positioner_or_packing import PositionerOrPacking, cause
 
@@ -52,6 +53,16 @@ def test_without_a_positioner_in_the_valve_file_it_is_refused_with_what_to_write
     bare = ValveFile(valve=KNOWN.valve)
     with pytest.raises(InputError, match=r'\[\[effect\]\] name = "positioner"'):
         compare(recorded(KNOWN, 1, 60), bare)
+
+
+def test_the_valve_itself_is_compared_in_set_points(tmp_path: Path) -> None:
+    compared = compare(recorded(KNOWN, 1, 60), KNOWN)
+    assert compared.rms_m < 5e-4
+    assert "reference_m" in compared.frame_columns()
+    report_comparison(compared, tmp_path / "compared.html", Subject(KNOWN, (), {}))
+    page = (tmp_path / "compared.html").read_text(encoding="utf-8")
+    assert "set point, mm" in page
+    assert "command, kPa" not in page
 
 
 def test_pressures_are_not_taken_for_set_points() -> None:

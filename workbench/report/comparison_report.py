@@ -133,6 +133,7 @@ def _overlay(each: Comparison) -> Html:
         [_model(each)],
         phase_shades(each.phase, valid),
         each.slips,
+        by_setpoint=each.by_setpoint,
     )
     return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
 

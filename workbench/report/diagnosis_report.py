@@ -204,6 +204,7 @@ def _overlay(validation: _Validation) -> Html:
         base.measured_m,
         _models(validation),
         [] if whole else [Shade("held out", HELD_OUT, validation.held_out)],
+        by_setpoint=base.by_setpoint,
     )
     told = "All of it was held out." if whole else "On the green ground: what was held out."
     return overlaid(figure, told, base.time_s.size)
