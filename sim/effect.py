@@ -114,6 +114,8 @@ class Parameter:
 def scale_of(text: str, valve: ValveParameters) -> float:
     """Return a product and quotient of a valve's parameters; 1 for an empty text.
 
+    A drive without a spring has the rate at which its stroke would take the force of its friction.
+
     Raises:
         ValueError: a name that is none of its numbers, or a joint other than * and /.
     """
@@ -121,6 +123,8 @@ def scale_of(text: str, valve: ValveParameters) -> float:
     unit = 1.0
     for joint, name in zip_longest(words[::2], words[1::2], fillvalue=""):
         value = getattr(valve, name, None)
+        if value == 0.0 and name == "spring_n_per_m":
+            value = valve.coulomb_n / valve.stroke_m
         if joint not in {"*", "/"} or not isinstance(value, float):
             raise ValueError(repr(text))
         unit = unit * value if joint == "*" else unit / value

@@ -14,7 +14,7 @@ from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
 from sim.effect import shipped_effect
-from workbench import compare, diagnose
+from workbench import compare, diagnose, fit
 from workbench.compare.friction_balance import forces
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
@@ -130,3 +130,13 @@ def test_below_break_away_energy_is_lost() -> None:
     lossy = scatter_with("presliding_hysteresis", ("stiffness_n_per_m", "loss", "exponent"), (9.0, 0.8, 2.5))
     assert elastic > 3.0 * rounding_rad
     assert lossy < 1.25 * rounding_rad
+
+
+def test_a_drive_without_a_spring_is_fitted_as_such() -> None:
+    springless = ValveFile.model_validate({"valve": MOTOR.valve.model_dump() | {"spring_n_per_m": 0.0}})
+    base = fit(recorded("J_7", 10), springless, profile=False)
+    found = fit(recorded("J_7", 10), springless, effects=["asymmetric_friction"], base=base, profile=False)
+    assert "spring_n_per_m" not in found.parameters
+    assert base.rms_m > 10.0
+    assert found.rms_m < 0.6
+    assert found.parameters["coulomb_n"].value == pytest.approx(0.0303, rel=0.1)

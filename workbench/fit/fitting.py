@@ -21,7 +21,7 @@ from config.recording import Column, Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import EffectTable, ValveFile, ValveParameters
-from sim.composition import BASE, STATIC, Composition
+from sim.composition import BASE, SPRING, STATIC, Composition
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shortened
@@ -236,7 +236,9 @@ def _error(
         for key, declared in each.parameters.items()
         if not declared.given
     ]
-    of_base = FREE if record.by_setpoint and not from_pressure else DEFAULT
+    of_base = list(FREE if record.by_setpoint and not from_pressure else DEFAULT)
+    if composition.theta[SPRING] == 0.0 and BASE[SPRING] in of_base:
+        of_base.remove(BASE[SPRING])
     parameters = free_parameters(composition, [*of_base, *reached] if free is None else free, scale)
     return SimulationError(run, composition, parameters, composition.theta)
 

@@ -105,6 +105,9 @@ def _parameter(composition: Composition, index: int, scale: ValveParameters) -> 
         return Parameter(name, index, 1.0, MOST_STATIC)
     if index < len(BASE):
         value = float(composition.theta[index]) or _smallest(composition, name)
+        if value == 0.0:
+            problem = f"{name} is 0 on a drive without spring: it must be more than 0 for a fit to begin from"
+            raise InputError(composition.source, problem)
         return Parameter(name, index, value / FACTOR, value * FACTOR)
     effect, _, key = name.partition(".")
     declared = next(each for each in composition.effects if each.name == effect).parameters[key]

@@ -15,6 +15,7 @@ out.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from typing import Literal
 
 from config.results.result import Brief
@@ -108,7 +109,7 @@ def positioner_or_packing(split: Split, both: EvaluatedModel, *, seed: int, work
         both.errors.test_rmse_m,
         _value(both.fit, "coulomb_n"),
         _value(both.fit, f"{name}.{DEAD_BAND}"),
-        2.0 * _value(both.fit, "coulomb_n") / both.fit.valve.valve.spring_n_per_m,
+        2.0 * _value(both.fit, "coulomb_n") / (both.fit.valve.valve.spring_n_per_m or inf),
         _found_twice(both.fit),
     )
 
