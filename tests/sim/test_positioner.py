@@ -96,3 +96,12 @@ def test_a_simulated_recording_says_that_it_is_of_set_points() -> None:
 def test_a_daemon_cannot_command_through_it() -> None:
     with pytest.raises(InputError, match="effect positioner declares no inverse"):
         extended_valve(valve_file(), "valve.toml")
+
+
+def test_the_integral_does_not_wind_up_while_the_pilot_is_at_its_limit() -> None:
+    """At 1.5 s the limit is reached, with an integral of 0.05 m 1.5 s / 0.5 s = 0.15 m; it stays that."""
+    valve = Valve.from_file(valve_file(1e4, integral_time_s=0.5, gain_pa_per_ms=1e5))
+    valve.advance(0.05, 2.0)
+    before_pa = valve.pressure_pa
+    valve.advance(-0.001, 0.01)
+    assert valve.pressure_pa - before_pa == pytest.approx(1e5 * (0.15 - 0.001) * 0.01, rel=0.02)
