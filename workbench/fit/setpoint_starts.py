@@ -115,6 +115,6 @@ def _speeds(record: Record, quantile: float) -> dict[str, float]:
     speed = moved_m / differences(record.time_s)
     found: dict[str, float] = {}
     for name, way in FLOW.items():
-        chosen = way * speed[way * moved_m > MOVED * record.noise_m]
+        chosen = way * speed[way * moved_m > MOVED * record.scale_m]
         found |= {name: float(np.quantile(chosen, quantile))} if chosen.size else {}
     return found
