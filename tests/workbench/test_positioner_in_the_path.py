@@ -19,7 +19,7 @@ from workbench.select.positioner_or_packing import PositionerOrPacking, cause
 KNOWN = valve_file(200.0, gain_pa_per_ms=0.4 * PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
 
 
-def recorded(valve: ValveFile, seed: int, duration_s: int = 90) -> Recording:
+def recorded(valve: ValveFile, seed: int, duration_s: int = 150) -> Recording:
     """Set points as a flow controller writes them: many small changes, some large; seen once a second."""
     generator = np.random.default_rng(seed)
     setpoint_m, here = np.empty(duration_s), 0.05
@@ -57,7 +57,7 @@ def test_without_a_positioner_in_the_valve_file_it_is_refused_with_what_to_write
 
 def test_the_valve_itself_is_compared_in_set_points(tmp_path: Path) -> None:
     compared = compare(recorded(KNOWN, 1, 60), KNOWN)
-    assert compared.rms_m < 5e-4
+    assert compared.rms_m < 1e-3
     assert "reference_m" in compared.frame_columns()
     report_comparison(compared, tmp_path / "compared.html", Subject(KNOWN, (), {}))
     page = (tmp_path / "compared.html").read_text(encoding="utf-8")

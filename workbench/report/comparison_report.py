@@ -72,7 +72,7 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> N
             _verdict(comparison),
             _key_figures(comparison, stroke_m),
             _overlay(comparison),
-            signature(comparison.command_pa, comparison.measured_m, [_model(comparison)]),
+            *([] if comparison.by_setpoint else [_signature(comparison)]),
             _phases(comparison, stroke_m),
             _friction(comparison),
             _slips(comparison),
@@ -122,6 +122,10 @@ def _is_noise(each: Comparison) -> bool:
 
 def _model(each: Comparison) -> Simulated:
     return Simulated("model", MODEL, each.simulated_m)
+
+
+def _signature(each: Comparison) -> Html:
+    return signature(each.command_pa, each.measured_m, [_model(each)])
 
 
 def _overlay(each: Comparison) -> Html:

@@ -93,7 +93,7 @@ def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, command
             _key_figures(diagnosis, validation),
             _fall(diagnosis, validation),
             _overlay(validation),
-            signature(validation.base.command_pa, validation.base.measured_m, _models(validation)),
+            *([] if validation.base.by_setpoint else [_signature(validation)]),
             _where(validation),
             _ranking(diagnosis, validation),
             _added(diagnosis),
@@ -193,6 +193,10 @@ def _models(validation: _Validation) -> list[Simulated]:
     if base is not best and not np.array_equal(base.simulated_m, best.simulated_m, equal_nan=True):
         models.append(Simulated("after", EXTENDED, best.simulated_m))
     return models
+
+
+def _signature(validation: _Validation) -> Html:
+    return signature(validation.base.command_pa, validation.base.measured_m, _models(validation))
 
 
 def _overlay(validation: _Validation) -> Html:
