@@ -32,7 +32,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import DevicePace
 from sim.composition import Composition
-from sim.effect import Effect, shipped_effect, shipped_effects
+from sim.effect import Effect, first_effects, shipped_effect
 from sim.slave.simulated_device import Device
 from sim.static_inverse import extended_valve
 from sim.valve import Valve
@@ -156,7 +156,7 @@ class Course:
 
 def report(course: Course, names: Sequence[str]) -> Iterator[str]:
     """Yield the table."""
-    library = [shipped_effect(name, "benchmark") for name in shipped_effects()]
+    library = [shipped_effect(name, "benchmark") for name in first_effects()]
     whole = Composition.of(ValveFile(valve=SEED, effect=tuple(off(each) for each in library)), library)
     bare = course.outcome(whole, extended_valve(ValveFile(valve=SEED), "seed")).rms
     yield f"{course.steps} steps, {course.step_s:g} s each, at {1e3 * course.period_s:g} ms; errors in % of stroke"
@@ -185,7 +185,7 @@ def main() -> None:
     parser.add_argument("--period-s", type=float, default=0.02)
     parser.add_argument("--step-s", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--effects", nargs="+", choices=shipped_effects(), default=shipped_effects(), metavar="NAME")
+    parser.add_argument("--effects", nargs="+", choices=first_effects(), default=first_effects(), metavar="NAME")
     arguments = parser.parse_args()
     started_s = time.monotonic()
     course = Course(arguments.steps, arguments.period_s, arguments.step_s, arguments.seed)

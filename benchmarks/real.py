@@ -2,21 +2,30 @@
 
     servo motor   fitted on four of its runs, judged on the fifth, each in turn; every tenth sample
     cylinder      fitted at 1, 3 and 7 bar, judged at 5 bar; and each pressure predicted from the others
+    plant valve   positioner, set point to travel at 1 s: fitted to its first 15 minutes, judged on the next 15
     bench curve   each reading predicted from the others; of area 1, so that N are Pa
 
 Held-out rms errors, step by step, and what was refused.
 """
 
 import argparse
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from config.exports.column_mapping import read_mapping
+from config.historian_export import read_export
 from config.recording import Recording
-from config.valve_file import ValveFile
+from config.valve_file import ValveFile, load_valve, shipped_valve
+from workbench.data.held_out import split
 from workbench.data.imposed_motion import read_imposed
+from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
+from workbench.select.block_errors import block_errors
 from workbench.select.diagnosis import diagnose
+from workbench.select.effect_candidates import EvaluatedModel
+from workbench.select.positioner_or_packing import positioner_or_packing
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RUNS = ("J_2", "J_3", "J_5", "J_7", "J_9")
@@ -48,6 +57,25 @@ MOTOR = valve(
     stroke_m=40.0,
 )
 CYLINDER = valve(mass_kg=0.1, diaphragm_area_m2=4.909e-4, stroke_m=0.04)
+PLANT = ValveFile.model_validate(
+    {
+        "valve": load_valve(shipped_valve("seed")).valve.model_dump()
+        | {"stroke_m": 0.1, "coulomb_n": 300.0, "static_n": 330.0},
+        "effect": [
+            {
+                "name": "positioner",
+                "gain_pa_per_ms": 5e5,
+                "integral_time_s": 1e6,
+                "dead_band_m": 0.0,
+                "filling_pa_per_s": 3e3,
+                "venting_pa_per_s": 3e3,
+                "supply_pa": 4e5,
+                "shut_below_m": -100.0,
+                "open_above_m": 100.0,
+            }
+        ],
+    }
+)
 SERVOMOTOR = valve(mass_kg=1.0, diaphragm_area_m2=1.0, spring_n_per_m=2e6, stroke_m=0.0381)
 
 
@@ -67,6 +95,25 @@ def servo_motor(runs: tuple[str, ...]) -> Iterator[str]:
         for each in found.candidates:
             if not each.accepted:
                 yield f"{'':<10}step {each.step}, {each.name}: {each.rejection_reason}"
+
+
+def plant_valve() -> Iterator[str]:
+    """Yield the figures of the plant valve, % of a stroke taken for 100 mm; spring and area are the shipped valve's."""
+    words = ["time_s=time_s", "reference_m=setpoint_percent:%", "position_m=position_percent:%"]
+    whole = read_export(DATA / "plant_valve" / "half_hour.csv", read_mapping(words), PLANT.valve.stroke_m)
+    half = len(whole) // 2
+    first, second = (
+        Recording({name: column[rows] for name, column in whole.columns.items()})
+        for rows in (slice(half), slice(half, None))
+    )
+    parts = split([first], second)
+    found = fit(first, PLANT, profile=False)
+    errors = block_errors(found, parts)
+    per_cent = 100.0 / PLANT.valve.stroke_m
+    yield f"  {per_cent * errors.train_rmse_m:.3g} % rms fitted, {per_cent * errors.test_rmse_m:.3g} % held out"
+    yield "  " + ", ".join(f"{name} {each.value:.4g}" for name, each in found.parameters.items())
+    model = EvaluatedModel(found, errors, errors.at_floor(parts.floor_m))
+    yield "  " + positioner_or_packing(parts, model, seed=0, workers=os.cpu_count() or 1).sentence
 
 
 def forces(found: ForceDiagnosis) -> Iterator[str]:
@@ -102,14 +149,18 @@ def main() -> None:
     parser.add_argument(
         "--runs", nargs="*", choices=RUNS, default=RUNS, help="of the servo motor, judged in turn (all)"
     )
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="sets by their names, as 'plant valve' (all)")
     arguments = parser.parse_args()
     if not DATA.is_dir():
         parser.exit(1, f"{DATA}: the measured recordings are not here\n")
     for name, figures in (
         ("bench curve", bench_curve()),
         ("cylinder", cylinder()),
+        ("plant valve", plant_valve()),
         ("servo motor", servo_motor(tuple(arguments.runs))),
     ):
+        if arguments.only and name not in arguments.only:
+            continue
         began_s = time.perf_counter()
         print(f"== {name}", flush=True)
         for line in figures:

@@ -15,7 +15,7 @@ import numpy as np
 
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from sim.effect import shipped_effect, shipped_effects
+from sim.effect import first_effects, shipped_effect
 from workbench import compare, diagnose, fit
 from workbench.blind.hiding import hide
 from workbench.data.held_out import split
@@ -31,7 +31,7 @@ TARGETS_S = {"compare": 3.0, "preview": 2.0, "diagnose": 60.0}
 def report(seed: int = SEED) -> Iterator[str]:
     """Yield one line a target."""
     hidden = hide(seed, duration_s=DURATION_S, period_s=PERIOD_S)
-    library = {name: shipped_effect(name, "library") for name in shipped_effects()}
+    library = {name: shipped_effect(name, "library") for name in first_effects()}
     parts = split([hidden.fit], hidden.test)
     bare = fit(parts.train.recording, hidden.base, profile=False)
     preview(bare, parts, library)  # compiles what is not in the cache

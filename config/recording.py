@@ -1,10 +1,11 @@
 """The recording format: CSV with a header row, SI units, time strictly increasing, one row a sample.
 
-`time_s, command_pa, position_m` are required; `pressure_pa` (measured), `load_n` (external force on the stem, positive
-in the opening direction), `reference_m`, `state` and further columns are optional. A row's command is the one in force
-from its time to the next row's. Lines that begin with `#` at the top carry metadata, `# key: value`. A last line torn
-by a crash is left out and told as `torn`. A byte order mark before it all is no part of it. A file named
-`.parquet` holds the same columns.
+`time_s, command_pa, position_m` are required; a recording of a valve behind its own positioner, of which no pressure
+is known, has `reference_m`, the set point, in the place of `command_pa`. `pressure_pa` (measured), `load_n` (external
+force on the stem, positive in the opening direction), `reference_m`, `state` and further columns are optional. A row's
+command is the one in force from its time to the next row's. Lines that begin with `#` at the top carry metadata,
+`# key: value`. A last line torn by a crash is left out and told as `torn`. A byte order mark before it all is no part
+of it. A file named `.parquet` holds the same columns.
 """
 
 import csv
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REQUIRED = ("time_s", "command_pa", "position_m")
+BEHIND_POSITIONER = ("time_s", "reference_m", "position_m")
+"""The same where a set point takes the command's place."""
 CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
 
@@ -49,8 +52,19 @@ class Recording(Result):
 
     @property
     def command_pa(self) -> Column:
-        """Pressure command in force from each time to the next."""
+        """Pressure command in force from each time to the next.
+
+        Raises:
+            InputError: there is none, but a set point.
+        """
+        if self.by_setpoint:
+            raise InputError("recording", "column command_pa is missing: it has a set point, reference_m, in its place")
         return self.columns["command_pa"]
+
+    @property
+    def by_setpoint(self) -> bool:
+        """Whether it is of a valve behind its own positioner: a set point, `reference_m`, and no command."""
+        return "reference_m" in self.columns and "command_pa" not in self.columns
 
     @property
     def position_m(self) -> Column:
@@ -64,7 +78,7 @@ class Recording(Result):
         Raises:
             InputError: names file, column or line, value and what is allowed.
         """
-        columns, metadata = _read(Path(path), REQUIRED, CLOCK_STEPS_TOLERATED)
+        columns, metadata = _read(Path(path), REQUIRED, CLOCK_STEPS_TOLERATED, or_required=BEHIND_POSITIONER)
         return cls(columns, metadata)
 
     def write(self, path: Path | str) -> None:
@@ -160,15 +174,17 @@ def read_table(path: Path, required: tuple[str, ...]) -> tuple[dict[str, Column]
     return _read(path, required, 0.0)
 
 
-def _read(path: Path, required: tuple[str, ...], clock_steps: float) -> tuple[dict[str, Column], dict[str, str]]:
+def _read(
+    path: Path, required: tuple[str, ...], clock_steps: float, *, or_required: tuple[str, ...] = ()
+) -> tuple[dict[str, Column], dict[str, str]]:
     try:
         if path.suffix == ".parquet":
             columns, metadata = _read_parquet(path)
             first_line = 0
-            _require(path, required, list(columns), "the file has")
+            _require(path, required, list(columns), "the file has", or_required)
         else:
             with path.open(newline="", encoding="utf-8-sig") as file:
-                columns, metadata, first_line = _table(path, file, required)
+                columns, metadata, first_line = _table(path, file, required, or_required)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -180,9 +196,9 @@ def _read(path: Path, required: tuple[str, ...], clock_steps: float) -> tuple[di
     return columns, metadata
 
 
-def _require(path: Path, required: tuple[str, ...], names: list[str], where: str) -> None:
+def _require(path: Path, required: tuple[str, ...], names: list[str], where: str, or_required: tuple[str, ...]) -> None:
     missing = [name for name in required if name not in names]
-    if missing:
+    if missing and not (or_required and set(or_required) <= set(names)):
         named = ", ".join(names)
         named = named if len(named) <= LONGEST_NAMED else f"{named[:LONGEST_NAMED]}.."
         hint = f"; of another program's export, `positioner import {path}` says how to read it"
@@ -193,7 +209,7 @@ def _require(path: Path, required: tuple[str, ...], names: list[str], where: str
 
 
 def _table(
-    path: Path, lines: Iterator[str], required: tuple[str, ...]
+    path: Path, lines: Iterator[str], required: tuple[str, ...], or_required: tuple[str, ...]
 ) -> tuple[dict[str, Column], dict[str, str], int]:
     """Return columns, metadata and the number of the header's line."""
     metadata: dict[str, str] = {}
@@ -205,7 +221,7 @@ def _table(
         key, _, value = header.lstrip("# ").partition(":")
         metadata[key.strip()] = value.strip()
     names = [name.strip() for name in header.split(",")]
-    _require(path, required, names, f"line {number} names")
+    _require(path, required, names, f"line {number} names", or_required)
     whole = _Whole(lines, len(names))
     table = _rows(path, csv.reader(iter(whole)), names, number)
     if whole.torn:

@@ -21,7 +21,8 @@ class ValveParameters(Schema):
     name: str
     mass_kg: Positive
     diaphragm_area_m2: Positive
-    spring_n_per_m: Positive
+    spring_n_per_m: NonNegative
+    """0: a drive without a spring, which the workbench fits and no daemon commands."""
     viscous_ns_per_m: NonNegative
     coulomb_n: NonNegative
     static_n: NonNegative

@@ -103,6 +103,11 @@ class Composition:
         """Longest step of the integration that its effects bear, s; infinite if any."""
         return min((each.step_s for each in self.effects), default=inf)
 
+    @property
+    def by_setpoint(self) -> bool:
+        """Whether its input is a set point, m, that a positioner obeys, and not a pressure, Pa."""
+        return any(each.by_setpoint for each in self.effects)
+
     def changed(self, theta: Vector, parameters: Mapping[str, float]) -> Vector:
         """Return theta, (parameters,) in the order of `names`, with some of them replaced by name.
 
@@ -131,6 +136,9 @@ def parameter_vector(file: ValveFile, effects: Sequence[Effect], source: str) ->
     for name in names:
         if names.count(name) > 1:
             raise InputError(source, f"effect {name} stands {names.count(name)} times; once is allowed")
+    path = [each for each in effects if "pressure" in each.functions]
+    for late in (each for each in path[1:] if each.by_setpoint):
+        raise InputError(source, f"effect {late.name} obeys a set point: it must stand before {path[0].name}")
     theta = [float(getattr(file.valve, name)) for name in BASE]
     for effect, table in zip(effects, file.effect, strict=True):
         theta += effect.values(table.parameters, f"{source}: effect {table.name}")

@@ -10,6 +10,9 @@ It defines
     STEP_S = h                      longest step over which its memory comes out well, s; FINE_STEP_S if not given, and
                                     any step without a memory
     LOOKS = text                    what it looks like in a record
+    AFTER = name                    effect that a search tries first: this one only where that has evidence and leaves
+                                    something to explain
+    INPUT = "setpoint"              what enters its pressure path is a set point, m, and not a pressure: a positioner
     CONFOUNDED = {name: text}       effects and parameters of the bare valve that look alike, and what record tells
                                     them apart; an empty text: none of pressure and position does
 
@@ -80,6 +83,7 @@ FINE_STEP_S = 2.5e-4
 """For a memory of which nothing is known."""
 SHIPPED = Path(__file__).parent / "effects"
 BALANCE = "balance"
+SETPOINT = "setpoint"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +114,8 @@ class Parameter:
 def scale_of(text: str, valve: ValveParameters) -> float:
     """Return a product and quotient of a valve's parameters; 1 for an empty text.
 
+    A drive without a spring has the rate at which its stroke would take the force of its friction.
+
     Raises:
         ValueError: a name that is none of its numbers, or a joint other than * and /.
     """
@@ -117,6 +123,8 @@ def scale_of(text: str, valve: ValveParameters) -> float:
     unit = 1.0
     for joint, name in zip_longest(words[::2], words[1::2], fillvalue=""):
         value = getattr(valve, name, None)
+        if value == 0.0 and name == "spring_n_per_m":
+            value = valve.coulomb_n / valve.stroke_m
         if joint not in {"*", "/"} or not isinstance(value, float):
             raise ValueError(repr(text))
         unit = unit * value if joint == "*" else unit / value
@@ -139,6 +147,10 @@ class Effect:
     """The first indented lines of its docstring."""
     looks: str
     confounded: Mapping[str, str]
+    after: str
+    """The effect that a search tries before it; empty: it is tried from the first."""
+    by_setpoint: bool
+    """Whether what enters is a set point, m: it must be the first of the pressure path."""
     in_balance: bool
     """Whether solving the balance at rest undoes it ..."""
     inverse: Callable[[Sequence[float]], Inverse] | None
@@ -225,6 +237,16 @@ def shipped_effects() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob("[!_]*.py"))
 
 
+def tried_effects() -> list[str]:
+    """Return the names of those of them that may be missing in a valve file: a positioner is there or not."""
+    return [name for name in shipped_effects() if not shipped_effect(name, "shipped effects").by_setpoint]
+
+
+def first_effects() -> list[str]:
+    """Return the names of those of these that a search tries from the first."""
+    return [name for name in tried_effects() if not shipped_effect(name, "shipped effects").after]
+
+
 def shipped_effect(name: str, source: str) -> Effect:
     """Return an effect that comes with the package.
 
@@ -281,6 +303,8 @@ def _declared(path: Path, source: str) -> Effect:
         equation=_equation(said),
         looks=namespace.get("LOOKS", ""),
         confounded=namespace.get("CONFOUNDED", {}),
+        after=namespace.get("AFTER", ""),
+        by_setpoint=_by_setpoint(path, namespace),
         in_balance="INVERSE" in namespace,
         inverse=_inverse(path, namespace),
         path=path,
@@ -331,6 +355,14 @@ def _parameters(path: Path, namespace: dict[str, Any]) -> dict[str, Parameter]:
     return declared
 
 
+def _by_setpoint(path: Path, namespace: dict[str, Any]) -> bool:
+    entering = namespace.get("INPUT", "")
+    if entering not in {"", SETPOINT} or (entering and "pressure" not in namespace):
+        problem = f'INPUT: allowed is "{SETPOINT}", of an effect of the pressure path, got {entering!r}'
+        raise InputError(str(path), problem)
+    return bool(entering)
+
+
 def _inverse(path: Path, namespace: dict[str, Any]) -> Callable[[Sequence[float]], Inverse] | None:
     """Return what undoes an effect that the balance does not, as a function of its parameters in their order."""
     if namespace.get("INVERSE", BALANCE) != BALANCE:
@@ -360,8 +392,9 @@ def _check_step(effect: Effect) -> None:
 
 
 def _check_words(effect: Effect) -> None:
-    if not isinstance(effect.looks, str):
-        raise InputError(str(effect.path), f"LOOKS: must be a text, got {effect.looks!r}")
+    for key, text in (("LOOKS", effect.looks), ("AFTER", effect.after)):
+        if not isinstance(text, str):
+            raise InputError(str(effect.path), f"{key}: must be a text, got {text!r}")
     is_table = isinstance(effect.confounded, dict)
     if not is_table or not all(isinstance(text, str) for pair in effect.confounded.items() for text in pair):
         raise InputError(str(effect.path), f"CONFOUNDED: must give a text for each name, got {effect.confounded!r}")

@@ -24,16 +24,18 @@ def simulate(
 ) -> Recording:
     """Record a valve's answer to a series of pressures, open loop, from rest at position 0 without pressure.
 
+    Of a valve with a positioner, which obeys set points, they are these.
+
     Args:
         valve: the valve, effects and all.
         time_s: (n,), s, strictly increasing.
-        command_pa: (n,), Pa; each is held from its time to the next.
+        command_pa: (n,), Pa, of a valve with a positioner m; each is held from its time to the next.
         noise_std_m: standard deviation of the sensor's white noise, m.
         seed: of the noise; the same seed, the same recording.
 
     Returns:
-        n rows: `time_s`, `command_pa`, `position_m` as the sensor indicates it, and `pressure_pa` in the actuator, both
-        of the row's time, before its command acts.
+        n rows: `time_s`, `command_pa` or `reference_m`, `position_m` as the sensor indicates it, and `pressure_pa` in
+        the actuator, both of the row's time, before its command acts.
 
     Raises:
         InputError: series of other shapes or values, or an effect that is unknown or not physical.
@@ -47,12 +49,13 @@ def simulate(
     if not (np.diff(time) > 0.0).all():
         raise InputError("simulate", "time_s must increase strictly")
     sensor = validated(Sensor, {"noise_std_m": noise_std_m, "seed": seed}, "sensor")
-    response = Valve.from_file(valve).run(command[:-1], np.diff(time))
+    simulated = Valve.from_file(valve)
+    response = simulated.run(command[:-1], np.diff(time))
     transmitter = Transmitter(sensor)
     return Recording(
         {
             "time_s": time,
-            "command_pa": command,
+            "reference_m" if simulated.by_setpoint else "command_pa": command,
             "position_m": np.array([transmitter.measure(position_m) for position_m in response.indicated_m]),
             "pressure_pa": response.pressure_pa,
         },

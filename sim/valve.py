@@ -73,6 +73,11 @@ class Valve:
         self._theta = self._composition.changed(self._theta, parameters)
 
     @property
+    def by_setpoint(self) -> bool:
+        """Whether its commands are set points, m, that a positioner obeys, and not pressures, Pa."""
+        return self._composition.by_setpoint
+
+    @property
     def time_s(self) -> float:
         """Time since the start."""
         return float(read(self._state).t)

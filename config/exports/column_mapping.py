@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from config.errors import InputError
 from config.exports.export_units import SHARES, allowed_units
-from config.recording import REQUIRED
+from config.recording import BEHIND_POSITIONER, REQUIRED
 
 RANGE_PA = (0.2e5, 1.0e5)
 """The pressures of 0 % and 100 %: the field's usual 0.2 to 1 bar, unless another range is given."""
@@ -54,7 +54,8 @@ def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
     """
     sources = tuple(_source(word) for word in words)
     names = [each.name for each in sources]
-    for name in (*REQUIRED, *names):
+    required = REQUIRED if "command_pa" in names or "reference_m" not in names else BEHIND_POSITIONER
+    for name in (*required, *names):
         if names.count(name) != 1:
             raise InputError("--column", f"{name} is given {names.count(name)} times; once is required")
     return sources

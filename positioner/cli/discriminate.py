@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.experiment_player import player_on, require_ready
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import Progress
-    from sim.effect import find_effect, shipped_effects
+    from sim.effect import find_effect, tried_effects
     from workbench.select.diagnosis import diagnose
     from workbench.select.discrimination import discriminate, rivals_of
 
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     if found.verdict != "one_of":
         print("no rivals to be told apart; nothing was played")
         return 0 if found.verdict in ("adequate", "missing") else 1
-    effects = [find_effect(name, "effects") for name in arguments.effects or shipped_effects()]
+    effects = [find_effect(name, "effects") for name in arguments.effects or tried_effects()]
     told = discriminate(
         fits,
         [*recordings, test] if test else recordings,

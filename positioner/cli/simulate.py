@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="PRESSURE.csv",
-        help="time_s, command_pa: each pressure holds until the next time",
+        help="time_s, command_pa: each pressure holds until the next time; of a valve with a positioner, reference_m",
     )
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="REC.csv")
     parser.add_argument("--noise-m", type=float, default=0.0, help="white sensor noise, standard deviation (0)")
@@ -27,11 +27,13 @@ def run(arguments: argparse.Namespace) -> int:
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.naming import naming
+    from sim.effect import find_effect
     from sim.simulation import simulate
 
     path = find_valve(arguments.valve)
     valve = load_valve(path)
-    time_s, command_pa = read_series(arguments.input, "command_pa")
+    by_setpoint = any(find_effect(each.name, str(path)).by_setpoint for each in valve.effect)
+    time_s, command_pa = read_series(arguments.input, "reference_m" if by_setpoint else "command_pa")
     with naming({"valve file": str(path), "sensor": "--noise-m, --seed"}):
         recording = simulate(valve, time_s, command_pa, noise_std_m=arguments.noise_m, seed=arguments.seed)
     recording.write(arguments.out)

@@ -11,7 +11,7 @@ from sim.effect import PLACES, Effect, Parameter, shipped_effect, shipped_effect
 
 BEGIN = "<!-- catalogue: written by `python -m sim.effects docs/effects.md` -->"
 END = "<!-- end of the catalogue -->"
-WORDS = {"s": "s", "m": "m", "m2": "m²", "m3": "m³", "n": "N", "ns": "N s", "ns2": "N s²", "pa": "Pa"}
+WORDS = {"s": "s", "m": "m", "m2": "m²", "m3": "m³", "ms": "(m s)", "n": "N", "ns": "N s", "ns2": "N s²", "pa": "Pa"}
 """Units as they stand in names, and as they are written."""
 
 

@@ -14,6 +14,7 @@ LOOKS = (
     "under a symmetric command."
 )
 CONFOUNDED = {
+    "asymmetric_viscosity": "moves at several speeds both ways: a viscosity grows with the speed, this does not",
     "preload": "break-away and sliding levels in both directions: a preload shifts both by the same force, an "
     "asymmetry in proportion to each",
     "sensor_offset": "break-away and sliding levels in both directions: an offset shifts both by the same force, an "

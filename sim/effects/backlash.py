@@ -17,6 +17,8 @@ STEP_S = inf
 
 LOOKS = "After every reversal the indication stays while the stem already moves; a slow cycle's branches part by w."
 CONFOUNDED = {
+    "presliding_hysteresis": "small cycles of growing height: a loop of the packing grows with them, a play's has one "
+    "width",
     "coulomb_n": "restarts in the same direction after a hold: friction holds again, the play is taken up already",
     "static_n": "restarts in the same direction after a hold: friction holds again, the play is taken up already",
     "presliding": "restarts in the same direction after a hold: the packing yields again, the play is taken up",

@@ -13,6 +13,7 @@ LOOKS = (
     "The opening and closing branches of the static curve part over the stroke: the dead band widens towards one end."
 )
 CONFOUNDED = {
+    "pressure_power_friction": "the same position at different pressures: just before and just after a reversal",
     "pressure_friction": "the same position at different pressures: just before and just after a reversal",
     "friction_drift": "the same stretch of travel early and late in the record",
 }

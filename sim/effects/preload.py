@@ -11,6 +11,7 @@ from sim.effect import Parameter
 
 LOOKS = "The whole curve of position over pressure is shifted, both branches by the same pressure F_0 / A."
 CONFOUNDED = {
+    "asymmetric_viscosity": "moves at several speeds both ways: a viscosity grows with the speed, this does not",
     "sensor_offset": "",
     "asymmetric_friction": "break-away and sliding levels in both directions: a preload shifts both by the same force, "
     "an asymmetry in proportion to each",

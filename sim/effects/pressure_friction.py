@@ -11,6 +11,7 @@ from sim.effect import Parameter
 
 LOOKS = "The dead band widens with the pressure at which the stem works, at any speed."
 CONFOUNDED = {
+    "pressure_power_friction": "strokes at three pressures and more: the dead band's growth from each to the next",
     "position_friction": "the same position at different pressures: just before and just after a reversal",
     "friction_drift": "the same stretch of travel early and late in the record",
 }

@@ -20,6 +20,7 @@ LOOKS = (
     "and closing if filling and venting do; small steps are untouched."
 )
 CONFOUNDED = {
+    "asymmetric_viscosity": "measured actuator pressure: the limit lies before it, viscous friction after",
     "ip_lag": "steps of different heights: the limit stretches the high ones, the lag none of them",
     "viscous_ns_per_m": "measured actuator pressure: the limit lies before it, viscous friction after",
     "quadratic_drag": "measured actuator pressure: the limit lies before it, drag after",

@@ -8,6 +8,7 @@ from config.slave_file import ModbusRtuBus, ModbusTcpBus, SlaveFile, load_slave,
 from config.valve_file import load_valve
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
+from sim.effect import find_effect
 from sim.slave.clocks import clock_of
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.rtu_server import RtuServer
@@ -67,6 +68,8 @@ def device_of(file: SlaveFile, valve_file: Path) -> Device:
         InputError: a fault in the valve file, or the changes contradict each other.
     """
     described = load_valve(valve_file)
+    if any(find_effect(each.name, str(valve_file)).by_setpoint for each in described.effect):
+        raise InputError(str(valve_file), "has a positioner: the simulated device obeys pressures, not set points")
     valve = Valve.from_file(described, step_s=min(VALVE_STEP_S, file.clock.period_s), source=str(valve_file))
     valve.rest_at(file.initial.position_m, file.initial.pressure_pa)
     return Device(valve, file, described.valve.model_dump(exclude={"name"}))

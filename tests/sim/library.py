@@ -13,12 +13,12 @@ import numpy.typing as npt
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim import karnopp
 from sim.composition import BASE, Composition
-from sim.effect import Effect, execute, shipped_effect, shipped_effects
+from sim.effect import Effect, execute, shipped_effect, tried_effects
 from sim.kernel_source import kernel_source
 from sim.valve import Valve
 
 SEED = load_valve(shipped_valve("seed"))
-EFFECTS = {name: shipped_effect(name, "test") for name in shipped_effects()}
+EFFECTS = {name: shipped_effect(name, "test") for name in tried_effects()}
 Series = npt.NDArray[np.float64]
 
 

@@ -11,7 +11,18 @@ VALVE = SEED.model_copy(
 )
 
 
-def bench(level_pa: float, seed: int, *, mu: float = 0.0, excess_n: float = 0.0, yield_m: float = 0.0) -> Recording:
+def bench(
+    level_pa: float,
+    seed: int,
+    *,
+    mu: float = 0.0,
+    growth_n: float = 0.0,
+    exponent: float = 1.0,
+    excess_n: float = 0.0,
+    yield_m: float = 0.0,
+    viscous_ns_per_m: float = VISCOUS_NS_PER_M,
+    extra_ns_per_m: float = 0.0,
+) -> Recording:
     """A rig pulls the stem up and down, each stroke at its own speed, at a pressure that swings by a fifth."""
     generator = np.random.default_rng(seed)
     corners_m = 0.05 + 0.045 * np.where(np.arange(13) % 2, 1.0, -1.0) * generator.uniform(0.7, 1.0, 13)
@@ -26,11 +37,17 @@ def bench(level_pa: float, seed: int, *, mu: float = 0.0, excess_n: float = 0.0,
             shown = np.clip(shown + (position_m[i] - position_m[i - 1]) / yield_m, -1.0, 1.0)
             direction[i] = shown
     pressure_pa = level_pa * (1.0 + 0.2 * np.sin(0.7 * time_s))
-    level_n = COULOMB_N + mu * pressure_pa + excess_n * np.exp(-((velocity / 0.008) ** 2))
+    level_n = (
+        COULOMB_N
+        + mu * pressure_pa
+        + growth_n * (pressure_pa / 1e5) ** exponent
+        + excess_n * np.exp(-((velocity / 0.008) ** 2))
+    )
     load_n = (
         -AREA_M2 * pressure_pa
         + SPRING_N_PER_M * position_m
-        + VISCOUS_NS_PER_M * velocity
+        + viscous_ns_per_m * velocity
+        + abs(extra_ns_per_m) * np.where(extra_ns_per_m * velocity > 0.0, velocity, 0.0)
         + level_n * direction
         + WEIGHT_N
         + 1.5 * generator.standard_normal(time_s.size)

@@ -35,6 +35,17 @@ def test_of_those_accepted_the_one_with_most_evidence_is_added_and_all_stand_by_
     assert names(step) == ("ip_lag",), "the other is four times as far off in every second"
 
 
+def test_what_comes_after_another_and_does_no_better_is_neither_added_nor_a_rival() -> None:
+    first, more = model_of("presliding", cost=AT_FLOOR), model_of("presliding_hysteresis", cost=0.999 * AT_FLOOR)
+    step = judged(POOR, presliding=first, presliding_hysteresis=more)
+    assert names(step) == ("presliding",)
+    assert "explains no better than presliding" in reasons(step)["presliding_hysteresis"]
+    better = model_of("presliding_hysteresis", cost=0.9 * AT_FLOOR)
+    step = judged(POOR, presliding=first, presliding_hysteresis=better)
+    assert step.added
+    assert step.added.name == "presliding_hysteresis"
+
+
 def test_where_nothing_passes_nothing_is_added() -> None:
     step = judged(POOR, ip_lag=POOR, backlash=POOR)
     assert step.added is None

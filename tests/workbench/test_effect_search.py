@@ -119,6 +119,32 @@ def test_the_steps_do_not_depend_on_the_workers(searched: Callable[..., tuple[Ef
     assert alone == together
 
 
+@pytest.mark.parametrize(
+    ("floors_first", "tried"),
+    [(1.0, False), (5.0, True), (20.0, False)],
+    ids=["it explains all", "it leaves something", "it has no evidence"],
+)
+def test_an_effect_that_comes_after_another_is_tried_where_that_leaves_something(
+    searched: Callable[..., tuple[EffectStep, ...]], floors_first: float, tried: bool
+) -> None:
+    def ends(there: Effects, added: Effects) -> float:
+        if "presliding_hysteresis" in there | added:
+            return 1.0
+        return floors_first if "presliding" in there | added else 20.0
+
+    steps = searched(ends, "backlash", "presliding", "presliding_hysteresis")
+    assert ("presliding_hysteresis" in names(steps[0])) == tried
+    if tried:
+        (step,) = steps
+        assert step.added
+        assert (step.added.name, step.added.model and step.added.model.explained) == ("presliding_hysteresis", True)
+
+
+def test_without_the_other_it_is_tried_from_the_first(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    (step,) = searched(lambda there, added: 1.0 if there | added else 20.0, "presliding_hysteresis")
+    assert names(step) == ["presliding_hysteresis"]
+
+
 def test_it_adds_three_at_most(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
     library = ("ip_lag", "backlash", "stribeck", "quadratic_drag")
     steps = searched(lambda there, added: 100.0 / 3.0 ** len(there | added), *library)

@@ -27,6 +27,9 @@ from workbench.forces.force_diagnosis_json import as_json
 Capture = pytest.CaptureFixture[str]
 
 
+FOUR_PA = (5e4, 1.5e5, 2.5e5, 3.5e5)
+
+
 def diagnosed(seed: int = 1, **hidden: float) -> ForceDiagnosis:
     return diagnose_forces(benches(seed, **hidden), VALVE)
 
@@ -57,6 +60,36 @@ def test_friction_that_grows_with_pressure_is_found_and_nothing_else() -> None:
     assert found.floor_n is not None
     assert found.best.median_error_n < 1.7
     assert found.base.test_rms_n > 4.0
+
+
+@pytest.mark.parametrize(("growth_n", "exponent"), [(40.0, 0.5), (6.0, 2.0), (6.0, 3.0)])
+def test_friction_that_grows_otherwise_than_pressure_is_told_from_one_that_grows_with_it(
+    growth_n: float, exponent: float
+) -> None:
+    levels = enumerate(FOUR_PA)
+    found = diagnose_forces([bench(level_pa, i, growth_n=growth_n, exponent=exponent) for i, level_pa in levels], VALVE)
+    assert found.missing == ("pressure_power_friction",)
+    assert found.best.parameters["pressure_power_friction.exponent"] == exponent
+    assert found.best.parameters["pressure_power_friction.growth_n"] == pytest.approx(growth_n, rel=0.1)
+    linear = next(each for each in found.steps[0].candidates if each.name == "pressure_friction")
+    assert linear.fit.test_rms_n > 1.2 * found.best.test_rms_n
+
+
+def test_friction_that_grows_with_pressure_is_not_called_a_power_of_it() -> None:
+    found = diagnose_forces([bench(level_pa, i, growth_n=12.0) for i, level_pa in enumerate(FOUR_PA)], VALVE)
+    assert found.missing == ("pressure_friction",)
+    assert found.indistinguishable == ()
+    (faster,) = (each for each in found.steps[0].candidates if each.name.startswith("pressure_power"))
+    assert "explains no better than pressure_friction" in faster.rejection_reason
+
+
+def test_viscous_friction_of_two_directions_is_found_and_never_negative() -> None:
+    found = diagnosed(extra_ns_per_m=300.0)
+    assert found.missing == ("asymmetric_viscosity",)
+    assert found.best.parameters["asymmetric_viscosity.extra_ns_per_m"] == pytest.approx(300.0, rel=0.1)
+    beyond = diagnosed(extra_ns_per_m=400.0, viscous_ns_per_m=-150.0)
+    tried = [each for each in beyond.candidates if each.name == "asymmetric_viscosity"]
+    assert any("N s/m one way" in each.rejection_reason for each in tried)
 
 
 def test_two_effects_are_found_one_after_the_other() -> None:

@@ -13,7 +13,7 @@ from config.recording import read_recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from positioner.cli.main import main
 from sim.composition import Composition
-from sim.effect import shipped_effect, shipped_effects
+from sim.effect import first_effects, shipped_effect, shipped_effects
 from tests.workbench.valves import error_of
 from workbench.blind import trial
 from workbench.blind.hiding import Hidden, drawn_effects, drawn_valve, hide, known_valve, strength
@@ -244,7 +244,7 @@ def test_two_effects_differ_and_can_be_told_apart() -> None:
     assert all(len({one.name, other.name}) == 2 for one, other in drawn)
     pairs = {frozenset((one.name, other.name)) for one, other in drawn}
     assert frozenset(("preload", "sensor_offset")) not in pairs
-    assert {name for pair in pairs for name in pair} == set(shipped_effects())
+    assert {name for pair in pairs for name in pair} == set(first_effects())
 
 
 def test_valves_spread_over_their_ranges() -> None:

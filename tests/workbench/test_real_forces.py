@@ -40,12 +40,16 @@ def never_trained_on(request: pytest.FixtureRequest) -> tuple[str, ForceDiagnosi
     return seal, diagnose_forces(runs(seal, 1, 3, 7), CYLINDER, test=runs(seal, 5)[0])
 
 
-def test_friction_grows_with_pressure_then_the_packing_yields(never_trained_on: tuple[str, ForceDiagnosis]) -> None:
+def test_friction_grows_with_a_power_of_pressure_then_the_packing_yields(
+    never_trained_on: tuple[str, ForceDiagnosis],
+) -> None:
     _, found = never_trained_on
-    assert found.missing == ("pressure_friction", "presliding")
+    assert found.missing[:2] == ("pressure_power_friction", "presliding")
     assert found.indistinguishable == ()
-    growth = found.best.parameters["pressure_friction.growth_n_per_pa"]
-    assert 5e-6 < growth < 2e-5
+    linear = next(each for each in found.steps[0].candidates if each.name == "pressure_friction")
+    assert linear.accepted
+    assert 5e-6 < linear.fit.parameters["pressure_friction.growth_n_per_pa"] < 2e-5
+    assert found.best.parameters["pressure_power_friction.exponent"] == 0.7
     assert 5e-5 < found.best.parameters["presliding.yield_m"] < 4e-4
 
 
@@ -53,8 +57,8 @@ def test_the_errors_fall_as_established(never_trained_on: tuple[str, ForceDiagno
     seal, found = never_trained_on
     established_n = {"O-ring": (1.74, 1.32, 0.99), "NAPN": (2.23, 1.44, 0.85)}[seal]
     fell_n = [step.before.test_rms_n for step in found.steps]
-    assert fell_n == pytest.approx(established_n, rel=0.2)
-    assert found.best.test_rms_n == fell_n[-1]
+    assert fell_n[:3] == pytest.approx(established_n, rel=0.2)
+    assert found.best.test_rms_n <= fell_n[-1]
 
 
 def test_the_axis_that_counts_against_the_load_is_turned_and_told(never_trained_on: tuple[str, ForceDiagnosis]) -> None:
@@ -81,7 +85,15 @@ def test_a_falling_friction_with_speed_is_refused_as_unphysical(never_trained_on
 
 def test_one_pressure_alone_does_not_show_that_friction_grows_with_it() -> None:
     found = diagnose_forces(runs("O-ring", 3), CYLINDER)
-    assert "pressure_friction" not in found.missing
+    assert not {"pressure_friction", "pressure_power_friction"} & set(found.missing)
+
+
+@pytest.mark.parametrize("bar", BARS)
+def test_at_whichever_pressure_it_is_judged_friction_grows_with_pressure(bar: int) -> None:
+    """With friction in proportion to the pressure alone, this was refused where the seal is judged at 3 bar."""
+    others = [each for each in BARS if each != bar]
+    found = diagnose_forces(runs("O-ring", *others), CYLINDER, test=runs("O-ring", bar)[0])
+    assert found.missing[0] in {"pressure_friction", "pressure_power_friction"}
 
 
 @pytest.fixture(scope="module")

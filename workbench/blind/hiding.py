@@ -22,7 +22,7 @@ from config.results.result import Brief
 from config.slave_file import Sensor
 from config.valve_file import EffectTable, ValveFile, ValveParameters, find_valve, load_valve
 from sim.composition import Composition
-from sim.effect import Effect, shipped_effect, shipped_effects
+from sim.effect import Effect, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import LEVELS, NOISE_M, Trial, refitted_rmse_m
 
@@ -138,7 +138,7 @@ def known_valve(valve: ValveParameters, generator: Draw) -> ValveParameters:
 
 def drawn_effects(generator: Draw, count: int) -> list[Effect]:
     """Draw different effects, no two of which are one by algebra."""
-    pool = [shipped_effect(name, "shipped effects") for name in shipped_effects()]
+    pool = [shipped_effect(name, "shipped effects") for name in first_effects()]
     order = [pool[i] for i in generator.permutation(len(pool))]
     chosen: list[Effect] = []
     for effect in order:

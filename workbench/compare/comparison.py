@@ -86,6 +86,7 @@ class Comparison(Result):
     pressure_side: PressureSide | None
     time_s: Column
     command_pa: Column
+    """What was asked of it: a pressure, Pa; behind a positioner (`by_setpoint`) the set point, m."""
     measured_m: Column
     simulated_m: Column
     residual_m: Column
@@ -101,6 +102,7 @@ class Comparison(Result):
     input_correlation: Correlation
     spectrum: Spectrum
     friction: FrictionBalance
+    by_setpoint: bool = False
 
     def blocks(self) -> list[Block]:
         """Say where the model fails, the gravest first, and by how much in each phase."""
@@ -138,7 +140,7 @@ class Comparison(Result):
         """Return a row a sample: time, command, position measured and simulated, residual, and the phase's name."""
         return {
             "time_s": self.time_s,
-            "command_pa": self.command_pa,
+            "reference_m" if self.by_setpoint else "command_pa": self.command_pa,
             "measured_m": self.measured_m,
             "simulated_m": self.simulated_m,
             "residual_m": self.residual_m,
@@ -229,6 +231,7 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         friction=balance(
             _all([each.measured_forces for each in segments]), _all([each.model_forces for each in segments])
         ),
+        by_setpoint=record.by_setpoint,
     )
 
 

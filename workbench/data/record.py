@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from config.errors import InputError
 from config.noise import quantum_m
-from config.recording import CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
+from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.motion import rests_first, slips
@@ -52,6 +52,7 @@ class Record(Brief):
 
     time_s: Column
     command_pa: Column
+    """What was asked of it: a pressure, Pa; of a valve behind its positioner (`by_setpoint`) the set point, m."""
     position_m: Column
     pressure_pa: Column | None
     load_n: Column | None
@@ -63,6 +64,7 @@ class Record(Brief):
     """Standard deviation of the sensor's noise, rounding included; None: unknown, and no verdict may rest on it."""
     repeatability_m: float | None
     """How well the valve repeats itself, None where the command does not."""
+    by_setpoint: bool = False
 
     @property
     def floor_m(self) -> float | None:
@@ -101,7 +103,8 @@ def ready(recording: Recording) -> Record:
     columns = recording.columns
     _require_columns(columns)
     notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key == "torn" or key.startswith("not ")]
-    command_pa = _held(recording.command_pa, notes)
+    asked = "reference_m" if recording.by_setpoint else "command_pa"
+    command_pa = _held(columns[asked], asked, notes)
     position_m = recording.position_m
     valid = _valid(position_m, notes)
     segments = tuple(_segments(columns, notes))
@@ -131,6 +134,7 @@ def ready(recording: Recording) -> Record:
         (),
         noise_m,
         repeated_m,
+        recording.by_setpoint,
     )
     return replace(record, segments=tuple(_from_rest(record, notes)), notes=tuple(notes))
 
@@ -196,8 +200,9 @@ def require_units(record: Record, valve: ValveParameters) -> None:
             f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m: it looks like a share of the "
             "stroke, 0 to 1; give it in m",
         )
-    _require_command_unit(record, valve, position_m)
-    _require_pressure_unit(record)
+    if not record.by_setpoint:
+        _require_command_unit(record, valve, position_m)
+        _require_pressure_unit(record)
 
 
 def _require_command_unit(record: Record, valve: ValveParameters, position_m: Column) -> None:
@@ -230,7 +235,8 @@ def _require_pressure_unit(record: Record) -> None:
 
 def _require_columns(columns: Mapping[str, Column]) -> None:
     there = ", ".join(columns) or "none"
-    for name in REQUIRED:
+    by_setpoint = "reference_m" in columns and "command_pa" not in columns
+    for name in BEHIND_POSITIONER if by_setpoint else REQUIRED:
         if name not in columns:
             imposed = "pressure_pa" in columns and "load_n" in columns
             hint = "; where a rig imposes the position: workbench.diagnose_forces" if imposed else ""
@@ -248,13 +254,13 @@ def _require_columns(columns: Mapping[str, Column]) -> None:
         raise InputError("recording", f"time_s must increase: it does not at {set_back} of {count} samples")
 
 
-def _held(command_pa: Column, notes: list[str]) -> Column:
+def _held(command_pa: Column, name: str, notes: list[str]) -> Column:
     finite = np.isfinite(command_pa)
     if not finite.any():
-        raise InputError("recording", "command_pa: no sample is a number")
+        raise InputError("recording", f"{name}: no sample is a number")
     if finite.all():
         return command_pa
-    notes.append(f"command_pa is not a number in {_samples(~finite)}: the command before is held")
+    notes.append(f"{name} is not a number in {_samples(~finite)}: the command before is held")
     last = np.maximum.accumulate(np.where(finite, np.arange(finite.size), 0))
     last[: finite.argmax()] = finite.argmax()
     return command_pa[last]

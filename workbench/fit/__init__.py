@@ -4,6 +4,7 @@ Its files:
 
     fitting            puts it together
     starts, guesses    where searches begin; what the positions suggest
+    setpoint_starts    the same for a valve behind its positioner
     landings           the balance of forces where slides end in rest, from which searches begin too
     objective          what they lower
     descent            how: trust region, and a scan of the stairs

@@ -21,7 +21,7 @@ from config.recording import Column, Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import EffectTable, ValveFile, ValveParameters
-from sim.composition import BASE, STATIC, Composition
+from sim.composition import BASE, SPRING, STATIC, Composition
 from sim.effect import Effect, find_effect
 from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shortened
@@ -34,6 +34,8 @@ from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.guesses import FINEST
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
+from workbench.fit.setpoint_starts import FREE as FREE_BY_SETPOINT
+from workbench.fit.setpoint_starts import setpoint_starts
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
 from workbench.fit.strewing import proved, strewn
 from workbench.fit.threads import on_threads
@@ -191,8 +193,13 @@ def fit(
         return _begun(record, valve, effects, ground, free, workers, progress).finished(profile=profile)
     composition = Composition.from_file(valve)
     error = _error(composition, record, free, from_pressure, sampling(record, valve.valve))
-    origins = composition.theta, forces_regressed(composition.theta, record, valve.valve, from_pressure)
-    begins = base_starts(error, origins, seed, DRAWS)
+    tell = progress or (lambda _: None)
+    if record.by_setpoint and not from_pressure:
+        origins = composition.theta, composition.theta
+        begins = setpoint_starts(error, composition.theta, seed, workers, lambda done: tell(0.5 * done))
+    else:
+        origins = composition.theta, forces_regressed(composition.theta, record, valve.valve, from_pressure)
+        begins = base_starts(error, origins, seed, DRAWS)
     found = _carried(composition, error, begins, OF_BASE, workers, progress).finished(profile=profile)
     return replace(found, seeds=(*found.seeds, *origins))
 
@@ -232,7 +239,12 @@ def _require_shown(effects: Sequence[Effect], by: Sampling) -> None:
 
 
 def _error(
-    composition: Composition, record: Record, free: Sequence[str] | None, from_pressure: bool, by: Sampling
+    composition: Composition,
+    record: Record,
+    free: Sequence[str] | None,
+    from_pressure: bool,
+    by: Sampling,
+    scale: ValveParameters | None = None,
 ) -> SimulationError:
     run = FreeRun(composition, record, from_pressure=from_pressure, by=by)
     reached = [
@@ -242,7 +254,10 @@ def _error(
         for key, declared in each.parameters.items()
         if not declared.given
     ]
-    parameters = free_parameters(composition, [*FREE[by.motion], *reached] if free is None else free)
+    of_base = list(FREE_BY_SETPOINT if record.by_setpoint and not from_pressure else FREE[by.motion])
+    if composition.theta[SPRING] == 0.0 and BASE[SPRING] in of_base:
+        of_base.remove(BASE[SPRING])
+    parameters = free_parameters(composition, [*of_base, *reached] if free is None else free, scale)
     return SimulationError(run, composition, parameters, composition.theta)
 
 
@@ -277,6 +292,12 @@ def _extended(valve: ValveFile, effects: Sequence[str], known: ValveParameters) 
     return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
 
 
+def _scale(base: Fit, known: ValveParameters) -> ValveParameters:
+    """Return the valve by which an effect's starts are scaled: the base fit's, but where that ran into its bounds."""
+    at_bound = [name for name in DEFAULT if name in base.parameters and base.parameters[name].at_bound]
+    return base.valve.valve.model_copy(update={name: getattr(known, name) for name in at_bound if name != BASE[STATIC]})
+
+
 def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTable:
     """Return an effect's table as it vanishes, drawing data as declared."""
     return EffectTable.model_validate({"name": name, **dict(zip(effect.parameters, effect.off(valve), strict=True))})
@@ -305,12 +326,12 @@ def _begun(
     """Search with effects added to a base fit, as far as the middling scale."""
     composition = _extended(base.valve, effects, valve.valve)
     _require_shown(composition.effects[len(base.valve.effect) :], base.by)
-    error = _error(composition, record, free, base.from_pressure, base.by)
+    error = _error(composition, record, free, base.from_pressure, base.by, _scale(base, valve.valve))
     names = {find_effect(name, "effects").name for name in effects}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    starts = effect_starts(error, added, seeds, landed=landed)
+    starts = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint)
     begun = _carried(composition, error, starts, effort, workers, progress)
     return replace(begun, weakest=weakest_start(error, added, seeds[0]))
 

@@ -18,8 +18,8 @@ from workbench.model.parameters import Parameter
 
 FINAL, MIDDLE = 5.0, 30.0
 """Scales, in sigma: of the cost by which fits are compared, and of that by which starts are chosen."""
-HOPELESS = 1e6
-"""What a residual that is not finite counts, in sigma."""
+HOPELESS = 1e3
+"""What a residual that is not finite counts, in strokes. However smooth the sensor, less than that is told apart."""
 INSIDE, SHARPER = 0.49, 0.1
 """Of a quantum: what is well inside its half; of the noise: how far outside counts, where a sensor rounds."""
 
@@ -41,6 +41,7 @@ class SimulationError:
         self._rows = slice(None) if whole else rows
         self._measured_m = record.position_m[self._rows]
         self.sigma_m = record.scale_m or 1e-6 * composition.valve.stroke_m
+        self._hopeless_m = HOPELESS * composition.valve.stroke_m
         self._theta = np.array(theta)
         self._costs: dict[tuple[bytes, float], float] = {}
         bounds = np.array([each.bounds for each in parameters]).reshape(-1, 2)
@@ -70,10 +71,15 @@ class SimulationError:
 
     def residuals(self, z: Vector) -> Vector:
         """Return r, one a valid sample."""
-        return _bounded(self._apart_m(self.theta(z)) / self.sigma_m)
+        return self._bounded_m(self._apart_m(self.theta(z))) / self.sigma_m
 
     def _apart_m(self, theta: Vector) -> Vector:
         return np.asarray(self.run.position_m(theta)[self._rows] - self._measured_m)
+
+    def _bounded_m(self, apart_m: Vector) -> Vector:
+        if apart_m @ apart_m < self._hopeless_m**2:
+            return apart_m
+        return np.where(np.isnan(apart_m), self._hopeless_m, np.clip(apart_m, -self._hopeless_m, self._hopeless_m))
 
     def cost(self, z: Vector, scale: float = FINAL) -> float:
         """Return the soft-L1 cost, half a sum of squares for small residuals; once worked out it is kept."""
@@ -130,8 +136,8 @@ class Unrounded(SimulationError):
         """Return r, one a valid sample."""
         theta = self.theta(z)
         theta[self._index] = 0.0
-        off_m = self._apart_m(theta)
-        return _bounded(np.sign(off_m) * np.maximum(np.abs(off_m) - self._inside_m, 0.0) / (SHARPER * self.sigma_m))
+        off_m = self._bounded_m(self._apart_m(theta))
+        return np.sign(off_m) * np.maximum(np.abs(off_m) - self._inside_m, 0.0) / (SHARPER * self.sigma_m)
 
 
 def smoothed(error: SimulationError, z: Vector) -> SimulationError:
@@ -141,13 +147,6 @@ def smoothed(error: SimulationError, z: Vector) -> SimulationError:
         if each.guess == "quantum" and theta[each.index] > 0.0:
             return Unrounded(error, each, z)
     return error
-
-
-def _bounded(residuals: Vector) -> Vector:
-    if residuals @ residuals < HOPELESS**2:
-        return residuals
-    clipped = np.clip(residuals, -HOPELESS, HOPELESS)
-    return np.where(np.isnan(clipped), HOPELESS, clipped)
 
 
 def root_weights(residuals: Vector, scale: float) -> Vector:

@@ -5,8 +5,9 @@ draws round both. An effect begins at landings with each of its strengths, and o
 none of them too, so that the extended valve is never worse than the base it extends. What the record's positions
 suggest is in `guesses`.
 
-    A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected; where these
-                                                  say nothing of v (`sampling`), over the landings, without F_v v
+    A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected, k_s = 0 stays;
+                                                  where these say nothing of v (`sampling`), over the landings,
+                                                  without F_v v
 
 Landings say nothing of motion: what they do not hold, F_v, F_s inside its interval and the effect's own dynamics, is
 scanned with the rest kept. Every other rest and those between solve for themselves: two starts without a common
@@ -266,7 +267,9 @@ def forces_regressed(theta: Vector, record: Record, valve: ValveParameters, from
     matrix, force_n = _moving(theta[AREA], record, from_pressure)
     if len(force_n) < ENOUGH_MOVING:
         return regressed
-    for index, value in zip((SPRING, VISCOUS, COULOMB), np.linalg.lstsq(matrix, force_n)[0].tolist(), strict=True):
+    first = 0 if theta[SPRING] else 1
+    found = np.linalg.lstsq(matrix[:, first:], force_n)[0].tolist()
+    for index, value in zip((SPRING, VISCOUS, COULOMB)[first:], found, strict=True):
         if value > 0.0:
             regressed[index] = value
     regressed[STATIC] = regressed[COULOMB] * max(1.0, theta[STATIC] / theta[COULOMB]) if theta[COULOMB] else 0.0
@@ -317,8 +320,10 @@ def _moving(area_m2: float, record: Record, from_pressure: bool) -> tuple[Vector
 def with_plays(theta: Vector, added: Sequence[Parameter]) -> list[list[Vector]]:
     """Return theta with narrow, middling and wide plays that friction has stood in for, in all or in part.
 
-    Empty if no play is among the parameters added.
+    Empty if no play is among the parameters added, or there is no spring that tells how wide it may be.
     """
+    if not theta[SPRING]:
+        return []
     widest_m = 2.0 * theta[COULOMB] / theta[SPRING]
     widths_m = np.geomspace(NARROWEST * widest_m, WIDEST * widest_m, 3 * PLAYS).reshape(3, PLAYS).tolist()
     return [

@@ -7,10 +7,13 @@ z is the direction of motion, +1 or -1, until presliding is added. The terms, ea
 force or friction it is:
 
     pressure_friction    mu max(p, 0) z            mu >= 0, N/Pa
+    pressure_power_friction
+                         F_1 (max(p, 0) / p_1)^n z F_1 >= 0, N, at p_1 = 100 kPa; n from 0.3 to 3
     position_friction    g F_c s z                 s = x / L within 0 and 1, L the stroke; friction stays >= 0
     friction_drift       r F_c t z                 t from the recording's start, s
     stribeck             F_x exp(-(v / v_x)^2) z   F_x >= 0, N; v_x from those between 0.1 and 1 of the median speed
     quadratic_drag       c v |v|                   c >= 0
+    asymmetric_viscosity c |v| / 2                 c of either sign, of which F_v takes half: |c| / 2 <= F_v
     spring_hardening     k_3 x^3                   k_3 >= 0
     area_variation       -dA s p                   dA of either sign
     presliding           z' = 1 / x_f within -1 <= z <= 1: the packing yields over x_f = F_c / k_p before it slips
@@ -26,7 +29,7 @@ a pressure or a seal never fitted on. One recording is predicted by fifths, a st
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +39,7 @@ from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import shipped_effect
+from sim.effects.pressure_power_friction import P_1_PA
 from workbench.data.imposed_motion import Rows
 
 FIFTHS = 5
@@ -43,6 +47,8 @@ YIELDS = (5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3)
 """Of the travel: over how much of it the packing may yield."""
 SPEEDS = (0.1, 0.3, 1.0)
 """Of the median speed."""
+EXPONENTS = (0.3, 0.5, 0.7, 1.5, 2.0, 3.0)
+"""Of the pressure."""
 PLACES = 40
 """Cells of the travel in which a residual's scatter is taken."""
 NORMAL = 1.4826
@@ -83,6 +89,7 @@ class ForceModel:
     terms: tuple[str, ...] = ()
     yield_m: float | None = None
     speed_m_per_s: float | None = None
+    exponent: float | None = None
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -102,26 +109,33 @@ class _Column:
 Term = Callable[["Balance", Column, ForceModel], Column]
 
 
+def _pressed(rows: Rows, exponent: float) -> Column:
+    return np.asarray((np.maximum(rows.pressure_pa, 0.0) / P_1_PA) ** exponent)
+
+
 def _share(balance: "Balance") -> Column:
     return np.clip(balance.rows.position_m / balance.valve.stroke_m, 0.0, 1.0)
 
 
 TERMS: Mapping[str, tuple[str, float, Term]] = {
     "pressure_friction": ("growth_n_per_pa", 0.0, lambda b, z, _: np.maximum(b.rows.pressure_pa, 0.0) * z),
+    "pressure_power_friction": ("growth_n", 0.0, lambda b, z, m: _pressed(b.rows, m.exponent or 1.0) * z),
     "position_friction": ("growth_n", -np.inf, lambda b, z, _: _share(b) * z),
     "friction_drift": ("rate_n_per_s", -np.inf, lambda b, z, _: b.time_s * z),
     "stribeck": ("excess_n", 0.0, lambda b, z, m: z * np.exp(-((b.velocity / (m.speed_m_per_s or np.inf)) ** 2))),
     "quadratic_drag": ("drag_ns2_per_m2", 0.0, lambda b, _z, _m: b.velocity * np.abs(b.velocity)),
+    "asymmetric_viscosity": ("extra_ns_per_m", -np.inf, lambda b, _z, _m: 0.5 * np.abs(b.velocity)),
     "spring_hardening": ("cubic_n_per_m3", 0.0, lambda b, _z, _m: b.rows.position_m**3),
     "area_variation": ("change_m2", -np.inf, lambda b, _z, _m: -_share(b) * b.rows.pressure_pa),
 }
-FRICTION = ("pressure_friction", "position_friction", "friction_drift", "stribeck")
+FRICTION = ("pressure_friction", "pressure_power_friction", "position_friction", "friction_drift", "stribeck")
+PRESSED = ("pressure_friction", "pressure_power_friction")
 RELATIVE = {
     "position_friction.growth": "position_friction.growth_n",
     "friction_drift.rate_per_s": "friction_drift.rate_n_per_s",
 }
 """Parameters that an effect has as shares of F_c, and what is fitted in their place."""
-NEEDS_MOTION = ("friction_drift", "stribeck", "quadratic_drag", "presliding")
+NEEDS_MOTION = ("friction_drift", "stribeck", "quadratic_drag", "asymmetric_viscosity", "presliding")
 
 
 class Balance:
@@ -196,11 +210,13 @@ class Balance:
         violations = (
             self._range_violation(columns, reduced, trained, least),
             self._negative_friction(model, values),
+            _negative_viscosity(values),
             _outside(whole),
         )
         deviations = _jackknife(list(others.values()))
         n = int(np.isin(self.fold, trained).sum())
-        free = len(columns) + (model.yield_m is not None) + (model.speed_m_per_s is not None)
+        shapes = (model.yield_m, model.speed_m_per_s, model.exponent)
+        free = len(columns) + sum(each is not None for each in shapes)
         return ForceFit(
             model.effects,
             whole,
@@ -216,14 +232,20 @@ class Balance:
     def _shapes(self, model: ForceModel, values: Mapping[str, float]) -> dict[str, float]:
         shapes = {}
         if model.yield_m is not None:
-            pressed = values.get("pressure_friction.growth_n_per_pa", 0.0) * float(np.mean(self.rows.pressure_pa))
+            up = np.ones(len(self.rows))
+            terms = [(TERMS[name], values[f"{name}.{TERMS[name][0]}"]) for name in model.terms if name in PRESSED]
+            pressed = sum(float(np.mean(growth * term(self, up, model))) for (_, _, term), growth in terms)
             shapes["presliding.yield_m"] = model.yield_m
             shapes["presliding.stiffness_n_per_m"] = (values["coulomb_n"] + pressed) / model.yield_m
+        if model.exponent is not None:
+            shapes["pressure_power_friction.exponent"] = model.exponent
         if model.speed_m_per_s is not None:
             shapes["stribeck.velocity_m_per_s"] = model.speed_m_per_s
         for relative, absolute in RELATIVE.items():
-            if absolute in values and values["coulomb_n"] > 0.0:
-                shapes[relative] = values[absolute] / values["coulomb_n"]
+            if values.get(absolute):
+                # Without any F_c a growth is beyond every share of it.
+                infinite = float(np.copysign(np.inf, values[absolute]))
+                shapes[relative] = values[absolute] / values["coulomb_n"] if values["coulomb_n"] else infinite
         return shapes
 
     def _range_violation(
@@ -254,12 +276,21 @@ class Balance:
         """Return the models that add an effect, one a value of its shape."""
         travel_m = float(np.ptp(self.rows.position_m))
         if name == "presliding":
-            return [ForceModel(before.terms, share * travel_m, before.speed_m_per_s) for share in YIELDS]
-        terms = (*before.terms, name)
+            return [replace(before, yield_m=share * travel_m) for share in YIELDS]
+        extended = replace(before, terms=(*before.terms, name))
+        if name == "pressure_power_friction":
+            return [replace(extended, exponent=each) for each in EXPONENTS]
         if name != "stribeck":
-            return [ForceModel(terms, before.yield_m, before.speed_m_per_s)]
+            return [extended]
         middle = float(np.median(np.abs(self.velocity)))
-        return [ForceModel(terms, before.yield_m, share * middle) for share in SPEEDS]
+        return [replace(extended, speed_m_per_s=share * middle) for share in SPEEDS]
+
+
+def _negative_viscosity(values: Mapping[str, float]) -> str:
+    """Say if viscous friction comes out negative one way; empty if not."""
+    half = 0.5 * abs(values.get("asymmetric_viscosity.extra_ns_per_m", 0.0))
+    least = values.get("viscous_ns_per_m", 0.0) - half
+    return f"not physical: viscous friction would be {least:.3g} N s/m one way" if half and least < 0.0 else ""
 
 
 def _outside(values: Mapping[str, float]) -> str:

@@ -10,7 +10,7 @@ are those that have nothing left to explain then. One step more than is added sh
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from config.recording import Recording
@@ -22,7 +22,7 @@ from workbench.data.imposed_motion import Rows, rows_of
 from workbench.forces.force_balance import Balance, ForceFit, ForceModel, floor_of
 from workbench.select.block_errors import indistinguishable, relative_error_reduction
 from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, candidate_table, draw_race
-from workbench.select.effect_acceptance import Gain
+from workbench.select.effect_acceptance import LEAST_BIC, Gain, no_better
 from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSelection, ForwardStep, without_missing
 from workbench.select.verdict import Verdict
 from workbench.select.verdict_sentence import rivals_sentence
@@ -121,8 +121,8 @@ def _searched(balance: Balance) -> ForceDiagnosis:
     steps: list[ForceStep] = []
     while True:
         floor_n = floor_of(balance.rows, fit.residual_n)
-        found = {name: _best(balance, here, name) for name in balance.names if name not in here.effects}
-        step = _step(len(steps) + 1, fit, {name: fitted for name, (_, fitted) in found.items()})
+        found = {name: _best(balance, here, name) for name in balance.names if _is_new(name, here.effects, library)}
+        step = _step(len(steps) + 1, fit, {name: fitted for name, (_, fitted) in found.items()}, library)
         if steps:
             steps[-1] = without_missing(steps[-1], step, library)
         explained = floor_n is not None and fit.median_error_n <= AT_FLOOR * floor_n
@@ -136,21 +136,34 @@ def _searched(balance: Balance) -> ForceDiagnosis:
     return ForceDiagnosis(tuple(steps), said, sentence, base, fit, floor_n, balance.rows)
 
 
+def _is_new(name: str, there: Sequence[str], library: Mapping[str, Effect]) -> bool:
+    """Whether an effect is neither there already nor a form of one that is."""
+    return name not in there and all(library[name].after != each and library[each].after != name for each in there)
+
+
 def _best(balance: Balance, before: ForceModel, name: str) -> tuple[ForceModel, ForceFit]:
     """Return the shape of an effect that fits best, on what is fitted."""
     fits = [(model, balance.fitted(model)) for model in balance.candidates(before, name)]
     return min(fits, key=lambda each: each[1].train_rms_n)
 
 
-def _step(number: int, before: ForceFit, fits: Mapping[str, ForceFit]) -> ForceStep:
-    tried = (_candidate(number, name, before, fit) for name, fit in fits.items())
-    candidates = tuple(sorted(tried, key=lambda each: -each.gain.bic))
+def _step(number: int, before: ForceFit, fits: Mapping[str, ForceFit], library: Mapping[str, Effect]) -> ForceStep:
+    tried = {name: _candidate(number, name, before, fit) for name, fit in fits.items()}
+    judged = (_after_first(each, tried.get(library[each.name].after)) for each in tried.values())
+    candidates = tuple(sorted(judged, key=lambda each: -each.gain.bic))
     accepted = [each for each in candidates if each.accepted]
     if not accepted:
         return ForwardStep(before, candidates, None, ())
     added = accepted[0]
     rivals = tuple(each for each in accepted if indistinguishable(added.fit.logs, each.fit.logs))
     return ForwardStep(before, candidates, added, rivals)
+
+
+def _after_first(candidate: ForceCandidate, first: ForceCandidate | None) -> ForceCandidate:
+    """Reject what does no better than the effect that it comes after."""
+    if first is None or candidate.rejection_reason or candidate.gain.bic > first.gain.bic + LEAST_BIC:
+        return candidate
+    return replace(candidate, rejection_reason=no_better(first.name))
 
 
 def _candidate(number: int, name: str, before: ForceFit, fit: ForceFit) -> ForceCandidate:

@@ -8,6 +8,9 @@ rate, begins with the pressure nearest to the first command of those that balanc
     at rest      |A p - k_s x| <= F_s
     in motion    A p = k_s x + F_v v + F_c sign v
 
+Behind a positioner no command is a pressure: it begins at rest, with that in the middle of those that balance, and
+the positioner brings it to where it moves.
+
 Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
 of the measurements at its ends. A measured load acts as the pressure load / A besides.
 
@@ -128,6 +131,8 @@ class FreeRun:
         self.from_pressure = from_pressure
         everything = (composition, list(range(len(composition.names))))
         self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
+        if not from_pressure:
+            _require_same_input(self._composition, record)
         drive_pa = _measured(record, self.by) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
@@ -196,6 +201,9 @@ class FreeRun:
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         stem_m = begin.position_m
+        if self._composition.by_setpoint:
+            begin = InitialState(stem_m, 0.0)
+            pressure_pa = float(theta[SPRING] * stem_m / theta[AREA])
         for _ in range(MOST_CORRECTIONS):
             held_pa = equilibrium_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
             state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
@@ -310,6 +318,19 @@ def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:
     )
     bare = Composition.of(ValveFile(valve=composition.valve, effect=tables), kept, composition.source)
     return bare, [composition.names.index(name) for name in bare.names]
+
+
+def _require_same_input(composition: Composition, record: Record) -> None:
+    if record.by_setpoint and not composition.by_setpoint:
+        raise InputError(
+            composition.source,
+            "the recording has a set point, reference_m, and no command_pa: what obeys it must be in the valve file, "
+            '[[effect]] name = "positioner" (docs/recordings.md)',
+        )
+    if composition.by_setpoint and not record.by_setpoint:
+        raise InputError(
+            composition.source, "has a positioner, which obeys a set point: the recording has command_pa, a pressure"
+        )
 
 
 def _measured(record: Record, by: Sampling) -> Column:

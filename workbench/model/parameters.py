@@ -13,6 +13,7 @@ from math import asinh, exp, log, sinh
 import numpy as np
 
 from config.errors import InputError
+from config.valve_file import ValveParameters
 from sim.composition import BASE, COULOMB, STATIC, Composition
 from sim.effect import Guess
 from sim.karnopp import Vector
@@ -75,8 +76,15 @@ class Parameter:
         return asinh(self.least / self.scale), asinh(self.most / self.scale)
 
 
-def free_parameters(composition: Composition, free: Sequence[str]) -> tuple[Parameter, ...]:
+def free_parameters(
+    composition: Composition, free: Sequence[str], scale: ValveParameters | None = None
+) -> tuple[Parameter, ...]:
     """Return the named parameters, Coulomb before static friction.
+
+    Args:
+        composition: the valve.
+        free: names.
+        scale: of what the effects' starts are in units, by default the composition's valve.
 
     Raises:
         InputError: an unknown name, the area, or a stem without Coulomb friction.
@@ -89,19 +97,23 @@ def free_parameters(composition: Composition, free: Sequence[str]) -> tuple[Para
             raise InputError(
                 composition.source, "free: diaphragm_area_m2 cannot be fitted: only ratios of forces are in a recording"
             )
-    return tuple(_parameter(composition, names.index(name)) for name in names if name in free)
+    unit = scale or composition.valve
+    return tuple(_parameter(composition, names.index(name), unit) for name in names if name in free)
 
 
-def _parameter(composition: Composition, index: int) -> Parameter:
+def _parameter(composition: Composition, index: int, scale: ValveParameters) -> Parameter:
     name = composition.names[index]
     if index == STATIC:
         return Parameter(name, index, 1.0, MOST_STATIC)
     if index < len(BASE):
         value = float(composition.theta[index]) or _smallest(composition, name)
+        if value == 0.0:
+            problem = f"{name} is 0 on a drive without spring: it must be more than 0 for a fit to begin from"
+            raise InputError(composition.source, problem)
         return Parameter(name, index, value / FACTOR, value * FACTOR)
     effect, _, key = name.partition(".")
     declared = next(each for each in composition.effects if each.name == effect).parameters[key]
-    starts = declared.starts_for(composition.valve)
+    starts = declared.starts_for(scale)
     return Parameter(name, index, declared.least, declared.most, starts, declared.guess)
 
 

@@ -72,7 +72,7 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> N
             _verdict(comparison),
             _key_figures(comparison, stroke_m),
             _overlay(comparison),
-            signature(comparison.command_pa, comparison.measured_m, [_model(comparison)]),
+            *([] if comparison.by_setpoint else [_signature(comparison)]),
             _phases(comparison, stroke_m),
             _friction(comparison),
             _slips(comparison),
@@ -124,6 +124,10 @@ def _model(each: Comparison) -> Simulated:
     return Simulated("model", MODEL, each.simulated_m)
 
 
+def _signature(each: Comparison) -> Html:
+    return signature(each.command_pa, each.measured_m, [_model(each)])
+
+
 def _overlay(each: Comparison) -> Html:
     valid = np.isfinite(each.residual_m)
     figure = overlay(
@@ -133,6 +137,7 @@ def _overlay(each: Comparison) -> Html:
         [_model(each)],
         phase_shades(each.phase, valid),
         each.slips,
+        by_setpoint=each.by_setpoint,
     )
     return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
 

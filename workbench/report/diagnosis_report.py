@@ -93,7 +93,7 @@ def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, command
             _key_figures(diagnosis, validation),
             _fall(diagnosis, validation),
             _overlay(validation),
-            signature(validation.base.command_pa, validation.base.measured_m, _models(validation)),
+            *([] if validation.base.by_setpoint else [_signature(validation)]),
             _where(validation),
             _ranking(diagnosis, validation),
             _added(diagnosis),
@@ -195,6 +195,10 @@ def _models(validation: _Validation) -> list[Simulated]:
     return models
 
 
+def _signature(validation: _Validation) -> Html:
+    return signature(validation.base.command_pa, validation.base.measured_m, _models(validation))
+
+
 def _overlay(validation: _Validation) -> Html:
     base = validation.base
     whole = bool(validation.held_out.all())
@@ -204,6 +208,7 @@ def _overlay(validation: _Validation) -> Html:
         base.measured_m,
         _models(validation),
         [] if whole else [Shade("held out", HELD_OUT, validation.held_out)],
+        by_setpoint=base.by_setpoint,
     )
     told = "All of it was held out." if whole else "On the green ground: what was held out."
     return overlaid(figure, told, base.time_s.size)

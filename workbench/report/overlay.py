@@ -6,6 +6,7 @@ Behind them stand the phases, or what was held out; triangles mark slips that th
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,21 @@ class Shade:
     rows: Mask
 
 
+class Asked(NamedTuple):
+    """What was asked of a valve, and how it is drawn."""
+
+    name: str
+    unit: str
+    si: str
+    factor: float
+    """From SI to the unit drawn."""
+    digits: int
+    """After the point, in SI."""
+
+
+COMMAND, SETPOINT = Asked("command", "kPa", "Pa", 1e-3, 0), Asked("set point", "mm", "m", 1e3, 7)
+
+
 def overlay(
     time_s: Column,
     command_pa: Column,
@@ -53,8 +69,13 @@ def overlay(
     models: Sequence[Simulated],
     shades: Sequence[Shade],
     slips: SlipEvents | None = None,
+    *,
+    by_setpoint: bool = False,
 ) -> Figure:
-    """Return the figure; time, s, command, Pa, and positions, m, are (n,), NaN where there is nothing."""
+    """Return the figure; time, s, command, Pa, and positions, m, are (n,), NaN where there is nothing.
+
+    Behind a positioner (`by_setpoint`) the command is a set point, m.
+    """
     traces: list[Trace] = [*_grounds(time_s, shades)]
     traces.append(_position(time_s, measured_m, "measured", MEASURED, "y"))
     for each in models:
@@ -64,14 +85,15 @@ def overlay(
     if slips is not None and bool(np.all(np.diff(time_s) > 0.0)):
         traces += _marks(time_s, measured_m, slips)
     command = drawn(time_s, command_pa)
+    asked = SETPOINT if by_setpoint else COMMAND
     traces.append(
         line(
             rounded(command.time_s, 5),
-            rounded(1e-3 * command.value, 3),
-            "command",
+            rounded(asked.factor * command.value, 3),
+            asked.name,
             QUIET,
-            "%{y:.2f} kPa (%{customdata:.6~g} Pa)<br>at %{x:.3f} s",
-            customdata=rounded(command.value, 0),
+            f"%{{y:.2f}} {asked.unit} (%{{customdata:.6~g}} {asked.si})<br>at %{{x:.3f}} s",
+            customdata=rounded(command.value, asked.digits),
             yaxis="y3",
             showlegend=False,
         )
@@ -90,12 +112,12 @@ def overlay(
                 spikethickness=1,
                 spikecolor=GRID,
             ),
-            **_axes(bool(shades)),
+            **_axes(bool(shades), f"{asked.name}, {asked.unit}"),
         ),
     }
 
 
-def _axes(has_ground: bool) -> Figure:
+def _axes(has_ground: bool, asked: str) -> Figure:
     """Return the ordinates; a ground is an axis of its own from 0 to 1, which gives its place to what overlays it."""
     position, error = {"domain": [0.50, 1.0]}, {"domain": [0.21, 0.45]}
     ground = {"range": [0, 1], "visible": False, "fixedrange": True}
@@ -104,7 +126,7 @@ def _axes(has_ground: bool) -> Figure:
     return {
         "yaxis": axis("position, mm", **({"overlaying": "y4"} if has_ground else position)),
         "yaxis2": axis("error, mm", **zero, **({"overlaying": "y5"} if has_ground else error)),
-        "yaxis3": axis("command, kPa", domain=[0.0, 0.16], nticks=4),
+        "yaxis3": axis(asked, domain=[0.0, 0.16], nticks=4),
         **behind,
     }
 

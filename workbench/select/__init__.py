@@ -9,6 +9,7 @@ Its files:
     knife_edges                                   held-out slips that are narrowly mistimed, by name
     verdict, verdict_sentence                     what follows, and how it is said
     equivalence                                   what no recording tells apart
+    positioner_or_packing                         what holds a stem behind its positioner
     tangent_preview                               the quick first ranking
     experiment, experiment_design                 the input that tells rivals apart: off a menu, or designed
     discrimination                                rivals told apart by one experiment after another

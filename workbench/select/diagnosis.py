@@ -13,7 +13,7 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import find_effect, shipped_effects
+from sim.effect import find_effect, tried_effects
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
 from workbench.model.sampling import sampling
@@ -23,6 +23,7 @@ from workbench.select.effect_search import EffectSearch, Progress
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
+from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
 from workbench.select.verdict import Verdict, verdict
 from workbench.select.verdict_sentence import verdict_sentence
@@ -44,6 +45,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     sentence: str
     unseen: Mapping[str, str] = field(default_factory=dict)
     """Effects that were not tried, and why a recording sampled like this one cannot show them."""
+    positioner: PositionerOrPacking | None = None
+    """Of a recording of set point and travel: what holds the stem."""
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -57,6 +60,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         if self.best.fit.by.slow:
             said.append(self.best.fit.by.sentence)
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
+        if self.positioner:
+            said.append(self.positioner.sentence)
         for number, step in enumerate(self.steps, start=1):
             errors = step.before.errors
             title = (
@@ -126,7 +131,7 @@ def diagnose(
     """
     parts = split([recording] if isinstance(recording, Recording) else recording, test)
     there = {each.name for each in valve.effect}
-    named = [find_effect(name, "effects") for name in (shipped_effects() if effects is None else effects)]
+    named = [find_effect(name, "effects") for name in (tried_effects() if effects is None else effects)]
     by = sampling(parts.train.record, valve.valve)
     unseen = {each.written: by.left_out(each) for each in named if by.left_out(each)}
     library = {each.written: each for each in named if each.written not in there and each.written not in unseen}
@@ -135,7 +140,12 @@ def diagnose(
     search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell)
 
     base = search.base(valve)
-    scores = preview(base.fit, parts, library, threads)
+    first = {name: each for name, each in library.items() if each.after not in library}
+    held = None
+    if parts.train.record.by_setpoint:
+        tell("positioner or packing", 0.0)
+        held = positioner_or_packing(parts, base, seed=seed, workers=threads)
+    scores = preview(base.fit, parts, first, threads)
     if on_preview:
         on_preview(scores)
     steps = search.steps(base)
@@ -154,4 +164,5 @@ def diagnose(
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts),
         unseen=unseen,
+        positioner=held,
     )

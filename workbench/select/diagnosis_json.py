@@ -18,6 +18,11 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": diagnosis.verdict,
         "sentence": diagnosis.sentence,
+        "held_by": diagnosis.positioner
+        and {
+            "cause": diagnosis.positioner.cause,
+            "sentence": diagnosis.positioner.sentence,
+        },
         "missing": list(diagnosis.missing),
         "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
         "suspected": list(diagnosis.suspected),

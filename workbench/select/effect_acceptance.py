@@ -55,6 +55,11 @@ class Gain:
         return ""
 
 
+def no_better(first: str) -> str:
+    """Say why an effect is refused that comes after another and has not `LEAST_BIC` more evidence."""
+    return f"explains no better than {first}, after which it is tried"
+
+
 def gain(base: Fit, candidate: Fit, base_errors: BlockErrors, candidate_errors: BlockErrors) -> Gain:
     """Compare a candidate with its base."""
     held_out, standard_errors = relative_error_reduction(base_errors.logs, candidate_errors.logs)

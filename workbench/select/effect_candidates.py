@@ -11,7 +11,7 @@ from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fitting import Fit
 from workbench.select.block_errors import BlockErrors, indistinguishable
-from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
+from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
 from workbench.select.residual_structure import STRUCTURED
@@ -53,6 +53,8 @@ class EffectCandidate(Candidate):
     model: EvaluatedModel | None
     gain: Gain | None
     physical: bool
+    outdone: bool = False
+    """It comes after another effect that explains as much."""
 
     @property
     def evidence(self) -> float:
@@ -74,7 +76,8 @@ def judged_step(
         number: of the step, from 1.
         library: the effects by name.
     """
-    candidates = tuple(_candidate(number, name, before, model, library) for name, model in models.items())
+    tried = {name: _candidate(number, name, before, model, library) for name, model in models.items()}
+    candidates = tuple(_after_first(each, tried.get(library[each.name].after)) for each in tried.values())
     equivalent = _bare_equivalent(candidates, before.explained, library)
     candidates, added = _best(_better_than(equivalent, candidates) if equivalent else candidates, library)
     suspect = None if added or equivalent else _suspect(candidates, library)
@@ -94,6 +97,13 @@ def _candidate(
     if same and not reason:
         reason = f"no record of pressure and position tells it from {same}"
     return EffectCandidate(number, name, reason, model, found, not beyond)
+
+
+def _after_first(candidate: EffectCandidate, first: EffectCandidate | None) -> EffectCandidate:
+    """Reject what does no better than the effect that it comes after."""
+    if first is None or candidate.evidence > first.evidence + LEAST_BIC:
+        return candidate
+    return replace(candidate, rejection_reason=candidate.rejection_reason or no_better(first.name), outdone=True)
 
 
 def _best(
@@ -159,13 +169,17 @@ def _rivals(
 
 def _may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> bool:
     """Whether an effect is physical, has evidence, and is not the bare valve by another name."""
-    evident = candidate.physical and candidate.evidence > LEAST_BIC
+    evident = candidate.physical and not candidate.outdone and candidate.evidence > LEAST_BIC
     return evident and bare_parameter(candidate.name, library) is None
 
 
 def _passing(candidates: Sequence[EffectCandidate], explained: bool) -> list[EffectCandidate]:
     """Return the physical ones that pass the rule, as it is where something is left to explain, or nothing."""
-    return [each for each in candidates if each.physical and each.gain and not each.gain.rejection_reason(explained)]
+    return [
+        each
+        for each in candidates
+        if each.physical and not each.outdone and each.gain and not each.gain.rejection_reason(explained)
+    ]
 
 
 def _evidence(candidate: EffectCandidate) -> float:

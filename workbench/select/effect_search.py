@@ -1,9 +1,11 @@
 """The forward search by simulation: every effect of the library refitted, step by step.
 
 A step fits the valve with each effect added. One whose first search ends far behind another's is not searched further,
-unless the step would name it. Before they are judged, the valve without is fitted once more from the base parameters of
-the best of those with: an optimiser's failure must not look like physics. Steps go on until the added model explains
-all, nothing more is accepted, or three effects are added.
+unless the step would name it. An effect that comes after another (`AFTER` in its file) is fitted only where that one
+has evidence, or is in the model already, and what the step would add leaves something to explain. Before they are
+judged, the valve without is fitted once more from the base parameters of the best of those with: an optimiser's failure
+must not look like physics. Steps go on until the added model explains all, nothing more is accepted, or three effects
+are added.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -112,14 +114,30 @@ class EffectSearch:
         return None
 
     def _step(self, number: int, before: EvaluatedModel) -> EffectStep:
-        names = [name for name in self._library if name not in before.effects]
+        missing = [name for name in self._library if name not in before.effects]
+        names = [name for name in missing if self._library[name].after not in missing]
         models = self._refitted(number, before, names)
         before = self._base_from(before, [each for each in models.values() if isinstance(each, EvaluatedModel)])
         # No effect makes a valve worse: what the base has left behind is refitted from it.
         fitted = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
         behind = [name for name, each in fitted.items() if log_likelihood_difference(before.fit, each) > LEFT_BEHIND]
         models |= self._refitted(number, before, behind, landed=False)
-        return self._judged_in_full(judged_step(before, models, number, self._library), models, number)
+        step = self._judged_in_full(judged_step(before, models, number, self._library), models, number)
+        later = self._worth_trying_after(step)
+        if not later:
+            return step
+        models = {each.name: each.model or each.rejection_reason for each in step.candidates}
+        models |= self._refitted(number, step.before, later)
+        return self._judged_in_full(judged_step(step.before, models, number, self._library), models, number)
+
+    def _worth_trying_after(self, step: EffectStep) -> list[str]:
+        """Return the effects that come after one that has evidence, if the step leaves something to explain."""
+        best = step.added.model if step.added and step.added.model else step.before
+        if best.explained:
+            return []
+        evident = {each.name for each in step.candidates if each.evidence > LEAST_BIC}
+        tried = {each.name for each in step.candidates}
+        return [name for name, each in self._library.items() if each.after in evident and name not in tried]
 
     def _judged_in_full(self, step: EffectStep, models: dict[str, EvaluatedModel | str], number: int) -> EffectStep:
         """Judge a step anew as long as it names an effect that was out of the race: refitted in full before."""

@@ -61,7 +61,7 @@ class Undetectable:
 
 def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
     """Return what may be there unseen beside the effects of a fitted valve: a play that friction stands in for."""
-    if any(each.name == BACKLASH for each in valve.effect):
+    if any(each.name == BACKLASH for each in valve.effect) or not valve.valve.spring_n_per_m:
         return ()
     widest_m = 2.0 * valve.valve.coulomb_n / valve.valve.spring_n_per_m
     least_m = LEAST_PLAY * split.scale_m

@@ -1,0 +1,111 @@
+"""Recordings of set point and travel: read, fitted with the positioner in the path, and what holds the stem."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.exports.column_mapping import read_mapping
+from config.recording import Recording
+from config.valve_file import ValveFile
+from sim.simulation import simulate
+from tests.sim.test_positioner import PA_PER_M, valve_file
+from workbench import compare, fit
+from workbench.report import Subject, report_comparison
+from workbench.select.effect_acceptance import Gain
+from workbench.select.positioner_or_packing import PositionerOrPacking, cause
+
+KNOWN = valve_file(200.0, gain_pa_per_ms=0.4 * PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
+
+
+def recorded(valve: ValveFile, seed: int, duration_s: int = 150) -> Recording:
+    """Set points as a flow controller writes them: many small changes, some large; seen once a second."""
+    generator = np.random.default_rng(seed)
+    setpoint_m, here = np.empty(duration_s), 0.05
+    k = 0
+    while k < duration_s:
+        here = here + 0.006 * generator.standard_normal() if generator.random() < 0.7 else generator.uniform(0.02, 0.08)
+        holds = int(generator.integers(3, 20))
+        setpoint_m[k : k + holds] = here = float(np.clip(here, 0.01, 0.09))
+        k += holds
+    whole = simulate(valve, np.arange(duration_s, dtype=float), setpoint_m, noise_std_m=5e-5, seed=seed)
+    return Recording({name: column for name, column in whole.columns.items() if name != "pressure_pa"})
+
+
+def test_a_file_of_set_point_and_travel_is_read_and_one_without_either_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "trend.csv"
+    recorded(KNOWN, 1, 30).write(path)
+    assert Recording.read(path).by_setpoint
+    path.write_text("time_s,position_m\n0,0\n1,0\n")
+    with pytest.raises(InputError, match="column command_pa is missing"):
+        Recording.read(path)
+
+
+def test_an_export_may_map_its_set_point_in_the_place_of_a_command() -> None:
+    sources = read_mapping(["time_s=t", "position_m=PV:%", "reference_m=SP:%"])
+    assert [each.name for each in sources] == ["time_s", "position_m", "reference_m"]
+    with pytest.raises(InputError, match="command_pa is given 0 times"):
+        read_mapping(["time_s=t", "position_m=PV:%"])
+
+
+def test_without_a_positioner_in_the_valve_file_it_is_refused_with_what_to_write() -> None:
+    bare = ValveFile(valve=KNOWN.valve)
+    with pytest.raises(InputError, match=r'\[\[effect\]\] name = "positioner"'):
+        compare(recorded(KNOWN, 1, 60), bare)
+
+
+def test_the_valve_itself_is_compared_in_set_points(tmp_path: Path) -> None:
+    compared = compare(recorded(KNOWN, 1, 60), KNOWN)
+    assert compared.rms_m < 1e-3
+    assert "reference_m" in compared.frame_columns()
+    report_comparison(compared, tmp_path / "compared.html", Subject(KNOWN, (), {}))
+    page = (tmp_path / "compared.html").read_text(encoding="utf-8")
+    assert "set point, mm" in page
+    assert "command, kPa" not in page
+
+
+def test_pressures_are_not_taken_for_set_points() -> None:
+    by_pressure = Recording({"time_s": np.arange(60.0), "command_pa": np.full(60, 4e4), "position_m": np.zeros(60)})
+    with pytest.raises(InputError, match="has a positioner, which obeys a set point: the recording has command_pa"):
+        compare(by_pressure, KNOWN)
+
+
+def test_the_positioner_is_fitted_as_the_rest() -> None:
+    truth = valve_file(300.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.004, filling_pa_per_s=9e3, venting_pa_per_s=6e3)
+    found = fit(recorded(truth, 3), KNOWN, profile=False)
+    assert found.rms_m < 4e-4, "of 80 mm, some 0.1 mm of which is when a sample falls into a jump"
+    value = {name: each.value for name, each in found.parameters.items()}
+    assert set(value) == {"coulomb_n", "static_n"} | {
+        f"positioner.{key}"
+        for key in ("gain_pa_per_ms", "integral_time_s", "dead_band_m", "filling_pa_per_s", "venting_pa_per_s")
+    }
+    assert value["coulomb_n"] == pytest.approx(300.0, rel=0.25)
+    assert value["positioner.dead_band_m"] == pytest.approx(0.004, rel=0.2)
+    assert value["positioner.filling_pa_per_s"] == pytest.approx(9e3, rel=0.1)
+    assert value["positioner.venting_pa_per_s"] == pytest.approx(6e3, rel=0.1)
+
+
+def worth(*, needed: bool) -> Gain:
+    return Gain(500.0, 0.4, 8.0, 0.5) if needed else Gain(-4.0, 0.0, 0.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("friction", "dead_band", "said"),
+    [
+        (True, False, "It is the packing, not the positioner"),
+        (False, True, "It is the positioner, not the packing"),
+        (True, True, "It is both, packing and positioner"),
+        (False, False, "does not tell the positioner's dead band from the packing's friction"),
+    ],
+)
+def test_what_is_needed_is_what_holds_the_stem(friction: bool, dead_band: bool, said: str) -> None:
+    gains = worth(needed=friction), worth(needed=dead_band)
+    found = PositionerOrPacking(cause(*gains), *gains, 1e-3, 8e-4, 2e-4, 300.0, 4e-3, 1.1e-2, found_twice=True)
+    assert said in found.sentence
+
+
+def test_evidence_of_samples_that_hang_together_is_none() -> None:
+    """A slip that comes late is off for all samples until the next."""
+    late = Gain(500.0, 0.4, 8.0, 0.01)
+    assert cause(late, late) == "not told"
