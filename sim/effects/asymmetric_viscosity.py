@@ -28,8 +28,8 @@ class Parameters(NamedTuple):
         float,
         Parameter(
             "what one direction has more, > 0: opening",
-            -1e8,
-            1e8,
+            -1e6,
+            1e6,
             off=0.0,
             starts=(-0.1, 0.1, -0.4, 0.4, -1.5, 1.5),
             scale="viscous_ns_per_m",
