@@ -28,7 +28,7 @@ their intervals share (`breakaway_force`).
 
 from dataclasses import dataclass, replace
 from functools import reduce
-from math import nan, sqrt
+from math import inf, nan, sqrt
 
 import numpy as np
 
@@ -60,11 +60,13 @@ LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
 DETECTED_WITHIN = 3
 """Samples after which a stem that left its rest has measurably done so."""
 LARGEST_RESIDUAL = 5e-3
-"""Share of the travel above which residuals are a misfit, whatever noise was measured: no transmitter is as bad."""
+"""Share of the travel above which residuals that are not white are a misfit, whatever noise was measured."""
 AS_WELL = 1.1
 """Ratio of the residuals up to which another model explains a motion as well."""
 APART = 3.0
 """Standard deviations beyond which two values of b/c are different ones."""
+ENOUGH_FOR_WHITE = 60
+"""Residuals whose neighbours tell whether they are white."""
 UNSEEN = 1e-3
 """Of what the stem sweeps: where the noise is unknown, what differs by less is no motion."""
 LEAST_MISFIT = 2e-4
@@ -209,15 +211,24 @@ def _does_not_fit(each: _Hypothesis, noise_std_m: float | None, settings: BatchS
 
 
 def _allowed_m(each: _Hypothesis, noise_std_m: float | None, settings: BatchSettings) -> float:
-    """Return how large residuals may be, m: as the sensor's noise; where that was measured, as any sensor's.
+    """Return how large residuals may be, m: as the sensor's noise, and unless they are white no more than any sensor's.
 
-    Where it is unknown only what no sensor would show passes.
+    Where the noise is unknown, as of a stem that never rests, white residuals are noise; of others only what no sensor
+    would show passes.
     """
+    white = each.fit is not None and _is_white(each.fit)
+    if white and noise_std_m is None:
+        return inf
     travel_m = max(float(np.ptp(segment.position_m)) for segment in each.chosen)
     allowed_m = max(MISFIT * (noise_std_m or 0.0), LEAST_MISFIT * travel_m)
-    if settings.noise_std_m is None:
+    if settings.noise_std_m is None and not white:
         allowed_m = min(allowed_m, LARGEST_RESIDUAL * travel_m)
     return allowed_m
+
+
+def _is_white(fit: LikelihoodFit) -> bool:
+    """Return whether nothing of the model's is in the residuals, as far as neighbours tell."""
+    return fit.count >= ENOUGH_FOR_WHITE and abs(fit.correlation) <= SIGNIFICANT
 
 
 def _preload_explains_as_well(best: _Hypothesis, noise_std_m: float | None, settings: BatchSettings) -> bool:
