@@ -126,7 +126,7 @@ def test_a_node_that_refuses_a_setting_is_left_as_it_was_found(other: OtherNode,
     other.constant = {constant}
     with pytest.raises(Refused, match="SDO abort"):
         driver_of(other).open()
-    assert (0, bytes((128, NODE))) in other.frames, "it had been made PRE-OPERATIONAL"
+    assert other.hears(0, bytes((128, NODE))), "it had been made PRE-OPERATIONAL"
     assert other.settles("OPERATIONAL")
     assert other.configuration == before
 
@@ -142,9 +142,10 @@ def test_a_node_that_is_as_wanted_is_told_nothing_but_to_be_active(other: OtherN
     again = driver_of(other, heartbeat_s=1e-3 * HEARTBEAT_MS)
     assert again.open() == HELD_PA
     again.close()
+    assert other.hears(0, bytes((1, NODE))), "it is started"
     told = [(identity, data) for identity, data in other.frames if identity == 0 or data[0] & 0xE0 == 0x20]
     assert {data[1:3] for identity, data in told if identity} == {b"\x40\x60"}, "the control word"
-    assert [data for identity, data in told if not identity] == [bytes((1, NODE))], "and started, never stopped"
+    assert [data for identity, data in told if not identity] == [bytes((1, NODE))], "never stopped"
 
 
 def test_a_node_without_heartbeat_lives_by_its_pdos(other: OtherNode, monkeypatch: pytest.MonkeyPatch) -> None:
