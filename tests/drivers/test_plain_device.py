@@ -1,6 +1,8 @@
 """The Modbus driver before a device that is not ours and knows little: modbus-tk, and functions 3, 4 and 6 alone."""
 
+import socket
 import struct
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 
@@ -50,6 +52,19 @@ class PlainDevice:
         self.show(POSITION, 150)
         self.show(COMMAND, 40)
         self.server.start()
+        self._await_listening()
+
+    def _await_listening(self) -> None:
+        """The library begins to listen in a thread of its own."""
+        end_s = time.monotonic() + 30.0
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", self.port), 1.0).close()
+            except ConnectionRefusedError:
+                assert time.monotonic() < end_s
+                time.sleep(1e-3)
+            else:
+                return
 
     def show(self, address: int, word: int) -> None:
         self.slave.set_values("registers", address, [word])
