@@ -112,7 +112,7 @@ class OtherDevice:
 
     def __init__(self, position_m: float, parameters: Parameters) -> None:
         self.stem = Stem(parameters, position_m)
-        self.port = _free_port()
+        self.port = free_port()
         self._server = TcpServer(self.port, "127.0.0.1")
         self._slave = self._server.add_slave(UNIT)
         self._slave.add_block("registers", defines.HOLDING_REGISTERS, 0, 64)
@@ -125,8 +125,7 @@ class OtherDevice:
         """Live and answer."""
         self._sample()
         self._server.start()
-        while not _listens(self.port):
-            pass
+        await_listening(self.port)
         self._thread.start()
 
     def stop(self) -> None:
@@ -191,12 +190,20 @@ def _know_no_function_23(slave: Slave) -> None:
     slave.handle_request = handle_request
 
 
-def _free_port() -> int:
+def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port: int = free.getsockname()[1]
     return port
 
 
-def _listens(port: int) -> bool:
-    with socket.socket() as line:
-        return line.connect_ex(("127.0.0.1", port)) == 0
+def await_listening(port: int) -> None:
+    """Wait for a server on this machine: the library begins to listen in a thread of its own."""
+    end_s = time.monotonic() + 30.0
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", port), 1.0).close()
+        except ConnectionRefusedError:
+            assert time.monotonic() < end_s
+            time.sleep(1e-3)
+        else:
+            return

@@ -26,9 +26,8 @@ from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER, Node
 from drivers.canopen.only_watch import WatchingDriver
 from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.readings import capabilities_of, reading_of
-from drivers.canopen.sdo import HEARTBEAT_MS, ILLEGAL_VALUE, SdoTransfers, Setting, sheet_variable
+from drivers.canopen.sdo import HEARTBEAT_MS, ILLEGAL_VALUE, SdoTransfers, Setting, device_sheet
 from drivers.canopen.watcher import NodeWatcher
-from fieldbus.canopen.eds import read_eds
 
 START, ENTER_PRE_OPERATIONAL = 1, 128
 SYNC = 0x1005
@@ -55,9 +54,7 @@ class CanopenDriver:
     """
 
     def __init__(self, config: CanopenDevice) -> None:
-        sheet = read_eds(config.eds, config.node)
-        for name, entry in config.map.entries.items():
-            sheet_variable(sheet, config, name, entry)
+        sheet = device_sheet(config)
         self._config = config
         self._bus = NodeBus(config)
         self._watcher = NodeWatcher(config, self._bus)

@@ -5,9 +5,8 @@ from drivers.boundary import Capabilities, Reading, Refused
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, NodeBus
 from drivers.canopen.readings import capabilities_of, reading_of
-from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, sheet_variable
+from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, device_sheet
 from drivers.canopen.watcher import NodeWatcher
-from fieldbus.canopen.eds import read_eds
 
 
 class WatchingDriver:
@@ -21,9 +20,7 @@ class WatchingDriver:
     """
 
     def __init__(self, config: CanopenDevice) -> None:
-        sheet = read_eds(config.eds, config.node)
-        for name, entry in config.map.entries.items():
-            sheet_variable(sheet, config, name, entry)
+        sheet = device_sheet(config)
         self._config = config
         self._bus = NodeBus(config)
         self._sdo = SdoTransfers(config, sheet, self._bus, NodeWatcher(config, self._bus))

@@ -139,7 +139,7 @@ class PdoExchange:
         self._command = can.Message(arbitration_id=rpdo.cob_id, data=bytes(8), is_extended_id=False)
 
     def use_found(self, sdo: SdoTransfers) -> bool:
-        """Use the node's PDOs as they were found, if they carry what is wanted; return whether they do.
+        """Use the node's PDOs as they were found, if they carry what is wanted, else our own; return whether they do.
 
         Raises:
             DriverError: as `SdoTransfers.upload`.

@@ -25,6 +25,7 @@ from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refus
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, SDO_REQUEST, NodeBus
 from drivers.canopen.watcher import NMT_STATES, OPERATIONAL, PRE_OPERATIONAL, NodeWatcher
+from fieldbus.canopen.eds import read_eds
 
 ILLEGAL_VALUE = 3
 """The code of `Refused` for a value that the device cannot be told, as Modbus has it."""
@@ -56,6 +57,18 @@ def sheet_variable(sheet: ObjectDictionary, config: CanopenDevice, name: str, en
         where = f"{entry.index:#06x} sub {entry.subindex}"
         raise InputError(str(config.eds), f"device.map.{name}: the data sheet has no number at {where}")
     return found
+
+
+def device_sheet(config: CanopenDevice) -> ObjectDictionary:
+    """Read the data sheet of a node, and see that it has all that the map names.
+
+    Raises:
+        InputError: the data sheet cannot be read, or has not what the map names.
+    """
+    sheet = read_eds(config.eds, config.node)
+    for name, entry in config.map.entries.items():
+        sheet_variable(sheet, config, name, entry)
+    return sheet
 
 
 class Setting(NamedTuple):

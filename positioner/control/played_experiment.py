@@ -91,9 +91,7 @@ class PlayedExperiment:
 def experiment_after(
     before: PlayedExperiment, request: ExperimentRequest, around: Surroundings, limits: ExperimentLimits
 ) -> PlayedExperiment:
-    """Return the experiment after one more step."""
-    if before.is_idle(request):
-        return before
+    """Return the experiment after one more step, where it is not idle."""
     here = replace(before, starts=request.starts)
     if not here.commands:
         return _started(here, request, around, limits)

@@ -6,7 +6,6 @@ The scripted device below answers honestly, from a simulated device, until it is
 import socket
 import struct
 import threading
-import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -21,6 +20,7 @@ from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
+from tests.refusals import refusal_of
 
 pytestmark = pytest.mark.real_time
 
@@ -96,24 +96,15 @@ def driver(scripted: ScriptedDevice) -> Iterator[ModbusTcpDriver]:
     driver.close()
 
 
-def refused_as(driver: ModbusTcpDriver, kind: type[DriverError], act: Callable[[], object]) -> str:
+def refused_as(kind: type[DriverError], act: Callable[[], object]) -> str:
     """Return what the error says: one line that names the device."""
-    start_s = time.perf_counter()
-    with pytest.raises(DriverError) as caught:
-        act()
-    assert time.perf_counter() - start_s < 5 * REPLY_TIMEOUT_S, "in a bounded time"
-    assert type(caught.value) is kind, caught.value
-    text = str(caught.value)
-    assert "\n" not in text
-    assert text.startswith("127.0.0.1:")
-    assert " unit 1: " in text
-    return text
+    return refusal_of(kind, act, names="127.0.0.1:", within_s=5 * REPLY_TIMEOUT_S)
 
 
 def recovers(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
     """Whatever happened: no call works until `open`, and then the newest measurement comes."""
-    refused_as(driver, NoConnection, driver.read)
-    refused_as(driver, NoConnection, lambda: driver.write(PUSH_PA))
+    refused_as(NoConnection, driver.read)
+    refused_as(NoConnection, lambda: driver.write(PUSH_PA))
     scripted.fault = honest
     driver.open()
     reading = driver.exchange(PUSH_PA)
@@ -147,7 +138,7 @@ def test_a_reply_that_does_not_fit_ends_the_connection(
     driver: ModbusTcpDriver, scripted: ScriptedDevice, fault: Fault
 ) -> None:
     scripted.fault = fault
-    text = refused_as(driver, BadReply, lambda: driver.exchange(PUSH_PA))
+    text = refused_as(BadReply, lambda: driver.exchange(PUSH_PA))
     assert "function 23, write 2 at 11, read 11 at 0: the reply does not fit: " in text
     recovers(driver, scripted)
 
@@ -155,13 +146,13 @@ def test_a_reply_that_does_not_fit_ends_the_connection(
 @pytest.mark.parametrize("echo", [struct.pack(">BHH", 16, 10, 2), struct.pack(">BHH", 16, 11, 1), b"\x10\0\x0b\0\2\0"])
 def test_a_wrong_echo_of_a_write_is_no_success(driver: ModbusTcpDriver, scripted: ScriptedDevice, echo: bytes) -> None:
     scripted.fault = lambda transaction, *_: frame(transaction, echo)
-    refused_as(driver, BadReply, lambda: driver.write(PUSH_PA))
+    refused_as(BadReply, lambda: driver.write(PUSH_PA))
     recovers(driver, scripted)
 
 
 def test_a_wrong_count_of_a_read_is_no_measurement(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
     scripted.fault = lambda transaction, _, reply: frame(transaction, reply[:-2])
-    refused_as(driver, BadReply, driver.read)
+    refused_as(BadReply, driver.read)
     recovers(driver, scripted)
 
 
@@ -179,7 +170,7 @@ def test_an_answer_that_does_not_come_whole_is_none(
     driver: ModbusTcpDriver, scripted: ScriptedDevice, fault: Fault, kind: type[DriverError]
 ) -> None:
     scripted.fault = fault
-    refused_as(driver, kind, lambda: driver.exchange(PUSH_PA))
+    refused_as(kind, lambda: driver.exchange(PUSH_PA))
     recovers(driver, scripted)
 
 
@@ -191,7 +182,7 @@ def test_a_late_answer_is_never_taken_for_the_next(driver: ModbusTcpDriver, scri
         return frame(transaction, reply)
 
     scripted.fault = late
-    assert "no reply within 500 ms" in refused_as(driver, NoReply, lambda: driver.exchange(30e3))
+    assert "no reply within 500 ms" in refused_as(NoReply, lambda: driver.exchange(30e3))
     scripted.fault = honest
     driver.open()
     gone_on.set()
@@ -203,7 +194,7 @@ def test_a_late_answer_is_never_taken_for_the_next(driver: ModbusTcpDriver, scri
 def test_an_answer_sent_twice_is_taken_once(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
     scripted.fault = lambda transaction, _, reply: 2 * frame(transaction, reply)
     assert driver.exchange(PUSH_PA).sample_counter == 2
-    refused_as(driver, BadReply, lambda: driver.exchange(PUSH_PA))
+    refused_as(BadReply, lambda: driver.exchange(PUSH_PA))
     recovers(driver, scripted)
 
 
@@ -217,9 +208,9 @@ def test_a_number_that_is_none_is_no_measurement_but_the_connection_holds(
         return frame(transaction, reply[:at] + struct.pack(">f", float(number)) + reply[at + 4 :])
 
     scripted.fault = no_number
-    text = refused_as(driver, NoNumber, lambda: driver.exchange(PUSH_PA))
+    text = refused_as(NoNumber, lambda: driver.exchange(PUSH_PA))
     assert f"{name} {number}" in text
-    refused_as(driver, NoNumber, driver.read)
+    refused_as(NoNumber, driver.read)
     scripted.fault = honest
     assert driver.exchange(PUSH_PA).sample_counter == 3
 
@@ -230,7 +221,7 @@ def test_an_exception_is_a_refusal_and_the_connection_holds(
 ) -> None:
     scripted.fault = lambda transaction, request, _: frame(transaction, bytes((request[0] | 0x80, code)))
     for act in (lambda: driver.exchange(PUSH_PA), lambda: driver.write(PUSH_PA), driver.read):
-        assert f"exception {code}, " in refused_as(driver, Refused, act)
+        assert f"exception {code}, " in refused_as(Refused, act)
     scripted.fault = honest
     before = scripted.device.sample_counter
     assert driver.exchange(PUSH_PA).sample_counter == before + 1
@@ -255,7 +246,7 @@ def test_only_an_unknown_function_makes_it_use_two_transactions_for_good(
 
 def test_open_refuses_a_held_command_that_is_no_number(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
     scripted.fault = lambda transaction, *_: frame(transaction, b"\3\4" + struct.pack(">f", float("nan")))
-    assert "the command it holds is nan" in refused_as(driver, BadReply, driver.open)
+    assert "the command it holds is nan" in refused_as(BadReply, driver.open)
     recovers(driver, scripted)
 
 
@@ -264,7 +255,7 @@ def test_open_fails_whole_when_the_timeout_cannot_be_set(driver: ModbusTcpDriver
         return frame(transaction, b"\x90\2" if request[0] == 16 else reply)
 
     scripted.fault = read_only
-    assert "function 16, write 1 at 15: exception 2" in refused_as(driver, Refused, driver.open)
+    assert "function 16, write 1 at 15: exception 2" in refused_as(Refused, driver.open)
     recovers(driver, scripted)
 
 
@@ -285,7 +276,7 @@ def test_a_host_that_does_not_accept_is_no_connection_within_the_timeout() -> No
             line.setblocking(False)
             line.connect_ex(("127.0.0.1", port))
         driver = ModbusTcpDriver(ModbusTcpDevice(port=port, reply_timeout_s=REPLY_TIMEOUT_S))
-        text = refused_as(driver, NoConnection, driver.open)
+        text = refused_as(NoConnection, driver.open)
         for line in waiting:
             line.close()
     assert "nobody accepts a connection within 500 ms" in text

@@ -32,6 +32,7 @@ from sim.slave.modbus_slave import device_of
 from sim.slave.rtu_server import RtuServer
 from sim.slave.simulated_device import Device
 from tests.drivers.test_driver_contract import FILE, WireBench, WireContract
+from tests.refusals import refusal_of
 
 pytestmark = pytest.mark.real_time
 
@@ -144,16 +145,7 @@ def slow_driver(scripted: ScriptedDevice) -> Iterator[ModbusRtuDriver]:
 
 def refused_as(kind: type[DriverError], act: Callable[[], object]) -> str:
     """Return what the error says: one line that names the device."""
-    start_s = time.perf_counter()
-    with pytest.raises(DriverError) as caught:
-        act()
-    assert time.perf_counter() - start_s < 5 * REPLY_TIMEOUT_S, "in a bounded time"
-    assert type(caught.value) is kind, caught.value
-    text = str(caught.value)
-    assert "\n" not in text
-    assert text.startswith("/dev/pts/")
-    assert " unit 1: " in text
-    return text
+    return refusal_of(kind, act, names="/dev/pts/", within_s=5 * REPLY_TIMEOUT_S)
 
 
 def recovers(driver: ModbusRtuDriver, scripted: ScriptedDevice) -> None:

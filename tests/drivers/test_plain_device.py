@@ -1,8 +1,6 @@
 """The Modbus driver before a device that is not ours and knows little: modbus-tk, and functions 3, 4 and 6 alone."""
 
-import socket
 import struct
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 
@@ -19,7 +17,7 @@ from drivers import driver_for
 from positioner.control.settings import Settings
 from positioner.daemon.link import Link
 from positioner.daemon.pacing import RealTimePace
-from tests.other_device import _free_port
+from tests.other_device import await_listening, free_port
 
 pytestmark = [
     pytest.mark.real_time,
@@ -34,7 +32,7 @@ class PlainDevice:
     """Whole numbers: the position in tenths of a millimetre, the command in kPa, a counter of samples that wraps."""
 
     def __init__(self) -> None:
-        self.port = _free_port()
+        self.port = free_port()
         self.server = TcpServer(self.port, "127.0.0.1")
         self.slave: Slave = self.server.add_slave(UNIT)
         self.slave.add_block("registers", defines.HOLDING_REGISTERS, 0, 64)
@@ -52,19 +50,7 @@ class PlainDevice:
         self.show(POSITION, 150)
         self.show(COMMAND, 40)
         self.server.start()
-        self._await_listening()
-
-    def _await_listening(self) -> None:
-        """The library begins to listen in a thread of its own."""
-        end_s = time.monotonic() + 30.0
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", self.port), 1.0).close()
-            except ConnectionRefusedError:
-                assert time.monotonic() < end_s
-                time.sleep(1e-3)
-            else:
-                return
+        await_listening(self.port)
 
     def show(self, address: int, word: int) -> None:
         self.slave.set_values("registers", address, [word])

@@ -21,7 +21,7 @@ from workbench.data.record import Record
 from workbench.fit.fitting import Fit, fit
 from workbench.select.discrimination import Played, Race, Weighed, discriminate, log_odds
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg, moves_in
+from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))
@@ -82,10 +82,9 @@ def test_a_better_rival_is_not_spoken_against(fits: dict[str, Fit]) -> None:
     assert log_odds(weighed(one, 500.0, [0.0] * 20), weighed(one, 400.0, apart(-0.05))) == 0.0
 
 
-def test_moves_are_counted_between_holds_and_reversals() -> None:
-    assert moves_in(np.array([0.0, 0, 1, 2, 2, 3, 1, 1, 0])) == 4
-    assert COURSE.moves == 2
-    assert moves_in(COURSE.sampled(PERIOD_S)[1]) == 2
+def test_the_moves_of_a_course_are_the_times_its_command_sets_out() -> None:
+    way = np.sign(np.diff(COURSE.sampled(PERIOD_S)[1]))
+    assert np.sum((way != 0) & (way != np.concatenate([[0], way[:-1]]))) == COURSE.moves == 2
 
 
 def test_a_course_stays_inside_its_bounds() -> None:

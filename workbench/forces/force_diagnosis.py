@@ -25,7 +25,7 @@ from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, 
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, no_better
 from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSelection, ForwardStep, without_missing
 from workbench.select.verdict import Verdict
-from workbench.select.verdict_sentence import rivals_sentence
+from workbench.select.verdict_sentence import rivals_sentence, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +58,7 @@ class ForceDiagnosis(Result, ForwardSelection[ForceFit, ForceCandidate]):
 
     def blocks(self) -> list[Block]:
         """Say the verdict, what was tried in each step, and the parameters of the best balance."""
-        said: list[Block] = [f"{self.verdict}: {self.sentence}"]
+        said: list[Block] = [verdict_line(self.verdict, self.sentence)]
         floor = "" if self.floor_n is None else f", floor {self.floor_n:.4g}"
         for number, step in enumerate(self.steps, start=1):
             before = step.before

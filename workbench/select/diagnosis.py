@@ -26,7 +26,7 @@ from workbench.select.forward_selection import ForwardSelection
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
 from workbench.select.verdict import Verdict, verdict
-from workbench.select.verdict_sentence import verdict_sentence
+from workbench.select.verdict_sentence import verdict_line, verdict_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,10 +53,14 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         """Effects that may be there, but that nothing proves: the valve without them is at the floor."""
         return tuple(each.name for each in self.steps[-1].suspected)
 
+    @property
+    def verdict_line(self) -> str:
+        """The verdict and its sentence."""
+        return verdict_line(self.verdict, self.sentence)
+
     def blocks(self) -> list[Block]:
         """Say the verdict, what was tried in each step, and what the recordings would not show."""
-        sentence = self.sentence.removeprefix("Missing: ") if self.verdict == "missing" else self.sentence
-        said: list[Block] = [f"{self.verdict}: {sentence}"]
+        said: list[Block] = [self.verdict_line]
         if self.best.fit.by.slow:
             said.append(self.best.fit.by.sentence)
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]

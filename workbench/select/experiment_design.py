@@ -152,12 +152,6 @@ class DesignedExperiment(Brief):
         return Experiment(self.course.name, self.separation, *self.course.sampled(period_s))
 
 
-def moves_in(command_pa: Command) -> int:
-    """Return how often a command sets out: stretches in which it goes one way, between holds and reversals."""
-    way = np.sign(np.diff(command_pa))
-    return int(np.sum((way != 0) & (way != np.concatenate([[0], way[:-1]]))))
-
-
 def designed(
     fits: Sequence[Fit],
     record: Record,

@@ -15,6 +15,11 @@ SCATTERS = 3.0
 REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
 
 
+def verdict_line(verdict: Verdict, sentence: str) -> str:
+    """Return a verdict and its sentence in one line; what both say is said once."""
+    return f"{verdict}: {sentence.removeprefix(f'{verdict.capitalize()}: ')}"
+
+
 def verdict_sentence(
     verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
 ) -> str:

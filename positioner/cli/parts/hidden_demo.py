@@ -150,9 +150,7 @@ def _extended(recording: Path, bare: "ValveFile", better: Path) -> tuple[str, ..
     began_s = time.monotonic()
     diagnosis = diagnose(read_recording(recording), bare, effects=CANDIDATES)
     found = tuple(each.name for each in diagnosis.best.fit.valve.effect)
-    print(
-        f"diagnosed {recording.name} in {time.monotonic() - began_s:.0f} s: {diagnosis.verdict}: {diagnosis.sentence}"
-    )
+    print(f"diagnosed {recording.name} in {time.monotonic() - began_s:.0f} s: {diagnosis.verdict_line}")
     for table in diagnosis.best.fit.valve.effect:
         print(f"  {table.name}: " + ", ".join(f"{name} = {value:.4g}" for name, value in table.parameters.items()))
     write_valve(better, diagnosis.best.fit.valve, [])
