@@ -6,6 +6,7 @@ for a clock, a process or a wire ever wait for each other. The others give way t
 
 import gc
 import os
+import signal
 import sys
 from functools import cache
 from pathlib import Path
@@ -27,6 +28,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Nor compile our modules anew in each, where a person has switched the keeping off.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# A child has the signals that its parent ignores ignored: nohup and a shell's "&" would decide what ends a daemon.
+for ignored in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
+    if signal.getsignal(ignored) is signal.SIG_IGN:
+        signal.signal(ignored, signal.default_int_handler if ignored is signal.SIGINT else signal.SIG_DFL)
 
 
 class Groups(LoadScopeScheduling):  # type: ignore[misc]
