@@ -8,5 +8,6 @@ Its files:
     motion            velocity, and the slips
     plateaus          where the stem rests, of few samples a move
     stillness         which rows tell something, and which only say it again
+    stretches         of a long one, those that tell the most
     imposed_motion    a bench where a rig imposes the position, and static curves
 """

@@ -12,7 +12,8 @@ import numpy as np
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.result import Brief
-from workbench.data.record import Mask, Record, ready, require_few_samples, require_fittable
+from workbench.data.record import Mask, Record, ready, require_few_samples
+from workbench.data.stretches import informative
 
 HELD_OUT = 1.0 / 3.0
 """Part of the recording that is held out where no other is given."""
@@ -65,14 +66,17 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
         InputError: no recording, too few samples, or more than can be fitted.
     """
     whole = joined(recordings)
-    require_few_samples(whole)
+    for each in (whole, test):
+        if each:
+            require_few_samples(each)
+    whole = informative(whole)
+    test = test and informative(test)
     end = len(whole) if test else round(len(whole) * (1.0 - HELD_OUT))
     train = _part(_head(whole, end), 0)
     held_out = _part(test, 0) if test else _part(whole, end)
     for part, what in ((train, "to fit"), (held_out, "held out")):
         if part.counted.sum() < FEWEST:
             raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {FEWEST} are needed")
-    require_fittable(train.record)
     floors_m = [each.record.floor_m for each in (train, held_out) if each.record.floor_m is not None]
     return Split(train, held_out, max(floors_m, default=None))
 

@@ -81,7 +81,7 @@ def repeat_lag(command_pa: Column) -> int | None:
     n = command_pa.size
     u = command_pa - command_pa.mean()
     power = float(np.mean(u**2))
-    if n < 60 or power == 0.0:
+    if n < 60 or np.ptp(command_pa) == 0.0:
         return None
     size = 1 << (2 * n - 1).bit_length()
     spectrum = np.fft.rfft(u, size)
@@ -90,11 +90,16 @@ def repeat_lag(command_pa: Column) -> int | None:
     lags = np.arange(n)
     difference = (total[n - lags] + total[n] - total[lags] - 2.0 * products) / (n - lags)
     allowed = (lags >= 20) & (n - lags >= np.maximum(20, lags // 3)) & (difference < REPEATS**2 * power)
-    for lag in lags[allowed].tolist():
-        # A held command repeats itself after any lag: it must have moved in the meantime.
-        if np.ptp(u[:lag]) > power**0.5 and np.ptp(u[lag:]) > power**0.5 and difference[lag // 2] > 0.01 * power:
-            return int(lag)
-    return None
+    # A held command repeats itself after any lag: it must have moved in the meantime.
+    before, after = _ranges(u), _ranges(u[::-1])[::-1]
+    allowed[1:] &= (np.minimum(before[:-1], after[1:]) > power**0.5) & (difference[lags[1:] // 2] > 0.01 * power)
+    found = np.flatnonzero(allowed)
+    return int(found[0]) if found.size else None
+
+
+def _ranges(x: Column) -> Column:
+    """Return greatest less least of all up to each, as x, (n,)."""
+    return np.maximum.accumulate(x) - np.minimum.accumulate(x)
 
 
 def repeatability_m(command_pa: Column, position_m: Column) -> float | None:

@@ -42,6 +42,8 @@ ALLOWED = (
     f"allowed are {MOST_WORK} samples, a slip counting for {SLIP_ROWS}: cut out the stretch that matters, --from-s and "
     "--to-s"
 )
+STRETCH = "stretch"
+"""The column that counts the stretches of a recording of which the rest was left out."""
 UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
 Mask = npt.NDArray[np.bool_]
 
@@ -307,6 +309,7 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
         breaks[row + 1] = f"the clock is set back by {-steps[row]:.6g} s"
     for row in np.flatnonzero(steps > longest_s).tolist():
         breaks[row + 1] = f"a gap of {steps[row]:.6g} s"
+    chosen = _rises(columns.get(STRETCH))
     for row, rise in _rises(columns.get("unrecorded")).items():
         told = f"unrecorded rises by {rise:g}"
         breaks[row] = f"{breaks[row]}, {told}" if row in breaks else told
@@ -316,9 +319,9 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
             f"lost_samples rises by {sum(lost.values()):g} in {len(lost)} places, the first before sample "
             f"{min(lost) + 1}: the command before is held"
         )
-    for row in sorted(breaks):
+    for row in sorted(breaks.keys() - chosen.keys()):
         notes.append(f"before sample {row + 1} {breaks[row]}: simulated anew from there")
-    edges = [0, *sorted(breaks), time_s.size]
+    edges = [0, *sorted(breaks.keys() | chosen.keys()), time_s.size]
     for first, end in pairwise(edges):
         if end - first >= SHORTEST:
             yield first, end

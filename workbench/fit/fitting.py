@@ -28,7 +28,8 @@ from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
 from workbench.data.motion import slips
 from workbench.data.noise_floor import told_mm
-from workbench.data.record import Record, ready, require_few_samples, require_fittable, require_units
+from workbench.data.record import Record, ready, require_few_samples, require_units
+from workbench.data.stretches import informative
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
@@ -305,8 +306,7 @@ def _switched_off(effect: Effect, name: str, valve: ValveParameters) -> EffectTa
 
 def _fittable(recording: Recording, valve: ValveFile) -> Record:
     require_few_samples(recording)
-    record = ready(recording)
-    require_fittable(record)
+    record = ready(informative(recording))
     require_units(record, valve.valve)
     _require_motion(record)
     return record
