@@ -29,7 +29,7 @@ import numpy as np
 
 from config.recording import Recording
 from config.valve_file import ValveFile
-from sim.effect import shipped_effect, shipped_effects
+from sim.effect import shipped_effect, tried_effects
 from tests.workbench.generators import KINDS, LAWS, case
 from workbench.blind.hiding import VISIBLE, hide
 from workbench.blind.trial import NOISE_M
@@ -78,7 +78,7 @@ def problem(family: str, seed: int) -> Problem:
     dirty = family == "dirty" or (family == "nothing" and seed % 2 == 1)
     made = hide(seed, effects=count, dirty=dirty)
     hidden = tuple(each.name for each in made.truth.effect)
-    library = [name for name in shipped_effects() if family != "removed" or name not in _same(hidden[0])]
+    library = [name for name in tried_effects() if family != "removed" or name not in _same(hidden[0])]
     visible = all(each["is_visible"] for each in made.answer["visible"].values())
     floor_m = made.answer["floor_m"]
     setting = "dirty" if dirty else "clean"
@@ -92,11 +92,11 @@ def _other(family: str, seed: int) -> Problem:
     law = sorted(LAWS)[number % len(LAWS)]
     kind = kinds[number % len(kinds)]
     made = case(kind, law=law, seed=seed)
-    return Problem(made.fit, made.test, made.base, shipped_effects(), (kind,), True, NOISE_M, NOISE_M, law)
+    return Problem(made.fit, made.test, made.base, tried_effects(), (kind,), True, NOISE_M, NOISE_M, law)
 
 
 def _same(name: str) -> frozenset[str]:
-    library = {each: shipped_effect(each, "library") for each in shipped_effects()}
+    library = {each: shipped_effect(each, "library") for each in tried_effects()}
     return algebraic_class(name, library)
 
 
@@ -218,13 +218,13 @@ def _spans(seeds: Sequence[int]) -> str:
 
 def _bare() -> frozenset[str]:
     """Return the effects that the bare valve already does: nothing is missing, and nothing can be."""
-    return frozenset(name for name in shipped_effects() if any(each not in shipped_effects() for each in _same(name)))
+    return frozenset(name for name in tried_effects() if any(each not in tried_effects() for each in _same(name)))
 
 
 def confusion(lines: Sequence[Line]) -> Iterator[str]:
     """Yield for each effect what was named in its place; sets by their first names."""
     yield "hidden effect: what was named, clean and dirty, visible cases"
-    for name in shipped_effects():
+    for name in tried_effects():
         said = Counter(
             "+".join("/".join(names) for names in each["sets"]) or each["verdict"]
             for each in lines

@@ -15,7 +15,7 @@ from sim.effect import Memory, Parameter
 
 STRETCHES = 4096
 MEMORY = 2 + 3 * STRETCHES
-STEP_S = 5e-4
+STEP_S = 2e-3
 COUNT, READ = 0, 1
 """Stretches written so far, and which of them was read last."""
 TIME, VALUE, SLOPE = 2, 2 + STRETCHES, 2 + 2 * STRETCHES

@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
-STEP_S = 5e-4
+STEP_S = 2e-3
 LONG_AGO_S = -1e9
 LOOKS = "The longer the hold, the later the break-away and the longer the jump; sliding is untouched."
 CONFOUNDED = {

@@ -13,7 +13,7 @@ from sim.effect import Memory, Parameter
 from sim.first_order_lag import lagged
 
 MEMORY = 1
-STEP_S = 5e-4
+STEP_S = 2e-3
 LOOKS = (
     "After a step of the command the stem starts late and gently, is fastest later and creeps into its end, in the "
     "same shape whatever the step's height; on a ramp it runs T behind."

@@ -12,7 +12,7 @@ from config.extended_valve import Inverse
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
-STEP_S = 5e-4
+STEP_S = 2e-3
 UNLIMITED = 1e10
 """Pa/s, from which a jump is made at once."""
 LOOKS = (

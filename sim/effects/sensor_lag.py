@@ -13,7 +13,7 @@ from sim.effect import Memory, Parameter
 from sim.first_order_lag import lagged
 
 MEMORY = 1
-STEP_S = 5e-4
+STEP_S = 2e-3
 LOOKS = (
     "The indicated position rounds off every start and stop; after the stem has stuck it still creeps, exponentially, "
     "to its end."

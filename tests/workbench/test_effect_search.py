@@ -26,14 +26,31 @@ Ends = Callable[[Effects, Effects], float]
 
 @dataclass(frozen=True)
 class Begun:
-    """A fit made by hand as it is begun: what its first search came to, and what all come to."""
+    """A fit made by hand as it is begun: where it is on the way, what its first search comes to, and what all do."""
 
+    way: Fit
     first: Fit
     best: Fit
 
     @property
+    def screening_cost(self) -> float:
+        return self.way.cost
+
+    @property
     def cost(self) -> float:
         return self.first.cost
+
+    def landed(self) -> "Begun":
+        return self
+
+    def carried(self) -> "Begun":
+        return self
+
+    def settled(self, _: int) -> "Begun":
+        return self
+
+    def left(self) -> Fit:
+        return self.way
 
     def judged(self, **_: object) -> Fit:
         return self.first
@@ -55,6 +72,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         *library: str,
         local_minimum: float = np.inf,
         workers: int = 2,
+        way: float = 1.0,
         first: float = 1.0,
         from_landings: list[tuple[str, bool]] | None = None,
     ) -> tuple[EffectStep, ...]:
@@ -70,7 +88,10 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
             if from_landings is not None:
                 from_landings.append((effects[0], landed))
             best = made(valve, effects)
-            return Begun(replace(best, cost=first * best.cost, rms_m=first * best.rms_m), best)
+            on_the_way, of_first = (
+                replace(best, cost=part * best.cost, rms_m=part * best.rms_m) for part in (way * first, first)
+            )
+            return Begun(on_the_way, of_first, best)
 
         def block_errors(found: Fit, _: object) -> BlockErrors:
             return errors_of(found.rms_m)
@@ -216,6 +237,18 @@ def test_what_is_far_behind_is_not_searched_further(searched: Callable[..., tupl
     floors = {"ip_lag": 1.0, "backlash": 18.0, "stribeck": 9.0}
     (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.5)
     assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 1.5 * 18.0})
+
+
+def test_what_is_far_behind_on_the_way_waits_there(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    floors = {"ip_lag": 1.0, "backlash": 18.0, "stribeck": 9.0}
+    (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, way=2.0)
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 2.0 * 18.0})
+
+
+def test_what_waits_is_searched_on_where_something_is_left(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    floors = {"ip_lag": 3.0, "backlash": 35.0}
+    step = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, way=2.0)[0]
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors)
 
 
 def test_what_is_named_is_searched_in_full_however_far_behind(

@@ -129,4 +129,4 @@ def scanned(error: SimulationError, z: Vector, i: int, distances: Vector = STAIR
         there = z.copy()
         there[i] = np.clip(z[i] + way, error.lower[i], error.upper[i])
         places.append(there)
-    return min(places, key=lambda there: error.cost(there, scale))
+    return error.least(places, scale)

@@ -37,12 +37,12 @@ from workbench.fit.guesses import FINEST
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.setpoint_starts import FREE as FREE_BY_SETPOINT
 from workbench.fit.setpoint_starts import setpoint_starts
-from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
+from workbench.fit.starts import base_starts, effect_starts, forces_regressed, moved_starts, weakest_start
 from workbench.fit.strewing import proved, strewn
-from workbench.fit.threads import on_threads
+from workbench.fit.threads import linear_algebra_alone, on_threads
 from workbench.fit.uncertainty import Combination, Uncertainty, uncertainty
 from workbench.model.free_run import FreeRun
-from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
+from workbench.model.parameters import AT_REST, DEFAULT, LANDED, Parameter, free_parameters
 from workbench.model.sampling import DYNAMIC, Motion, Sampling, sampling
 
 if TYPE_CHECKING:
@@ -154,6 +154,7 @@ class Fit(Result):
         return FreeRun(composition, record, from_pressure=self.from_pressure, by=by).position_m(composition.theta)
 
 
+@linear_algebra_alone()
 def fit(
     recording: Recording,
     valve: ValveFile,
@@ -191,7 +192,8 @@ def fit(
         ground = base or fit(
             recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free)
         )
-        return _begun(record, valve, effects, ground, free, workers, progress).finished(profile=profile)
+        begun = _begun(record, valve, effects, ground, free, workers, progress)
+        return begun.landed().carried().finished(profile=profile)
     composition = Composition.from_file(valve)
     error = _error(composition, record, free, from_pressure, sampling(record, valve.valve))
     tell = progress or (lambda _: None)
@@ -201,23 +203,27 @@ def fit(
     else:
         origins = composition.theta, forces_regressed(composition.theta, record, valve.valve, from_pressure)
         begins = base_starts(error, origins, seed, DRAWS)
-    found = _carried(composition, error, begins, OF_BASE, workers, progress).finished(profile=profile)
+    begun = _widely(BegunFit(composition, error, (), OF_BASE, workers, tell), begins)
+    found = begun.carried().finished(profile=profile)
     return replace(found, seeds=(*found.seeds, *origins))
 
 
+@linear_algebra_alone()
 def begun_fit(
     recording: Recording, valve: ValveFile, effects: Sequence[str], base: Fit, *, landed: bool = True
 ) -> "BegunFit":
-    """Fit a valve with effects added to a base fit, on one thread, as far as to where the best search stays.
+    """Fit a valve with effects added to a base fit, on one thread, as far as through the wide scale.
 
-    Without `landed` no search begins at landings: those of an earlier base fit were the same.
+    Searches that begin at landings are begun by `BegunFit.landed`. Without `landed` there are none: those of an earlier
+    base fit were the same.
 
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect.
     """
-    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None, landed=landed).settled(1)
+    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None, landed=landed)
 
 
+@linear_algebra_alone()
 def profiled(found: Fit, recording: Recording) -> Fit:
     """Return a fit with the intervals that following its cost gives."""
     composition = Composition.from_file(found.valve)
@@ -323,7 +329,7 @@ def _begun(
     *,
     landed: bool = True,
 ) -> "BegunFit":
-    """Search with effects added to a base fit, as far as the middling scale."""
+    """Search with effects added to a base fit, as far as through the wide scale."""
     composition = _extended(base.valve, effects, valve.valve)
     _require_shown(composition.effects[len(base.valve.effect) :], base.by)
     error = _error(composition, record, free, base.from_pressure, base.by, _scale(base, valve.valve))
@@ -331,45 +337,33 @@ def _begun(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    starts = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint)
-    begun = _carried(composition, error, starts, effort, workers, progress)
-    return replace(begun, weakest=weakest_start(error, added, seeds[0]))
-
-
-def _carried(
-    composition: Composition,
-    error: SimulationError,
-    begins: Sequence[Place],
-    effort: Effort,
-    workers: int | None,
-    progress: Progress | None,
-) -> "BegunFit":
-    """Search from every start at the wide scale, and from the best of these at the middling one."""
+    starts, at_landings = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint)
     tell = progress or (lambda _: None)
-    rough = error.rough
+    weakest = weakest_start(error, added, seeds[0])
+    begun = BegunFit(composition, error, (), effort, workers, tell, weakest=weakest, waiting=at_landings, added=added)
+    return _widely(begun, [*starts, *at_landings[:1]])
+
+
+def _widely(fit: "BegunFit", begins: Sequence[Place]) -> "BegunFit":
+    """Search from more starts at the wide scale."""
+    rough = fit.error.rough
 
     def begun(start: Place) -> Place:
         return replace(start, z=descended(smoothed(rough, start.z), start.z, WIDE))
 
-    def carried(start: Place) -> Place:
-        return replace(start, z=descended(smoothed(rough, start.z), start.z, MIDDLING))
-
-    def screening(start: Place) -> float:
-        return rough.cost(start.z, MIDDLE)
-
-    first = sorted(_each(begun, begins, workers, lambda done: tell(0.3 * done)), key=screening)[: effort.carried]
-    second = _by_origins(sorted(_each(carried, first, workers, lambda done: tell(0.3 + 0.2 * done)), key=screening))
-    return BegunFit(composition, error, second, effort, workers, tell)
+    found = [*fit.places, *_each(begun, begins, fit.workers, lambda done: fit.tell(0.3 * done))]
+    ordered = sorted(found, key=lambda place: rough.cost(place.z, MIDDLE))
+    return replace(fit, places=ordered[: fit.effort.carried])
 
 
 @dataclass(frozen=True, slots=True)
 class BegunFit:
-    """A fit whose searches have come through the middling scale, the best of them perhaps to where they stay."""
+    """A fit whose searches have come through the wide scale or the middling one, or the best to where they stay."""
 
     composition: Composition
     error: SimulationError
     places: Sequence[Place]
-    """Where the searches have come to, in the order in which they are brought to where they stay."""
+    """Where the searches have come to, the best first; through the middling scale, in the order in which they go on."""
     effort: Effort
     workers: int | None
     tell: Progress
@@ -377,11 +371,41 @@ class BegunFit:
     """Where the first of them stay, best first."""
     weakest: Place | None = None
     """Where what is added makes next to nothing of the base."""
+    added: Sequence[Parameter] = ()
+    """The parameters of what is added."""
+    waiting: Sequence[Place] = ()
+    """Starts from landings that no search has begun at."""
+    through: bool = False
+    """Whether the searches have come through the middling scale."""
 
     @property
     def cost(self) -> float:
         """Cost of the best end."""
         return self.error.cost(self.ends[0].z)
+
+    @property
+    def screening_cost(self) -> float:
+        """Cost by which searches are compared on their way, that of the best of them."""
+        return min(self.error.rough.cost(place.z, MIDDLE) for place in self.places)
+
+    def landed(self) -> "BegunFit":
+        """Begin the searches from landings, which take more to begin than others, if they are not there yet."""
+        if not self.waiting:
+            return self
+        return replace(_widely(self, moved_starts(self.error, self.waiting, self.added)), waiting=())
+
+    def carried(self) -> "BegunFit":
+        """Carry the searches from the wide scale through the middling one, if they are not there yet."""
+        rough = self.error.rough
+        if self.through:
+            return self
+
+        def carried(place: Place) -> Place:
+            return replace(place, z=descended(smoothed(rough, place.z), place.z, MIDDLING))
+
+        found = _each(carried, self.places, self.workers, lambda done: self.tell(0.3 + 0.2 * done))
+        ordered = sorted(found, key=lambda place: rough.cost(place.z, MIDDLE))
+        return replace(self, places=_by_origins(ordered), through=True)
 
     def settled(self, count: int) -> "BegunFit":
         """Bring at most so many more of the searches to where they stay."""
@@ -410,6 +434,10 @@ class BegunFit:
         if here._rounds(best) and here._shows(best):
             here = replace(here, ends=proved(here.error, here.ends))
         return here.judged(profile=profile)
+
+    def left(self) -> Fit:
+        """Return the fit by the best place on the way: nothing has settled, and nothing is brought there."""
+        return replace(self, ends=tuple(self.ends or self.places)[:1], weakest=None).judged(profile=False)
 
     def judged(self, *, profile: bool) -> Fit:
         """Return the fit by what has settled so far.

@@ -7,6 +7,8 @@ The wide scales do with a simulation of longer steps (`rough`); what is compared
 
 from collections.abc import Iterable
 from functools import cached_property
+from math import inf
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +41,8 @@ class SimulationError:
         """Number of valid samples."""
         whole = rows.size == len(record)
         self._rows = slice(None) if whole else rows
-        self._measured_m = record.position_m[self._rows]
+        self._measured_m = record.position_m
+        self._counted = None if whole else run.judged & record.valid
         self.sigma_m = record.scale_m or 1e-6 * composition.valve.stroke_m
         self._hopeless_m = HOPELESS * composition.valve.stroke_m
         self._theta = np.array(theta)
@@ -71,13 +74,19 @@ class SimulationError:
 
     def residuals(self, z: Vector) -> Vector:
         """Return r, one a valid sample."""
-        return self._bounded_m(self._apart_m(self.theta(z))) / self.sigma_m
+        apart_m = self.run.position_m(self.simulated(z))[self._rows] - self._measured_m[self._rows]
+        return self.weighed(self._bounded_m(apart_m))
 
-    def _apart_m(self, theta: Vector) -> Vector:
-        return np.asarray(self.run.position_m(theta)[self._rows] - self._measured_m)
+    def simulated(self, z: Vector) -> Vector:
+        """Return the parameter vector that is simulated for z."""
+        return self.theta(z)
+
+    def weighed(self, apart_m: Vector) -> Vector:
+        """Return r of simulated less measured positions, m."""
+        return np.asarray(apart_m / self.sigma_m)
 
     def _bounded_m(self, apart_m: Vector) -> Vector:
-        if apart_m @ apart_m < self._hopeless_m**2:
+        if not apart_m.size or (apart_m.max() < self._hopeless_m and apart_m.min() > -self._hopeless_m):
             return apart_m
         return np.where(np.isnan(apart_m), self._hopeless_m, np.clip(apart_m, -self._hopeless_m, self._hopeless_m))
 
@@ -88,13 +97,46 @@ class SimulationError:
             self._costs[key] = soft(self.residuals(z), scale)
         return self._costs[key]
 
+    def cost_below(self, z: Vector, limit: float, scale: float = FINAL) -> float:
+        """Return the cost where it is below a limit, else infinity: a run is given up as soon as it has come to that.
+
+        The cost only grows along the record. What is compared with a best so far mostly shows early that it is worse.
+        """
+        key = (z.tobytes(), scale)
+        if key not in self._costs:
+            cost = 0.0
+            for rows, position_m in self.run.stretches(self.simulated(z)):
+                apart_m = position_m - self._measured_m[rows]
+                if self._counted is not None:
+                    apart_m = apart_m[self._counted[rows]]
+                cost += soft(self.weighed(self._bounded_m(apart_m)), scale)
+                if cost >= limit:
+                    return inf
+            self._costs[key] = cost
+        return self._costs[key] if self._costs[key] < limit else inf
+
+    def least(self, places: Iterable[Vector], scale: float = FINAL) -> Vector:
+        """Return the first of the places where the cost is least."""
+        (best,) = self._best(places, 1, scale)
+        return best
+
+    def _best(self, places: Iterable[Vector], count: int, scale: float) -> list[Vector]:
+        """Return the places of least cost, best first; of equal ones the first."""
+        best: list[tuple[float, Vector]] = []
+        for z in places:
+            limit = best[-1][0] if len(best) == count else inf
+            cost = self.cost_below(z, limit, scale)
+            if cost < limit:
+                best = sorted([*best, (cost, z)], key=itemgetter(0))[:count]
+        return [z for _, z in best]
+
     def keep(self, z: Vector, residuals: Vector, scale: float) -> None:
         """Keep the cost at z, of residuals that were worked out elsewhere."""
         self._costs[z.tobytes(), scale] = soft(residuals, scale)
 
     def screened(self, pool: Iterable[Vector], count: int) -> list[Vector]:
         """Return the best of a pool, by the middling scale's cost of the rough simulation."""
-        return sorted(pool, key=lambda z: self.rough.cost(z, MIDDLE))[:count]
+        return self.rough._best(pool, count, MIDDLE)
 
     def rms_m(self, z: Vector) -> float:
         """Return the plain rms error, m."""
@@ -132,12 +174,16 @@ class Unrounded(SimulationError):
         self._measured_m = quantum_m * np.round(self._measured_m / quantum_m)
         self._inside_m = INSIDE * quantum_m
 
-    def residuals(self, z: Vector) -> Vector:
-        """Return r, one a valid sample."""
+    def simulated(self, z: Vector) -> Vector:
+        """Return the parameter vector at z without rounding."""
         theta = self.theta(z)
         theta[self._index] = 0.0
-        off_m = self._bounded_m(self._apart_m(theta))
-        return np.sign(off_m) * np.maximum(np.abs(off_m) - self._inside_m, 0.0) / (SHARPER * self.sigma_m)
+        return theta
+
+    def weighed(self, apart_m: Vector) -> Vector:
+        """Return r of simulated positions less the measured quanta, m."""
+        outside_m = np.maximum(np.abs(apart_m) - self._inside_m, 0.0)
+        return np.asarray(np.sign(apart_m) * outside_m / (SHARPER * self.sigma_m))
 
 
 def smoothed(error: SimulationError, z: Vector) -> SimulationError:

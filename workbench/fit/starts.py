@@ -15,6 +15,7 @@ measurement.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, co
     theta, regressed = origins
     drawn = [*_drawn(regressed, DRAWS_REGRESSED, generator), *_drawn(theta, DRAWS_FILE, generator)]
     return [
-        *landed_starts(error, (theta,), [()], (), LANDED_BASE),
+        *moved_starts(error, landed_starts(error, (theta,), [()], (), LANDED_BASE), ()),
         Place(error.coordinates(theta), "valve file"),
         Place(error.coordinates(regressed), "regression"),
         *(Place(z, f"draw {i}") for i, z in enumerate(error.screened(map(error.coordinates, drawn), count))),
@@ -81,8 +82,10 @@ def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, co
 
 def effect_starts(
     error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector], *, landed: bool = True
-) -> list[Place]:
-    """Return where searches with effects begin: landings, and at each base fit the best strengths by screening.
+) -> tuple[list[Place], list[Place]]:
+    """Return where searches with effects begin: at each base fit the best strengths by screening, and at landings.
+
+    Those at landings are for `moved_starts` to finish.
 
     Args:
         error: by whose screening cost they are compared.
@@ -98,17 +101,15 @@ def effect_starts(
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
     rounds = any(each.guess == "quantum" for each in added)
     solved = (rounds and guesses[:1]) or points
-    starts = [
-        *(landed_starts(error, seeds[-2:][:1], solved, added, LANDED_EFFECT) if landed else ()),
-        weakest_start(error, added, seeds[0]),
-    ]
+    at_landings = landed_starts(error, seeds[-2:][:1], solved, added, LANDED_EFFECT) if landed else []
+    starts = [weakest_start(error, added, seeds[0])]
     for number, theta in enumerate(seeds, 1):
         grid = [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
         grid = [_smoothed(error, z) for z in grid] if number == 1 else grid
         starts += [Place(z, f"base fit {number}") for z in error.screened(grid, EACH_SEED if number > 1 else AT_BEST)]
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
-    return starts
+    return starts, at_landings
 
 
 def _slower(parameter: Parameter, value: float) -> float:
@@ -142,6 +143,8 @@ def landed_starts(
 ) -> list[Place]:
     """Return the best starts from landings: at each strength the landings' solution, viscous friction from a grid.
 
+    What landings do not hold is left to `moved_starts`.
+
     Args:
         error: by whose screening cost they are compared.
         seeds: theta from which the landings are solved.
@@ -151,12 +154,25 @@ def landed_starts(
     """
     if error.run.by.slow:
         return told_starts(error, seeds, points, added, count)
-    moving = [i for i, each in enumerate(error.parameters) if each.index in (VISCOUS, STATIC) or each in added]
     return [
-        Place(_in_motion(smoothed(error.rough, z), z, moving), origin)
+        Place(z, origin)
         for origin, chosen in _halves(rests(error.run.record)).items()
         for z in error.screened(_landed(error, Landings(error, chosen), seeds, points, added), count)
     ]
+
+
+def moved_starts(error: SimulationError, landed: Sequence[Place], added: Sequence[Parameter]) -> list[Place]:
+    """Return the starts from landings with what these do not hold moved to where the simulation comes closest.
+
+    Args:
+        error: by whose cost that is judged.
+        landed: as `landed_starts` returns them.
+        added: the parameters of the effects to be added.
+    """
+    if error.run.by.slow:
+        return list(landed)
+    moving = [i for i, each in enumerate(error.parameters) if each.index in (VISCOUS, STATIC) or each in added]
+    return [replace(each, z=_in_motion(smoothed(error.rough, each.z), each.z, moving)) for each in landed]
 
 
 def told_starts(

@@ -38,7 +38,7 @@ def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
         away = 10.0 ** generator.uniform(NEAREST, FARTHEST) * deviation
         stair = 10.0 ** generator.uniform(STATIC_NEAREST, STATIC_FARTHEST) * static
         way = (away + i % 2 * stair) * generator.standard_normal(z.size)
-        z = min(z, np.clip(z + way, error.lower, error.upper), key=error.cost)
+        z = error.least((z, np.clip(z + way, error.lower, error.upper)))
     return z
 
 

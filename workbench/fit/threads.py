@@ -6,6 +6,7 @@ mostly wait for each other and take the processors from the searches.
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from os import cpu_count
 from typing import TypeVar
@@ -18,8 +19,15 @@ S = TypeVar("S")
 
 def on_threads(function: Callable[[T], S], arguments: Sequence[T], workers: int | None) -> Iterator[S]:
     """Apply a function to each argument on so many threads, by default one a core; results in their order."""
-    with _linear_algebra().limit(limits=1, user_api="blas"), ThreadPoolExecutor(workers or cpu_count()) as pool:
+    with linear_algebra_alone(), ThreadPoolExecutor(workers or cpu_count()) as pool:
         yield from pool.map(function, arguments)
+
+
+@contextmanager
+def linear_algebra_alone() -> Iterator[None]:
+    """Keep linear algebra to the thread that asks for it; a function decorated so keeps it so throughout."""
+    with _linear_algebra().limit(limits=1, user_api="blas"):
+        yield
 
 
 @cache

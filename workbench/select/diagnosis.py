@@ -16,6 +16,7 @@ from config.valve_file import ValveFile
 from sim.effect import find_effect, tried_effects
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
+from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
@@ -107,6 +108,7 @@ def _tried(each: EffectCandidate) -> Tried:
     return Tried(each.step, each.name, *rms_m, each.gain, each.rejection_reason)
 
 
+@linear_algebra_alone()
 def diagnose(
     recording: Recording | Sequence[Recording],
     valve: ValveFile,

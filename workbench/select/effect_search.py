@@ -1,17 +1,19 @@
 """The forward search by simulation: every effect of the library refitted, step by step.
 
-A step fits the valve with each effect added. One whose first search ends far behind another's is not searched further,
-unless the step would name it. An effect that comes after another (`AFTER` in its file) is fitted only where that one
-has evidence, or is in the model already, and what the step would add leaves something to explain. Before they are
-judged, the valve without is fitted once more from the base parameters of the best of those with: an optimiser's failure
-must not look like physics. Steps go on until the added model explains all, nothing more is accepted, or three effects
-are added.
+A step fits the valve with each effect added. They race: one that is far behind another at the wide scale or at the
+middling one waits there, and is searched on only if what the step adds leaves something to explain. One whose first
+search ends far behind another's is not searched further, unless the step would name it. An effect that comes after
+another (`AFTER` in its file) is fitted only where that one has evidence, or is in the model already, and what the step
+would add leaves something to explain. Before they are judged, the valve without is fitted once more from the base
+parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
+model explains all, nothing more is accepted, or three effects are added.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
+from typing import TypeVar
 
 from config.errors import InputError
 from config.valve_file import ValveFile, ValveParameters
@@ -38,9 +40,11 @@ BETTER = 0.999
 LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
 OUT_OF_RACE = 10.0
-"""Factor on the cost of the best first search of a step, above which an effect is not searched further."""
+"""Factor on the cost of the best search of a step, above which an effect is not searched further."""
 
 Progress = Callable[[str, float], None]
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 class EffectSearch:
@@ -116,31 +120,48 @@ class EffectSearch:
     def _step(self, number: int, before: EvaluatedModel) -> EffectStep:
         missing = [name for name in self._library if name not in before.effects]
         names = [name for name in missing if self._library[name].after not in missing]
-        models = self._refitted(number, before, names)
-        before = self._base_from(before, [each for each in models.values() if isinstance(each, EvaluatedModel)])
-        # No effect makes a valve worse: what the base has left behind is refitted from it.
-        fitted = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
-        behind = [name for name, each in fitted.items() if log_likelihood_difference(before.fit, each) > LEFT_BEHIND]
-        models |= self._refitted(number, before, behind, landed=False)
-        step = self._judged_in_full(judged_step(before, models, number, self._library), models, number)
+        models, waiting = self._raced(number, self._begun(number, before, names))
+        left = {name: self._evaluated(each.left()) for name, each in waiting.items()}
+        before, models = self._with_base_again(number, before, models, models)
+        step = self._judged_in_full(before, {**left, **models}, number)
+        if waiting and not _best(step).explained:
+            late = self._settled(number, waiting)
+            before, models = self._with_base_again(number, before, late, models | late)
+            step = self._judged_in_full(before, models, number)
         later = self._worth_trying_after(step)
         if not later:
             return step
         models = {each.name: each.model or each.rejection_reason for each in step.candidates}
         models |= self._refitted(number, step.before, later)
-        return self._judged_in_full(judged_step(step.before, models, number, self._library), models, number)
+        return self._judged_in_full(step.before, models, number)
+
+    def _with_base_again(
+        self,
+        number: int,
+        before: EvaluatedModel,
+        new: Mapping[str, EvaluatedModel | str],
+        models: dict[str, EvaluatedModel | str],
+    ) -> tuple[EvaluatedModel, dict[str, EvaluatedModel | str]]:
+        """Return the model before, fitted again where new ones show how, and the models that it has not left behind."""
+        before = self._base_from(before, [each for each in new.values() if isinstance(each, EvaluatedModel)])
+        # No effect makes a valve worse: what the base has left behind is refitted from it.
+        fitted = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
+        behind = [name for name, each in fitted.items() if log_likelihood_difference(before.fit, each) > LEFT_BEHIND]
+        return before, models | self._refitted(number, before, behind, landed=False)
 
     def _worth_trying_after(self, step: EffectStep) -> list[str]:
         """Return the effects that come after one that has evidence, if the step leaves something to explain."""
-        best = step.added.model if step.added and step.added.model else step.before
-        if best.explained:
+        if _best(step).explained:
             return []
         evident = {each.name for each in step.candidates if each.evidence > LEAST_BIC}
         tried = {each.name for each in step.candidates}
         return [name for name, each in self._library.items() if each.after in evident and name not in tried]
 
-    def _judged_in_full(self, step: EffectStep, models: dict[str, EvaluatedModel | str], number: int) -> EffectStep:
-        """Judge a step anew as long as it names an effect that was out of the race: refitted in full before."""
+    def _judged_in_full(
+        self, before: EvaluatedModel, models: dict[str, EvaluatedModel | str], number: int
+    ) -> EffectStep:
+        """Judge a step; again as long as it names an effect that was out of the race, refitted in full before."""
+        step = judged_step(before, models, number, self._library)
         least = min(map(_cost, models.values()), default=inf)
         full: set[str] = set()
         while short := {each for each in _named(step) if _cost(models[each]) > OUT_OF_RACE * least} - full:
@@ -189,7 +210,7 @@ class EffectSearch:
     def _refitted(
         self, number: int, before: EvaluatedModel, names: Sequence[str], *, racing: bool = True, landed: bool = True
     ) -> dict[str, EvaluatedModel | str]:
-        """Refit the named effects, each on one thread; where that is not possible, say why.
+        """Refit the named effects beside the model before; where that is not possible, say why.
 
         Args:
             number: of the step, from 1.
@@ -198,6 +219,12 @@ class EffectSearch:
             racing: leave it at one search where another effect's comes to a cost `OUT_OF_RACE` times lower.
             landed: search from landings too; where that was done and has come to nothing better than the base, without.
         """
+        return self._settled(number, self._begun(number, before, names, landed=landed), racing=racing)
+
+    def _begun(
+        self, number: int, before: EvaluatedModel, names: Sequence[str], *, landed: bool = True
+    ) -> dict[str, BegunFit | str]:
+        """Begin to refit the named effects, as far as through the wide scale."""
         train, here = self._split.train.recording, before.fit
         known = ValveFile(valve=self._known, effect=here.valve.effect)
 
@@ -209,12 +236,29 @@ class EffectSearch:
 
         # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
         dearest_first = sorted(names, key=lambda name: -len(self._library[name].parameters))
-        what, half = f"step {number}: refitting {len(names)} effects", 0.5 / max(1, len(names))
-        fits = []
-        for each in on_threads(begun, dearest_first, self._workers):
-            fits.append(each)
-            self._progress(what, half * len(fits))
-        least = min((each.cost for each in fits if not isinstance(each, str)), default=inf)
+        return self._each(number, "searching", begun, {name: name for name in dearest_first}, 0.0, 0.5)
+
+    def _raced(
+        self, number: int, racers: Mapping[str, BegunFit | str]
+    ) -> tuple[dict[str, EvaluatedModel | str], dict[str, BegunFit]]:
+        """Refit the effects that are not far behind another on the way; return their models, and those that wait."""
+        refused: dict[str, BegunFit | str] = {name: each for name, each in racers.items() if isinstance(each, str)}
+        fast, waiting = _parted({name: each for name, each in racers.items() if not isinstance(each, str)})
+        for further in (lambda each: each.landed(), lambda each: each.carried()):
+            fast, slower = _parted(self._each(number, "searching", further, fast, 0.5, 0.6))
+            waiting |= slower
+        return self._settled(number, refused | fast), waiting
+
+    def _settled(
+        self, number: int, racers: Mapping[str, BegunFit | str], *, racing: bool = True
+    ) -> dict[str, EvaluatedModel | str]:
+        """Bring searches to where they stay; one of each effect where that is far behind another's."""
+
+        def first(each: BegunFit | str) -> BegunFit | str:
+            return each if isinstance(each, str) else each.landed().carried().settled(1)
+
+        fits = self._each(number, "refitting", first, racers, 0.6, 0.8)
+        least = min((each.cost for each in fits.values() if not isinstance(each, str)), default=inf)
 
         def finished(each: BegunFit | str) -> EvaluatedModel | str:
             if isinstance(each, str):
@@ -222,15 +266,40 @@ class EffectSearch:
             lost = racing and each.cost > OUT_OF_RACE * least
             return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
 
-        models: dict[str, EvaluatedModel | str] = {}
-        for name, model in zip(dearest_first, on_threads(finished, fits, self._workers), strict=True):
-            models[name] = model
-            self._progress(what, 0.5 + half * len(models))
-        return {name: models[name] for name in names}
+        return self._each(number, "refitting", finished, fits, 0.8, 1.0)
+
+    def _each(
+        self,
+        number: int,
+        what: str,
+        function: Callable[[S], T],
+        by_name: Mapping[str, S],
+        begin: float,
+        end: float,
+    ) -> dict[str, T]:
+        """Apply a function to what is there of each effect, on the workers; tell how far the step is by then."""
+        found: dict[str, T] = {}
+        for name, each in zip(by_name, on_threads(function, tuple(by_name.values()), self._workers), strict=True):
+            found[name] = each
+            self._progress(
+                f"step {number}: {what} {len(by_name)} effects", begin + (end - begin) * len(found) / len(by_name)
+            )
+        return found
 
     def _evaluated(self, found: Fit) -> EvaluatedModel:
         errors = block_errors(found, self._split)
         return EvaluatedModel(found, errors, errors.at_floor(self._split.floor_m))
+
+
+def _parted(racers: Mapping[str, BegunFit]) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:
+    """Return those that are in the race on their way, and those that are not."""
+    least = min((each.screening_cost for each in racers.values()), default=inf)
+    fast = {name: each for name, each in racers.items() if each.screening_cost <= OUT_OF_RACE * least}
+    return fast, {name: each for name, each in racers.items() if name not in fast}
+
+
+def _best(step: EffectStep) -> EvaluatedModel:
+    return step.added.model if step.added and step.added.model else step.before
 
 
 def _cost(model: EvaluatedModel | str) -> float:
