@@ -4,7 +4,7 @@ Its files:
 
     valve_file, slave_file, daemon_file           what a person writes: the valve, the simulated slave, the daemon
     extended_valve                                a valve file worked out for the controller
-    loading, writing                              reads such a file; writes a valve's
+    loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all
     whole_file                                    replaces a file so that a crash leaves the old one or the new one
     device, canopen_device                        table [device], on Modbus and on CANopen
     hosts, serial_port, tls_table                 where it is, and how it is secured

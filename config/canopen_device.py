@@ -135,6 +135,10 @@ class CanopenDevice(CanBus, Device):
     heartbeat_s: Annotated[float, Field(ge=1e-3, le=65)] = 0.05
     """Told to the node; `heartbeats_missed` of it without one is a fault."""
     heartbeats_missed: Annotated[float, Field(ge=1.5, le=100)] = 2.5
+    master_node: Annotated[int, Field(ge=1, le=127)] | None = None
+    """The node id that this daemon has itself: then the node is told to watch its heartbeat (0x1016)."""
+    master_heartbeat_s: Annotated[float, Field(ge=1e-3, le=10)] = 0.05
+    """Sent at least so often while cycles are more frequent; the node is told `heartbeats_missed` of it."""
     reply_timeout_s: Annotated[float, Field(gt=0, le=60)] = 0.03
     communication_timeout_s: NonNegative = 1.0
     communication_action: ActionName = "hold"
@@ -149,8 +153,14 @@ class CanopenDevice(CanBus, Device):
 
     @property
     def acts_alone_after_s(self) -> float:
-        """The time-out that it is told, if it can be told one."""
-        return self.communication_timeout_s or math.inf if self.map.communication_timeout_s else math.inf
+        """The shorter of the time-outs that it is told, if it can be told one."""
+        told_s = self.communication_timeout_s or math.inf if self.map.communication_timeout_s else math.inf
+        return told_s if self.master_node is None else min(told_s, self.master_timeout_s)
+
+    @property
+    def master_timeout_s(self) -> float:
+        """Silence of this master after which the node acts by itself, if it watches it."""
+        return self.heartbeats_missed * self.master_heartbeat_s
 
     def read_only(self) -> Self:
         """Return the same device for one who only watches."""
@@ -178,6 +188,8 @@ class CanopenDevice(CanBus, Device):
     def _sync_id_is_free(self) -> Self:
         if self.sync_cob_id in self.own_ids:
             raise ValueError(f"sync_cob_id must be none of node {self.node}'s own ids, it is {self.sync_cob_id:#x}")
+        if self.master_node == self.node:
+            raise ValueError(f"master_node must be another than the device's own node, {self.node}")
         return self
 
     @property

@@ -54,6 +54,7 @@ class Fault(Code):
     RESTARTED = 5, "device restarted"
     DCS_SILENT = 6, "DCS silent"
     STALLED = 7, "the daemon stood still"
+    OTHER_MASTER = 8, "another master wrote the set point"
 
 
 class Quality(Code):

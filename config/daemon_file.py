@@ -16,9 +16,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from config.bus_plugins import AnyDevice
-from config.device import ModbusTcpDevice
+from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
-from config.loading import Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
+from config.loading import FolderName, Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
 from config.quantities import ActionName
 from config.tls_table import Tls
 
@@ -63,6 +63,8 @@ class SafetyTable(Schema):
     """Without a new measurement, or later than its cycle was due: then the daemon stood still."""
     travel_margin: Fraction = 0.1
     """A position farther than this fraction of the stroke outside the stroke is implausible."""
+    read_back_s: NonNegative = 1.0
+    """How often the device is asked for the command it holds, that another master may have written; 0 is never."""
     heartbeat_timeout_s: NonNegative = 0.0
     """Silence of the DCS that is a fault; 0 is never."""
     heartbeat_action: ActionName = "hold"
@@ -176,9 +178,15 @@ class ControlTable(Schema):
 class SupervisoryTable(Schema):
     """Table `[supervisory]`: where the DCS finds the registers. Port 0 takes any free one; the daemon says which."""
 
-    host: str = "127.0.0.1"
+    host: Host = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 5502
     unit: Annotated[int, Field(ge=1, le=247)] = 1
+    most_clients: Annotated[int, Field(ge=1, le=1000)] = 64
+    clients_per_host: Annotated[int, Field(ge=1, le=1000)] = 56
+    reserved_hosts: tuple[Host, ...] = ()
+    """Addresses of the DCS: where all places are taken, another's is made free for them."""
+    requests_per_s: NonNegative = 1000.0
+    """Of one host; more wait. 0 is no limit."""
     tls: Tls | None = None
     """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
 
@@ -186,7 +194,7 @@ class SupervisoryTable(Schema):
 class RecorderTable(Schema):
     """Table `[recorder]`: recordings in a folder, a new file at a size, the oldest deleted beyond a number."""
 
-    folder: str
+    folder: FolderName
     file_bytes: Annotated[int, Field(ge=10_000)] = 50_000_000
     keep_files: Annotated[int, Field(ge=1)] = 20
 
@@ -197,7 +205,7 @@ class HealthTable(Schema):
     A limit of 0 is none.
     """
 
-    folder: str | None = None
+    folder: FolderName | None = None
     """One small file for each valve there keeps counts and baseline over restarts; without it they begin anew."""
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 0.005
     """Motion that does not count as travel, as a fraction of the stroke; widened to 12 times the noise."""
@@ -221,7 +229,7 @@ class HealthTable(Schema):
 class MemoryTable(Schema):
     """Table `[memory]`: where what is known of a valve is kept over restarts."""
 
-    folder: str | None = None
+    folder: FolderName | None = None
     """One small file for each valve there; without it each start knows nothing of the last."""
 
 
@@ -329,6 +337,8 @@ def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict
             raise InputError(where, f"valve.{key}: is required and missing")
     own = {key: _merged(tables.get(key, {}), entry[key]) for key in entry.keys() & OWN}
     supervisory = tables.get("supervisory", {})
+    if not isinstance(supervisory, dict):
+        raise InputError(where, f"supervisory: must be a table, got {supervisory!r}")
     if "unit" in supervisory:
         raise InputError(where, "supervisory.unit: each of several valves has its own unit, in [[valve]]")
     valve = {key: value for key, value in entry.items() if key in ValveTable.model_fields}

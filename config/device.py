@@ -22,6 +22,9 @@ def _host(host: str) -> str:
     return host
 
 
+Host = Annotated[str, AfterValidator(_host)]
+"""A host name or an IP address."""
+
 RENAMED = {"untouched": "read_only", "clash": "conflict_with", "turn_s": "longest_exchange_s"}
 """Members of `Device` by the names they had in 0.1: a bus that still overrides one would be passed over in silence."""
 
@@ -30,6 +33,9 @@ class Device(Schema):
     """What table `[device]` says of a device on any bus: a bus's own schema adds how to reach it."""
 
     bus: str
+    sampling: Literal["before", "after"] = "before"
+    """What the pressure of a reply is: of the command before (latched, or on the device's own clock), or already of the
+    one that the reply answers (sampled on request, after the write). A device in lockstep has obeyed for a period."""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_kwargs: Any) -> None:
@@ -137,7 +143,7 @@ class ModbusTcpDevice(ModbusDevice):
     """Table `[device]` of the daemon: a device on Modbus TCP."""
 
     bus: Literal["modbus"] = "modbus"
-    host: Annotated[str, AfterValidator(_host)] = "127.0.0.1"
+    host: Host = "127.0.0.1"
     port: Port = 5020
     unit: Annotated[int, Field(ge=0, le=255)] = 1
     tls: Tls | None = None

@@ -17,6 +17,7 @@ from pydantic import (
 )
 
 from config.errors import InputError
+from config.plain_file import read_plain
 
 SHIPPED = Path(str(resources.files("config")))
 """Where the shipped valve files and profiles lie."""
@@ -34,7 +35,18 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 
 
+def _named(path: str) -> str:
+    if "\0" in path or not path:
+        raise ValueError("must be the name of a file or a folder")
+    return path
+
+
+FolderName = Annotated[str, AfterValidator(_named)]
+"""A folder, from that of the file it is written in."""
+
+
 def _beside(path: Path, info: ValidationInfo) -> Path:
+    _named(str(path))
     return Path((info.context or {}).get("folder", ""), path)
 
 
@@ -60,15 +72,13 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         InputError: the file is not there, cannot be read, or is not TOML (names the line).
     """
+    text = read_plain(path)
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(str(path), f"is not valid TOML: {error}") from None
-    except UnicodeDecodeError:
-        raise InputError(str(path), "is not valid TOML: it is not UTF-8 text") from None
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(str(path), "is not valid TOML: it is nested too deeply") from None
+    except ValueError as error:  # no TOML; or a number of too many digits
+        raise InputError(str(path), f"is not valid TOML: {str(error).partition(';')[0]}") from None
 
 
 def validated(schema: type[S], tables: dict[str, Any], source: str, folder: Path | None = None) -> S:

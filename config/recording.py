@@ -9,7 +9,9 @@ of it. A file named `.parquet` holds the same columns.
 """
 
 import csv
+import os
 from array import array
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -20,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.errors import InputError
+from config.plain_file import MOST_COLUMNS, require_moderate
 from config.results.block import Block, Table
 from config.results.result import Result
 
@@ -143,16 +146,20 @@ def write_recording(path: Path, recording: Recording) -> None:
     """Write a recording as CSV, or as Parquet if the file is named so; numbers keep every bit.
 
     Raises:
-        InputError: Parquet without pyarrow.
+        InputError: Parquet without pyarrow, or the file cannot be written.
     """
-    if path.suffix == ".parquet":
-        _write_parquet(path, recording)
-        return
-    with path.open("w", newline="", encoding="utf-8") as file:
-        file.writelines(f"# {key}: {value}\n" for key, value in recording.metadata.items())
-        file.write(",".join(recording.columns) + "\n")
-        for row in zip(*(column.tolist() for column in recording.columns.values()), strict=True):
-            file.write(",".join(map(repr, row)) + "\n")
+    try:
+        if path.suffix == ".parquet":
+            _write_parquet(path, recording)
+            return
+        with path.open("w", newline="", encoding="utf-8") as file:
+            file.writelines(f"# {key}: {value}\n" for key, value in recording.metadata.items())
+            file.write(",".join(recording.columns) + "\n")
+            for row in zip(*(column.tolist() for column in recording.columns.values()), strict=True):
+                file.write(",".join(map(repr, row)) + "\n")
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise InputError(str(path), f"cannot be written: {reason}") from None
 
 
 def read_recording(path: Path) -> Recording:
@@ -203,9 +210,11 @@ def _require(path: Path, required: tuple[str, ...], names: list[str], where: str
         named = named if len(named) <= LONGEST_NAMED else f"{named[:LONGEST_NAMED]}.."
         hint = f"; of another program's export, `positioner import {path}` says how to read it"
         raise InputError(str(path), f"column {missing[0]} is missing; {where}: {named}{hint}")
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(str(path), f"column {name} stands {names.count(name)} times; once is allowed")
+    if len(names) > MOST_COLUMNS:
+        raise InputError(str(path), f"{where} {len(names)} columns; allowed are {MOST_COLUMNS}")
+    name, times = Counter(names).most_common(1)[0]
+    if times > 1:
+        raise InputError(str(path), f"column {name} stands {times} times; once is allowed")
 
 
 def _table(
@@ -298,6 +307,8 @@ def _write_parquet(path: Path, recording: Recording) -> None:
 def _read_parquet(path: Path) -> tuple[dict[str, Column], dict[str, str]]:
     arrow, parquet = _pyarrow(path)
     try:
+        declared = parquet.read_metadata(path)
+        require_moderate(path, declared.num_rows, declared.num_columns)
         table = parquet.read_table(path)
         columns = {name: _float64(table[name]) for name in table.column_names}
     except (arrow.ArrowException, ValueError, TypeError) as error:

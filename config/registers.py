@@ -121,6 +121,7 @@ STATUS = (
     Register("sample_age", 116, "float32", "s", "time since the last good measurement"),
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
     Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {listed(Restored)}"),
+    Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
     Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
 

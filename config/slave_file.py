@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from config.canopen_device import CanBus
+from config.device import Host
 from config.errors import InputError
 from config.loading import NonNegative, Port, Positive, Schema, chosen_by, load
 from config.modbus_map import SIMULATED_MAP, ModbusMap
@@ -20,7 +21,7 @@ class ModbusTcpBus(Schema):
     """Table `[bus]`: where the slave listens on Modbus TCP."""
 
     kind: Literal["modbus"] = "modbus"
-    host: str = "127.0.0.1"
+    host: Host = "127.0.0.1"
     port: Port = 5020
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     tls: Tls | None = None

@@ -5,7 +5,7 @@ never retries and never repeats an old measurement: what it cannot get it raises
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +17,8 @@ class Reading:
     sample_counter: int | None = None
     device_time_s: float | None = None
     status: int = 0
+    emergency: int = 0
+    """The device's own code of what is wrong with it, where it has such (CANopen: of the last EMCY); 0: nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,4 +104,22 @@ class Driver(Protocol):
 
     def close(self) -> None:
         """Let go of the device; it keeps its last command until its own time-out. Never raises."""
+        ...
+
+
+@runtime_checkable
+class ReadsBack(Protocol):
+    """What a driver is, too, that can read the command back while it drives."""
+
+    def held_pa(self) -> float:
+        """Return the command that the device holds, in Pa, whoever gave it. Moves nothing; raises `DriverError`."""
+        ...
+
+
+@runtime_checkable
+class ForeseesRefusal(Protocol):
+    """What a watching driver is, too, that knows what driving would be refused."""
+
+    def refused(self) -> str | None:
+        """Say what the device would refuse of what it had to be told; None if nothing. Raises `DriverError`."""
         ...

@@ -77,6 +77,11 @@ class MemoryDriver:
         self.write(command_pa)
         return self.read()
 
+    def held_pa(self) -> float:
+        """Return the command that the plant obeys, in Pa."""
+        self._check_open()
+        return self._plant.command_pa
+
     def close(self) -> None:
         """Let go of the plant."""
         self._is_open = False

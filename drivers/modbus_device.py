@@ -84,7 +84,7 @@ class ModbusDriver(ABC):
         """
         try:
             self._connect()
-            held_pa = self._held_command_pa()
+            held_pa = self.held_pa()
             self._configure()
         except BaseException:
             self.close()
@@ -117,6 +117,17 @@ class ModbusDriver(ABC):
         self.write(command_pa)
         return self.read()
 
+    def held_pa(self) -> float:
+        """Return the command that the device holds, in Pa, whoever gave it; moves nothing."""
+        place = self._config.map.command_pa
+        words = place.format.words
+        request = encoded(ReadHoldingRegistersRequest(address=place.address, count=words))
+        (raw,) = layout([place]).unpack(self._ask(request, bytes((3, 2 * words)), 2 + 2 * words))
+        held_pa = place.value(raw)
+        if not math.isfinite(held_pa):
+            raise BadReply(f"{self._about(request)}: the command it holds is {held_pa}")
+        return held_pa
+
     def _read_all(self) -> Reading:
         values: dict[str, float] = {}
         for each in self._reads:
@@ -129,16 +140,6 @@ class ModbusDriver(ABC):
         had_holes = len(split) > len(self._reads)
         self._reads = [_Read(each) for each in split]
         return had_holes
-
-    def _held_command_pa(self) -> float:
-        place = self._config.map.command_pa
-        words = place.format.words
-        request = encoded(ReadHoldingRegistersRequest(address=place.address, count=words))
-        (raw,) = layout([place]).unpack(self._ask(request, bytes((3, 2 * words)), 2 + 2 * words))
-        held_pa = place.value(raw)
-        if not math.isfinite(held_pa):
-            raise BadReply(f"{self._about(request)}: the command it holds is {held_pa}")
-        return held_pa
 
     def _configure(self) -> None:
         # The action first: a time-out must never start with another's action.

@@ -44,6 +44,8 @@ own file and of `sim.first_order_lag`.
 """
 
 import inspect
+import logging
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -81,6 +83,10 @@ UPKEEP: Mapping[str, tuple[str, ...]] = {
 AT_STEM = ("force", "friction", "motion")
 FINE_STEP_S = 2.5e-4
 """For a memory of which nothing is known."""
+log = logging.getLogger(__name__)
+
+FOLDERS_ALLOWED = "POSITIONER_EFFECTS"
+"""Of the environment: folders from which effects may be run by their paths, in place of the working folder."""
 SHIPPED = Path(__file__).parent / "effects"
 BALANCE = "balance"
 SETPOINT = "setpoint"
@@ -261,14 +267,32 @@ def shipped_effect(name: str, source: str) -> Effect:
 def find_effect(text: str, source: str) -> Effect:
     """Return the effect that a person named: the path of its file, which ends in .py, or a shipped one's name.
 
+    Such a file is a program that runs as whoever reads it: only from folders that are allowed, and said the first time.
+
     Raises:
-        InputError: there is no such file or name, or the file is not an effect's.
+        InputError: there is no such file or name, its folder is not allowed, or the file is not an effect's.
     """
     if not text.endswith(".py"):
         return shipped_effect(text, source)
-    if not Path(text).is_file():
+    path = Path(text)
+    if not path.is_file():
         raise InputError(source, f"no effect's file {text}")
-    return read_effect(Path(text))
+    if not any(path.resolve().is_relative_to(folder) for folder in allowed_folders()):
+        said = f"names {text}, a program, which lies in no folder allowed: put it beside your work, or allow its folder"
+        raise InputError(source, f"{said}, {FOLDERS_ALLOWED}={path.resolve().parent}")
+    _say_aloud(path.resolve(), source)
+    return read_effect(path)
+
+
+def allowed_folders() -> list[Path]:
+    """Return the folders from which effects may be run by path: those of the environment, else the working one."""
+    said = os.environ.get(FOLDERS_ALLOWED, "")
+    return [Path(each).resolve() for each in (said.split(os.pathsep) if said else ["."])]
+
+
+@cache
+def _say_aloud(path: Path, source: str) -> None:
+    log.warning("%s names an effect by its path: %s is run as a program", source, path)
 
 
 def read_effect(path: Path) -> Effect:

@@ -8,6 +8,7 @@ import gc
 import os
 import signal
 import sys
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,8 @@ GIVES_WAY = 3
 
 # Of every process: threads for small matrices would only take the processors from the other workers.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Effects that tests write themselves lie in temporary folders.
+os.environ["POSITIONER_EFFECTS"] = os.pathsep.join((".", tempfile.gettempdir()))
 # Nor compile our modules anew in each, where a person has switched the keeping off.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from config.errors import InputError
 from config.exports.raw_table import Cell, RawTable
+from config.plain_file import MOST_COLUMNS
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma"}
 MARKS = {
@@ -103,6 +104,8 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[Cel
             raise InputError(str(path), f"line {begin}: {_said(error)}") from None
         if row is None:
             return
+        if len(row) > MOST_COLUMNS:
+            raise InputError(str(path), f"line {begin}: {len(row)} fields; allowed are {MOST_COLUMNS}")
         yield reader.line_num, [cell.strip() for cell in row]
 
 

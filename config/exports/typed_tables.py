@@ -13,6 +13,7 @@ import numpy as np
 from config.errors import InputError
 from config.exports.raw_table import Cell, RawTable
 from config.extras import needed
+from config.plain_file import require_moderate
 
 
 def workbook(path: Path, sheet: str | None = None) -> list[RawTable]:
@@ -117,7 +118,11 @@ def parquet(path: Path) -> list[RawTable]:
     """
     reader = needed("pyarrow.parquet", str(path))
     try:
+        declared = reader.read_metadata(path)
+        require_moderate(path, declared.num_rows, declared.num_columns)
         table = reader.read_table(path)
+    except InputError:
+        raise
     except Exception as error:  # a damaged file fails in any of Arrow's ways
         raise InputError(str(path), f"is a damaged Parquet file: {_first_line(error)}") from None
     columns = {name: [_cell(value) for value in table[name].to_pylist()] for name in table.column_names}

@@ -13,25 +13,26 @@ is more than a lost sample.
 """
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 from config.canopen_device import CanopenDevice
-from config.quantities import CommunicationAction, DeviceStatus
+from config.quantities import DeviceStatus
 from drivers.boundary import Capabilities, Driver, DriverError, Reading, Refused
 from drivers.canopen.activation import Activation
+from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NMT, SDO_ANSWER, NodeBus
 from drivers.canopen.only_watch import WatchingDriver
 from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.readings import capabilities_of, reading_of
-from drivers.canopen.sdo import HEARTBEAT_MS, ILLEGAL_VALUE, SdoTransfers, Setting, device_sheet
+from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, Setting, device_sheet
 from drivers.canopen.watcher import NodeWatcher
 
 START, ENTER_PRE_OPERATIONAL = 1, 128
-SYNC = 0x1005
-DEFAULT_SYNC_ID = 0x80
+OPERATIONAL = bytes((5,))
 
 
 def canopen_driver(config: CanopenDevice) -> Driver:
@@ -60,12 +61,15 @@ class CanopenDriver:
         self._watcher = NodeWatcher(config, self._bus)
         self._sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
         self._pdos = PdoExchange(config, sheet, self._bus, self._watcher)
+        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self._sdo, self._pdos)
         self._activation = Activation(config.map, self._bus)
+        self._said_alive_s = -math.inf
 
     @property
     def capabilities(self) -> Capabilities:
         """What the device can do."""
-        return capabilities_of(self._config)
+        capabilities = capabilities_of(self._config)
+        return replace(capabilities, sample_counter=capabilities.sample_counter or self._pdos.come_by_themselves)
 
     def open(self) -> float:
         """Configure and start the node; return the command it holds, in Pa. Moves nothing.
@@ -79,7 +83,8 @@ class CanopenDriver:
             self._bus.open(own_ids)
             self._sdo.open()
             held_pa = self._sdo.held_command_pa(self._config.map.command_pa)
-            wanted = self._wanted()
+            wanted = self._configuration.wanted()
+            self._say_alive()
             self._bus.hear((*own_ids, *self._pdos.tpdo_ids))
             self._sdo.require_alone()
             self._set(wanted)
@@ -120,11 +125,24 @@ class CanopenDriver:
             self._bus.require_open()
             raise self._refused(f"not sent: {error}") from None
         self._pdos.catch_up()
+        self._say_alive()
         self._pdos.send_command()
         reading = self._reading(self._pdos.sample())
         if self._watcher.refusal is not None:
             raise self._refused(f"{command_pa:g} Pa: {self._watcher.refusal}")
         return reading
+
+    def held_pa(self) -> float:
+        """Return the command that the node holds, asked by SDO; moves nothing.
+
+        Raises:
+            DriverError: it did not answer, or is not OPERATIONAL any more.
+        """
+        self._pdos.catch_up()
+        self._watcher.state = None
+        held_pa = self._sdo.held_command_pa(self._config.map.command_pa)
+        self._watcher.judge_state()
+        return held_pa
 
     def close(self) -> None:
         """Leave the bus; the node keeps its last command until its own time-out. Never raises."""
@@ -132,25 +150,6 @@ class CanopenDriver:
 
     def _manage(self, command: int) -> None:
         self._bus.send(NMT, bytes((command, self._config.node)))
-
-    def _wanted(self) -> list[Setting]:
-        """Return what must be set, in order: what the node has already is left alone."""
-        config, objects, sdo = self._config, self._config.map, self._sdo
-        wanted: list[Setting] = []
-        # The action first: a time-out must never start with another's action.
-        if entry := objects.communication_action:
-            action = CommunicationAction[config.communication_action.upper()]
-            wanted.append(Setting(entry.index, entry.subindex, entry.raw(action)))
-        if entry := objects.communication_timeout_s:
-            wanted.append(Setting(entry.index, entry.subindex, entry.raw(config.communication_timeout_s)))
-        self._watcher.heartbeat_timeout_s = config.heartbeat_timeout_s
-        if sdo.has(HEARTBEAT_MS):
-            wanted.append(Setting(HEARTBEAT_MS, 0, round(1e3 * config.heartbeat_s)))
-        else:  # that it lives, its TPDOs show
-            self._watcher.heartbeat_timeout_s = math.inf
-        if sdo.has(SYNC) or config.sync_cob_id != DEFAULT_SYNC_ID:
-            wanted.append(Setting(SYNC, 0, config.sync_cob_id))
-        return [each for each in wanted if not sdo.holds(each)] + self._pdos.wanted(sdo)
 
     def _set(self, wanted: Sequence[Setting]) -> None:
         """Set it and make the node ACTIVE, or put back what was set and raise as `SdoTransfers.download`."""
@@ -170,11 +169,19 @@ class CanopenDriver:
                     self._manage(START)
             raise
 
+    def _say_alive(self) -> None:
+        """Send this master's heartbeat when it is due, if the node shall watch it: half a period early, not late."""
+        master, now_s = self._config.master_node, time.monotonic()
+        if master is not None and now_s - self._said_alive_s >= self._config.master_heartbeat_s / 2:
+            self._said_alive_s = now_s
+            self._bus.send(HEARTBEAT + master, OPERATIONAL)
+
     def _reading(self, values: Mapping[str, float]) -> Reading:
-        if "status_word" not in values:
-            return reading_of(values)
-        self._activation.update(round(values["status_word"]))
-        return reading_of(values, 0 if self._activation.is_active else DeviceStatus.NOT_READY)
+        unfit = 0
+        if "status_word" in values:
+            self._activation.update(round(values["status_word"]))
+            unfit = 0 if self._activation.is_active else DeviceStatus.NOT_READY
+        return replace(reading_of(values, unfit), emergency=self._watcher.emergency)
 
     def _refused(self, said: str) -> Refused:
         return Refused(f"{self._bus.who}: {NodeEvent.COMMAND_REFUSED}: {said}", ILLEGAL_VALUE)

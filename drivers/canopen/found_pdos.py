@@ -1,10 +1,12 @@
 """The PDOs of a node as it was found: what its records say they carry (CiA 301, 7.5.2.35 to 7.5.2.38).
 
-    0x1400, 0x1800 + n   communication   sub 1 COB-ID, bit 31 set where the PDO is not in use; sub 2 transmission type
+    0x1400, 0x1800 + n   communication   sub 1 COB-ID, bit 31 set where the PDO is not in use; sub 2 transmission type;
+                                         sub 5 event timer, ms
     0x1600, 0x1A00 + n   mapping         sub 0 how many, sub 1 on: index << 16 | sub-index << 8 | bits
 
 Some nodes have PDOs that cannot be changed, and others serve another master, too. Where they carry all that is wanted
-they are used as they are, and nothing is told: TPDOs sent at each SYNC, whatever else is in them; one RPDO with what is
+they are used as they are, and nothing is told: TPDOs sent at each SYNC, whatever else is in them, or by themselves with
+an event timer, without which a stem at rest could not be told from a sensor that has died; one RPDO with what is
 commanded and nothing else, for what else is in it would be commanded, too.
 """
 
@@ -22,8 +24,10 @@ MAPPING = 0x200
 INVALID = 1 << 31
 """Of a PDO's COB-ID."""
 COB_ID = (1 << 11) - 1
-EACH_SYNC = 1
-"""Transmission type."""
+EACH_SYNC, LAST_SYNCHRONOUS, BY_ITSELF = 1, 240, (254, 255)
+"""Transmission types."""
+EVENT_TIMER_MS = 5
+"""Sub-index."""
 Place = tuple[int, int]
 """Index and sub-index."""
 
@@ -36,6 +40,13 @@ class FoundPdo:
     cob_id: int
     transmission: int
     carried: tuple[tuple[Place, int], ...]
+    event_timer_s: float = 0.0
+    """The longest time from one to the next; 0: there is none."""
+
+    @property
+    def comes_by_itself(self) -> bool:
+        """Whether it is sent without SYNC, and often enough that its silence says something."""
+        return self.transmission in BY_ITSELF and self.event_timer_s > 0
 
     @property
     def places(self) -> frozenset[Place]:
@@ -62,16 +73,19 @@ def found_pdos(sdo: SdoTransfers, sheet: ObjectDictionary, first_record: int) ->
         mapped = [int(sdo.upload(record + MAPPING, n)) for n in range(1, count + 1)] if count <= PDO_BYTES else []
         if mapped and not any(each & 0x7 for each in mapped):
             carried = tuple(((each >> 16, each >> 8 & 0xFF), (each & 0xFF) // 8) for each in mapped)
-            found.append(FoundPdo(record, identity & COB_ID, int(sdo.upload(record, 2)), carried))
+            transmission = int(sdo.upload(record, 2))
+            timer_ms = sdo.whole_number(record, EVENT_TIMER_MS) if transmission in BY_ITSELF else 0
+            found.append(FoundPdo(record, identity & COB_ID, transmission, carried, 1e-3 * timer_ms))
     return found
 
 
 def that_carry(found: list[FoundPdo], wanted: Mapping[str, Entry]) -> list[FoundPdo] | None:
-    """Return those TPDOs that bring all quantities, each once and at each SYNC; None where they do not."""
+    """Return those TPDOs that bring all quantities, each once, at SYNC or by themselves; None where they do not."""
     places = {(entry.index, entry.subindex) for entry in wanted.values()}
     carrying = [each for each in found if each.places & places]
     brought = [place for each in carrying for place, _ in each.carried if place in places]
-    if sorted(brought) != sorted(places) or any(each.transmission != EACH_SYNC for each in carrying):
+    usable = all(each.transmission == EACH_SYNC or each.comes_by_itself for each in carrying)
+    if sorted(brought) != sorted(places) or not usable:
         return None
     return carrying
 

@@ -2,8 +2,10 @@
 
 from config.canopen_device import CanopenDevice
 from drivers.boundary import Capabilities, Reading, Refused
+from drivers.canopen.configuration import NodeConfiguration
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, NodeBus
+from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.readings import capabilities_of, reading_of
 from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, device_sheet
 from drivers.canopen.watcher import NodeWatcher
@@ -23,7 +25,10 @@ class WatchingDriver:
         sheet = device_sheet(config)
         self._config = config
         self._bus = NodeBus(config)
-        self._sdo = SdoTransfers(config, sheet, self._bus, NodeWatcher(config, self._bus))
+        self._watcher = NodeWatcher(config, self._bus)
+        self._sdo = SdoTransfers(config, sheet, self._bus, self._watcher)
+        pdos = PdoExchange(config, sheet, self._bus, self._watcher)
+        self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self._sdo, pdos)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -67,6 +72,14 @@ class WatchingDriver:
         """Command nothing; raises as `write`."""
         self.write(command_pa)
         return self.read()
+
+    def refused(self) -> str | None:
+        """Say which of what it would be told to be driven the node refuses by its data sheet; None if nothing.
+
+        Raises:
+            DriverError: it did not answer.
+        """
+        return self._configuration.refused()
 
     def close(self) -> None:
         """Leave the bus. Never raises."""

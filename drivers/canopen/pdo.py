@@ -4,9 +4,11 @@
     SYNC    `sync_cob_id`        empty
     TPDOs   0x180, 0x280, .. + n the quantities of one sample     sent at each SYNC (transmission type 1)
 
-PDOs that carry what is wanted are used as they were found (`found_pdos`). Else what a PDO carries is set by SDO in its
-records (0x1400 and 0x1600, 0x1800 and 0x1A00 on), the quantities packed first fit into 8 bytes each. A TPDO too short,
-twice, or without SYNC cannot be trusted: the bus is left.
+PDOs that carry what is wanted are used as they were found (`found_pdos`). Of TPDOs that come by themselves (types 254
+and 255) the newest count; they need not be of one sample, and their samples are numbered here: one in which not every
+such TPDO came anew has the number of the one before. SYNC is sent only where a PDO waits for it. Else what a PDO
+carries is set by SDO in its records (0x1400 and 0x1600, 0x1800 and 0x1A00 on), the quantities packed first fit into
+8 bytes each. A TPDO too short, twice, or without SYNC cannot be trusted: the bus is left.
 """
 
 import math
@@ -21,7 +23,16 @@ from config.canopen_device import CanopenDevice, Entry
 from config.errors import InputError
 from drivers.boundary import BadReply, NoNumber, NoReply
 from drivers.canopen.events import NodeEvent
-from drivers.canopen.found_pdos import EACH_SYNC, INVALID, MAPPING, FoundPdo, found_pdos, that_carry, that_takes
+from drivers.canopen.found_pdos import (
+    EACH_SYNC,
+    INVALID,
+    LAST_SYNCHRONOUS,
+    MAPPING,
+    FoundPdo,
+    found_pdos,
+    that_carry,
+    that_takes,
+)
 from drivers.canopen.node_bus import NodeBus
 from drivers.canopen.sdo import REALS, SdoTransfers, Setting, sheet_variable
 from drivers.canopen.watcher import NodeWatcher
@@ -30,6 +41,8 @@ from fieldbus.canopen.objects import MOST_PDOS, Control, first_fit
 RPDO, TPDO = 0x1400, 0x1800
 """First communication records."""
 RPDO_ID, TPDO_ID = 0x200, 0x180
+FIRST_TIMERS = 3
+"""Event timers within which TPDOs that come by themselves must all have come once."""
 
 
 class Pdo:
@@ -116,6 +129,12 @@ class PdoExchange:
         self._sampled, self._commanded = sampled, commanded
         self._groups = self._grouped(config, {name: len(self._variables[name]) // 8 for name in sampled})
         self._tpdos: dict[int, Pdo] = {}
+        self._by_themselves: dict[int, Pdo] = {}
+        """Those of `_tpdos` that no SYNC brings."""
+        self._newest: dict[str, float] = {}
+        self._came: set[int] = set()
+        self._first_within_s = 0.0
+        self._samples = 0
         self._use_own()
         self._sync = can.Message(arbitration_id=config.sync_cob_id, is_extended_id=False)
 
@@ -124,8 +143,17 @@ class PdoExchange:
         """The arbitration ids of the TPDOs in use."""
         return tuple(self._tpdos)
 
+    @property
+    def come_by_themselves(self) -> bool:
+        """Whether some TPDOs come without SYNC."""
+        return bool(self._by_themselves)
+
     def _use_own(self) -> None:
         """Use PDOs by the predefined connection set."""
+        self._by_themselves, self._newest, self._came = {}, {}, set()
+        self._all_came = False
+        self.need_sync = True
+        """Whether a PDO in use waits for SYNC."""
         self._tpdos = {
             self._tpdo_id(n): Pdo(
                 TPDO + n, self._tpdo_id(n), [(each, self._sampled[each]) for each in names], self._variables
@@ -151,6 +179,10 @@ class PdoExchange:
             return False
         self._tpdos = {each.cob_id: self._as_found(each, self._sampled) for each in carrying}
         self._use_rpdo(self._as_found(taking, self._commanded))
+        unasked = [each for each in carrying if each.comes_by_itself]
+        self._by_themselves = {each.cob_id: self._tpdos[each.cob_id] for each in unasked}
+        self._first_within_s = FIRST_TIMERS * max((each.event_timer_s for each in unasked), default=0.0)
+        self.need_sync = len(unasked) < len(carrying) or taking.transmission <= LAST_SYNCHRONOUS
         return True
 
     def _as_found(self, found: FoundPdo, wanted: Mapping[str, Entry]) -> Pdo:
@@ -192,6 +224,8 @@ class PdoExchange:
         self._bus.require_open()
         self._watcher.refusal = None
         while (message := self._bus.receive(0.0)) is not None:
+            if self._takes_unasked(message):
+                continue
             if message.arbitration_id in self._tpdos:
                 said = "a TPDO without SYNC: another node has this id, or another master sends SYNC"
                 raise self._bus.closing_fault(BadReply, NodeEvent.NODE_ID_TAKEN, said)
@@ -214,8 +248,11 @@ class PdoExchange:
             NoNumber: a quantity is none.
             NoConnection: the node is lost.
         """
-        self._bus.put(self._sync)
+        if self.need_sync:
+            self._bus.put(self._sync)
         values = self._received()
+        if self._by_themselves:
+            values |= self._unasked()
         self._watcher.require_heartbeat()
         if not all(map(math.isfinite, values.values())):
             said = ", ".join(f"{name} {value}" for name, value in values.items())
@@ -224,7 +261,7 @@ class PdoExchange:
 
     def _received(self) -> dict[str, float]:
         """Wait for the TPDOs of the SYNC just sent."""
-        missing = dict(self._tpdos)
+        missing = {each: pdo for each, pdo in self._tpdos.items() if each not in self._by_themselves}
         values: dict[str, float] = {}
         rest_s = self._reply_timeout_s
         end_s = time.monotonic() + rest_s
@@ -234,11 +271,41 @@ class PdoExchange:
             if message is not None and message.arbitration_id in missing:
                 values.update(self._unpacked(missing.pop(message.arbitration_id), message))
                 continue
-            if message is not None:
+            if message is not None and not self._takes_unasked(message):
                 self._consume_other(message)
             if rest_s <= 0:
                 raise self._silent(len(missing))
         return values
+
+    def _takes_unasked(self, message: can.Message) -> bool:
+        """Keep what a TPDO says that comes by itself; return whether it is one."""
+        pdo = self._by_themselves.get(message.arbitration_id)
+        if pdo is None:
+            return False
+        self._newest |= self._unpacked(pdo, message)
+        self._came.add(message.arbitration_id)
+        return True
+
+    def _unasked(self) -> dict[str, float]:
+        """Return the newest of what came by itself, with the number of its sample; wait for the very first."""
+        if not self._all_came:
+            self._await_first()
+            self._all_came = True
+        if len(self._came) == len(self._by_themselves):
+            self._samples = (self._samples + 1) % (1 << 32)
+            self._came.clear()
+        own = {} if "sample_counter" in self._sampled else {"sample_counter": self._samples}
+        return {**self._newest, **own}
+
+    def _await_first(self) -> None:
+        end_s = time.monotonic() + max(self._reply_timeout_s, self._first_within_s)
+        while len(self._came) < len(self._by_themselves):
+            rest_s = end_s - time.monotonic()
+            message = self._bus.receive(max(0.0, rest_s))
+            if message is not None and not self._takes_unasked(message):
+                self._watcher.consume(message)
+            if message is None and rest_s <= 0:
+                raise self._silent(len(self._by_themselves) - len(self._came))
 
     def _unpacked(self, pdo: Pdo, message: can.Message) -> dict[str, float]:
         if len(message.data) < pdo.layout.size:
@@ -256,7 +323,8 @@ class PdoExchange:
         """Return what it means that TPDOs are missing."""
         event = NodeEvent.HEARTBEAT_LOST if self._watcher.is_silent else NodeEvent.SYNC_LOST
         said = (
-            f"{missing} of {len(self._tpdos)} TPDOs missing {1e3 * self._reply_timeout_s:g} ms after SYNC, "
+            f"{missing} of {len(self._tpdos)} TPDOs missing {1e3 * self._reply_timeout_s:g} ms "
+            f"{'after SYNC' if self.need_sync else 'after the command'}, "
             f"last heartbeat {1e3 * self._watcher.silence_s:.0f} ms ago"
         )
         return self._bus.closing_fault(NoReply, event, said)

@@ -132,6 +132,19 @@ class SdoTransfers:
             raise self._fault(error, index, subindex) from None
         return float(value) if isinstance(value, float) else int(value)
 
+    def whole_number(self, index: int, subindex: int) -> int:
+        """Return an unsigned number that need not be in the data sheet; 0 where the node has none.
+
+        Raises:
+            NoReply: no answer within the reply time-out.
+        """
+        try:
+            return int.from_bytes(self._client.upload(index, subindex), "little")
+        except SdoAbortedError:
+            return 0
+        except SdoCommunicationError as error:
+            raise self._fault(error, index, subindex) from None
+
     def download(self, index: int, subindex: int, value: float) -> None:
         """Write a number, as the node has it, into an object.
 

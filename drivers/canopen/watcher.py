@@ -76,6 +76,8 @@ class NodeWatcher:
         """What its heartbeat said last while it was being opened."""
         self.was_interrupted = False
         """Whether it booted or was stopped since this was last set to False."""
+        self.emergency = 0
+        """The error code of the node's last emergency; 0 when all are over, or there was none."""
         self.refusal: str | None = None
         """Why the node refused a command since this was last set to None."""
 
@@ -108,7 +110,16 @@ class NodeWatcher:
     def note(self, message: can.Message) -> None:
         """Take in a frame while the node is not driven yet, whatever its state."""
         if self.consume_emergency(message) is None and message.arbitration_id == self._heartbeat_id and message.data:
-            self.state = message.data[0] & 0x7F
+            self.state, self._heard_s = message.data[0] & 0x7F, time.monotonic()
+
+    def judge_state(self) -> None:
+        """Take in what `note` heard meanwhile of a node that is driven.
+
+        Raises:
+            NoConnection: as `consume`.
+        """
+        if self.state is not None:
+            self._consume_heartbeat(self.state)
 
     def consume_emergency(self, message: can.Message) -> int | None:
         """Log an emergency with its cause; return its code, None if the frame is something else."""
@@ -117,7 +128,8 @@ class NodeWatcher:
         code, register = struct.unpack_from("<HB", message.data)
         level, cause = (logging.WARNING, cause_of(code)) if code else (logging.INFO, "over")
         self._bus.say(level, NodeEvent.EMERGENCY, code=code, cause=cause, register=register)
-        return int(code)
+        self.emergency = int(code)
+        return self.emergency
 
     def require_heartbeat(self) -> None:
         """Ask that the last heartbeat is not too old.

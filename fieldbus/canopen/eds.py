@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from config.canopen_device import CONTROL_WORD, SIMULATED_OBJECTS, STATUS_WORD
 from config.errors import InputError
+from config.plain_file import read_plain
 from config.quantities import QUANTITIES, WRITABLE
 from config.register_format import Format, WireType
 from fieldbus.canopen.objects import DEVICE_MODE, MOST_PDOS, DeviceMode, first_fit
@@ -205,8 +206,9 @@ def read_eds(path: Path, node: int) -> "ObjectDictionary":
 
     import canopen
 
+    text = read_plain(path)
     try:
-        if "[DeviceInfo]" not in path.read_text():
+        if "[DeviceInfo]" not in text:
             raise ValueError("section [DeviceInfo] is missing")
         found = canopen.import_od(str(path), node)
     except OSError as error:

@@ -13,6 +13,7 @@ ends; so it does when a client does not read its answers for `SEND_TIMEOUT_S`, s
 
 import socket
 import struct
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from socketserver import BaseRequestHandler
@@ -32,12 +33,8 @@ class Host(Protocol):
         """Return the PDU that answers one."""
         ...
 
-    def note_use(self, peer: str) -> None:
-        """Take note that a client has asked for something (or has just come)."""
-        ...
-
-    def note_end(self, peer: str) -> None:
-        """Take note that a client has gone."""
+    def note_use(self, peer: str) -> float:
+        """Take note that a client asks for something; return how long it must wait for the answer, s."""
         ...
 
 
@@ -51,13 +48,12 @@ class Connection(BaseRequestHandler):
         """Answer the client's requests."""
         peer = endpoint(self.client_address)
         self.request.settimeout(SEND_TIMEOUT_S)
-        self.server.note_use(peer)
         with suppress(OSError):  # it is gone, or does not read
             for transaction, unit, pdu in self._requests():
-                self.server.note_use(peer)
+                if wait_s := self.server.note_use(peer):
+                    time.sleep(wait_s)
                 answer = self.server.answer(unit, pdu, peer)
                 self.request.sendall(HEADER.pack(transaction, 0, len(answer) + 1, unit) + answer)
-        self.server.note_end(peer)
 
     def _requests(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield transaction, unit and PDU of each frame, until the client has no more to say or makes no sense."""

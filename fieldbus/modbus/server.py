@@ -8,10 +8,12 @@ On TCP the address of the device is its IP address: unit 0 and 255 mean "this de
 Any other unit is a device behind a gateway that is not there: exception 11, so that a wrong number shows at once. So
 are 0 and 255 where several units are behind the port: there is no one device that they could mean.
 
-When `MOST_CLIENTS` are connected, a new one takes the place of the one that has asked for nothing for longest, if that
-is at least `UNUSED_S`; otherwise it is turned away. So clients that vanished without a word lock out nobody.
+Who gets a place and how often each host may ask, `fieldbus.modbus.admission` says: clients that vanished without a word
+lock out nobody, and one that asks without end is made to wait. On a secured port a client gets its place after its
+handshake; a session ends with its certificate. Out of descriptors, no more clients are accepted for a while.
 """
 
+import errno
 import logging
 import socket
 import time
@@ -24,6 +26,7 @@ from typing import Any
 from pymodbus.constants import ExcCodes
 
 from config.errors import InputError
+from fieldbus.modbus.admission import Admitted, Allowance, Places, ServerLimits
 from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.exception_codes import exception_reply
 from fieldbus.modbus.register_answers import RegisterAnswers, Registers
@@ -31,14 +34,16 @@ from fieldbus.modbus.tls import NOBODY, Guard, Identity, NotAuthorized, failure_
 
 log = logging.getLogger(__name__)
 
-MOST_CLIENTS = 64
-UNUSED_S = 60.0
 SEND_BUFFER_BYTES = 1 << 15
 """Answers that wait for a client that does not read; the system would keep megabytes for each."""
 KEEPALIVE = {"TCP_KEEPIDLE": 30, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 60_000}
 """Options by which a client that vanished is noticed within a minute, not two hours; s, s, 1, ms."""
 LINGER_S, MOST_DRAINED = 0.5, 8
 """How long, and for how many pieces, what a refused client still sends is drained before the close."""
+REFUSALS_SAID, REFUSALS_SAID_PER_S = 50, 0.2
+"""Lines on who was turned away: so many at once, then one in five seconds."""
+SCARCE = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
+SCARCE_WAIT_S = 0.1
 THIS_DEVICE = frozenset((0, 255))
 """Unit numbers that mean the device at this address, besides its own."""
 
@@ -53,6 +58,7 @@ class RegisterServer(RegisterAnswers):
         unit: the server's own unit number.
         guard: secures every connection with TLS, and says what each client may do; None serves all in the clear.
         others: the registers of other units behind the same port. With them "this device" is nobody's number.
+        limits: of clients and requests.
     """
 
     def __init__(
@@ -63,8 +69,10 @@ class RegisterServer(RegisterAnswers):
         unit: int,
         guard: Guard | None = None,
         others: Mapping[int, Registers] | None = None,
+        limits: ServerLimits | None = None,
     ) -> None:
         super().__init__(registers)
+        self._limits = limits or ServerLimits()
         self._address = (host, port)
         self._units: dict[int, RegisterAnswers] = {unit: self}
         if others:
@@ -81,7 +89,7 @@ class RegisterServer(RegisterAnswers):
             InputError: the address or the port cannot be bound.
         """
         try:
-            self._listener = _Listener(self._address, self._reply, self._guard)
+            self._listener = _Listener(self._address, self._reply, self._guard, self._limits)
         except (OSError, OverflowError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             raise InputError(endpoint(self._address), f"cannot listen there: {reason}") from None
@@ -113,6 +121,9 @@ class RegisterServer(RegisterAnswers):
     def _permitted(self, guard: Guard, unit: RegisterAnswers, pdu: bytes, peer: str) -> bytes:
         """Answer what the client's role permits; refuse the rest, as Modbus/TCP Security has it."""
         identity = self._listener.identities[peer] if self._listener else NOBODY
+        if identity.until_s < time.time():
+            log.warning("%s at %s: its certificate has ended, and its session with it", identity, peer)
+            raise ConnectionAbortedError
         try:
             guard.authorize(identity, pdu)
         except NotAuthorized as refusal:
@@ -129,7 +140,11 @@ class _Listener(ThreadingTCPServer):
     request_queue_size = 128
 
     def __init__(
-        self, address: tuple[str, int], answer: Callable[[int, bytes, str], bytes], guard: Guard | None
+        self,
+        address: tuple[str, int],
+        answer: Callable[[int, bytes, str], bytes],
+        guard: Guard | None,
+        limits: ServerLimits,
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
         self.answer = answer
@@ -137,7 +152,9 @@ class _Listener(ThreadingTCPServer):
         """Who is at the other end of each secured connection, by its `host:port`."""
         self._guard = guard
         self._connections: dict[Any, str] = {}
-        self._used_s: dict[str, float] = {}
+        self._places = Places(limits)
+        self._sayable = Allowance(REFUSALS_SAID_PER_S, REFUSALS_SAID)
+        self._unsaid = 0
         super().__init__(address, Connection)
 
     @property
@@ -151,7 +168,13 @@ class _Listener(ThreadingTCPServer):
             _disconnect(connection)
 
     def get_request(self) -> tuple[socket.socket, Any]:
-        connection, address = super().get_request()
+        try:
+            connection, address = super().get_request()
+        except OSError as error:
+            if error.errno in SCARCE:
+                self._say_refused("new clients", error.strerror or "")
+                time.sleep(SCARCE_WAIT_S)  # the one that knocks goes on knocking: asked at once, this would spin
+            raise
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -161,29 +184,40 @@ class _Listener(ThreadingTCPServer):
         return connection, address
 
     def verify_request(self, _request: Any, client_address: Any) -> bool:
-        room = len(self._connections) < MOST_CLIENTS or self._evict_idlest()
-        if not room:
-            log.warning("%s refused: %d clients are connected already", endpoint(client_address), MOST_CLIENTS)
-        return room
+        peer, host = endpoint(client_address), str(client_address[0])
+        if self._guard is None:
+            return self._has_place(peer, host)
+        if refusal := self._places.knock(peer, host):
+            self._say_refused(peer, refusal)
+        return refusal is None
 
-    def note_use(self, peer: str) -> None:
-        """Note when a client last asked for something."""
-        self._used_s[peer] = time.monotonic()
+    def note_use(self, peer: str) -> float:
+        """Note a request; return how long it must wait."""
+        return self._places.use(peer, time.monotonic())
 
-    def note_end(self, peer: str) -> None:
-        """Forget a client."""
-        self._used_s.pop(peer, None)
+    def _has_place(self, peer: str, host: str) -> bool:
+        """Give a client a place, or say why not."""
+        admitted = self._places.take(peer, host, time.monotonic())
+        if admitted.refusal:
+            self._say_refused(peer, admitted.refusal)
+        if admitted.gone:
+            self._dismiss(admitted)
+        return admitted.refusal is None
 
-    def _evict_idlest(self) -> bool:
-        """End the connection that is unused for longest, if any is for long enough; return whether."""
-        now_s = time.monotonic()
-        unused_s = {each: now_s - self._used_s.get(peer, now_s) for each, peer in list(self._connections.items())}
-        idlest = max(unused_s, key=unused_s.__getitem__)
-        if unused_s[idlest] < UNUSED_S:
-            return False
-        log.warning("%s gives way: it asked for nothing for %.0f s", self._connections.get(idlest), unused_s[idlest])
-        _disconnect(idlest)
-        return True
+    def _dismiss(self, admitted: Admitted) -> None:
+        """End the connection that gives way."""
+        log.warning("%s gives way: it asked for nothing for %.0f s", admitted.gone, admitted.unused_s)
+        for connection, peer in list(self._connections.items()):
+            if peer == admitted.gone:
+                _disconnect(connection)
+
+    def _say_refused(self, peer: str, reason: str) -> None:
+        """Log a refusal; of many, some, with how many were passed over."""
+        if not self._sayable.may(time.monotonic()):
+            self._unsaid += 1
+            return
+        unsaid, self._unsaid = self._unsaid, 0
+        log.warning("%s refused: %s%s", peer, reason, f" ({unsaid} more were refused)" if unsaid else "")
 
     def process_request(self, request: Any, client_address: Any) -> None:
         self._connections[request] = endpoint(client_address)
@@ -200,16 +234,19 @@ class _Listener(ThreadingTCPServer):
             self._connections[secured] = peer  # from here on the other is an empty shell
             try:
                 self.identities[peer] = self._guard.handshake(secured)
-                super().finish_request(secured, client_address)
+                if self._has_place(peer, str(client_address[0])):
+                    super().finish_request(secured, client_address)
             except OSError as error:
-                log.warning("%s refused: %s", peer, failure_reason(error))
+                self._say_refused(peer, failure_reason(error))
                 _linger(secured)
             finally:
+                self._places.leave(peer)
                 self.identities.pop(peer, None)
                 del self._connections[secured]
 
     def shutdown_request(self, request: Any) -> None:
         if peer := self._connections.pop(request, None):
+            self._places.leave(peer)
             log.debug("%s gone", peer)
         super().shutdown_request(request)
 

@@ -6,6 +6,7 @@ extension 1.3.6.1.4.1.50316.802.1 (a UTF8String: observer, operator or engineer)
 refused with exception 1, as the protocol has it, and one line in the log.
 """
 
+import math
 import socket
 import ssl
 import struct
@@ -20,6 +21,8 @@ from config.tls_table import Tls
 
 ROLE_OID = "1.3.6.1.4.1.50316.802.1"
 _UTF8_STRING = 0x0C
+MOST_WRITTEN = 123
+"""Registers that one request may write."""
 
 Writers = Callable[[int], Role]
 """From a register's address to the role that may write it."""
@@ -31,6 +34,8 @@ class Identity:
 
     name: str
     role: Role
+    until_s: float = math.inf
+    """When the certificate ends, s since 1970."""
 
     def __str__(self) -> str:
         return f"{self.name} ({self.role.name.lower()})"
@@ -135,10 +140,11 @@ def identity_in(certificate: bytes) -> Identity:
     parsed = x509.load_der_x509_certificate(certificate)
     names = parsed.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
     name = str(names[0].value) if names else "nameless"
+    until_s = parsed.not_valid_after_utc.timestamp()
     for extension in parsed.extensions:
         if extension.oid.dotted_string == ROLE_OID and isinstance(extension.value, x509.UnrecognizedExtension):
-            return Identity(name, _role(extension.value.value))
-    return Identity(name, Role.NONE)
+            return Identity(name, _role(extension.value.value), until_s)
+    return Identity(name, Role.NONE, until_s)
 
 
 def role_extension(role: Role) -> bytes:
@@ -152,14 +158,17 @@ def _role(value: bytes) -> Role:
 
 
 def _written_range(pdu: bytes) -> tuple[int, int]:
-    """Return first address and number of the registers that a request writes; 0 of them for all else."""
+    """Return first address and number of the registers that a request writes; 0 of them for all else.
+
+    A count that no request may have is not walked through: the request is refused in any case.
+    """
     if pdu[0] == 6 and len(pdu) >= 3:
         return int.from_bytes(pdu[1:3]), 1
     at = {16: 1, 23: 5}.get(pdu[0])
     if at is None or len(pdu) < at + 4:
         return 0, 0
     address, count = struct.unpack(">HH", pdu[at : at + 4])
-    return address, count
+    return address, min(count, MOST_WRITTEN)
 
 
 def _context(tls: Tls, protocol: int) -> ssl.SSLContext:

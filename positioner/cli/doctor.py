@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Check = Callable[[DaemonFile, Path], str]
 
-HELP = "check installation, config, bus, timing and permissions, one line each; moves nothing"
+HELP = "check installation, config, bus, timing and permissions, one line each; moves nothing unless --nudge-pa"
 EXAMPLE = "positioner doctor daemon.toml"
 
 LEAST_DAYS = 14
@@ -27,6 +27,12 @@ class FailedCheck(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the daemon's file")
+    parser.add_argument(
+        "--nudge-pa",
+        type=float,
+        metavar="PA",
+        help="command so much more for a moment, to see when the device samples; no daemon may run",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -37,18 +43,20 @@ def run(arguments: argparse.Namespace) -> int:
     well = _passes("packages", "", _packages)
     for file in files:
         print(f"{'config':12} ok    {arguments.config}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
+    nudge_pa: float | None = arguments.nudge_pa
+    nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [
         *(
             (name, check, file)
             for file in files
-            for name, check in (("law", _law), ("bus", _bus), ("recorder", _recorder))
+            for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder))
         ),
         *((name, check, files[0]) for name, check in (("supervisory", _supervisory), ("timing", _timing))),
         ("priority", _priority, files[0]),
         *(("certificates", _certificates, file) for file in files),
     ]
     for name, check, file in checks:
-        valve = f"{file.valve.name}: " if len(files) > 1 and check in (_law, _bus, _recorder) else ""
+        valve = f"{file.valve.name}: " if len(files) > 1 and name in ("law", "bus", "sampling", "recorder") else ""
         well = _passes(name, valve, partial(check, file, arguments.config)) and well
     return 0 if well else 1
 
@@ -88,7 +96,7 @@ def _law(file: "DaemonFile", config: Path) -> str:
 def _bus(file: "DaemonFile", _config: Path) -> str:
     import time
 
-    from drivers.boundary import DriverError
+    from drivers.boundary import DriverError, ForeseesRefusal
     from positioner.cli.probe import watching_driver
     from positioner.control.settings import Settings
 
@@ -99,16 +107,44 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
         for _ in range(PERIODS // 5):
             reading = driver.read()
         took_s = (time.perf_counter() - started_s) / (PERIODS // 5)
+        refused = driver.refused() if isinstance(driver, ForeseesRefusal) else None
     except DriverError as error:
         raise FailedCheck(str(error)) from None
     finally:
         driver.close()
+    if refused is not None:
+        raise FailedCheck(f"run would be refused: {refused}")
     if not Settings.of(file).limits.plausible(reading.position_m):
         raise FailedCheck(f"position {reading.position_m:g} m is not plausible: check device.map")
     # A reading piece by piece, as a watcher of CANopen has it, says nothing of the cycle.
     if took_s > file.cycle.period_s and driver.capabilities.one_transaction:
         raise FailedCheck(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
     return f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"
+
+
+def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:
+    from config.errors import CommandFailed
+    from drivers import driver_for
+    from drivers.boundary import DriverError
+    from positioner.cli.parts.sampling import when_shown
+
+    if file.cycle.pace == "device":
+        return "in lockstep: a reply is of after its command has been obeyed for a period"
+    least_pa = file.device.command_step_pa
+    driver = driver_for(file.device)
+    try:
+        held_pa = driver.open()
+        towards = nudge_pa if held_pa + abs(nudge_pa) <= file.pressure.maximum_pa else -nudge_pa
+        if not least_pa < abs(nudge_pa) <= file.pressure.maximum_pa - file.pressure.minimum_pa:
+            raise FailedCheck(f"--nudge-pa must be more than a digit of the command, {least_pa:g} Pa")
+        shown = when_shown(driver, held_pa, towards)
+    except (DriverError, CommandFailed) as error:
+        raise FailedCheck(str(error)) from None
+    finally:
+        driver.close()
+    if shown.sampling != file.device.sampling:
+        raise FailedCheck(f'it samples {shown.sampling} the command: device.sampling = "{shown.sampling}"')
+    return f"{shown.sampling} the command, whose change showed {shown.replies} replies later"
 
 
 def _supervisory(file: "DaemonFile", _config: Path) -> str:

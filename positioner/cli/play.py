@@ -73,7 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.extended_valves import extended_valve_of
+    from positioner.cli.parts.output_files import writable
 
+    writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
     valve = load_valve(path).valve
     time_s, reference_m = read_series(arguments.reference, "reference_m")

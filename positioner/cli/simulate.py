@@ -27,9 +27,11 @@ def run(arguments: argparse.Namespace) -> int:
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.output_files import writable
     from sim.effect import find_effect
     from sim.simulation import simulate
 
+    writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
     valve = load_valve(path)
     by_setpoint = any(find_effect(each.name, str(path)).by_setpoint for each in valve.effect)

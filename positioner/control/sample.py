@@ -20,5 +20,9 @@ class Sample:
     """The device's own bits, `DeviceStatus`; 0 is healthy."""
     held_pa: float | None = None
     """The command the device held, when it was looked at anew and not commanded in this cycle."""
+    overwritten: bool = False
+    """Whether it then held what this daemon had not given it, though nothing had been lost: somebody else wrote it."""
+    emergency: int = 0
+    """The device's own code of what is wrong with it (CANopen: of its last EMCY); 0: nothing."""
     unattended_s: float = 0.0
     """For how long the daemon had not commanded the device, where that was too long; 0 otherwise."""

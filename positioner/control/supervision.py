@@ -98,8 +98,8 @@ def supervise(
 
 
 def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s: float, limits: Limits) -> Fault:
-    if sample.unattended_s > 0:
-        return Fault.STALLED
+    if sample.unattended_s > 0 or sample.overwritten:
+        return Fault.STALLED if sample.unattended_s > 0 else Fault.OTHER_MASTER
     held_pa = sample.held_pa
     if held_pa is not None and all(abs(held_pa - each) > limits.restart_tolerance_pa for each in given_pa):
         return Fault.RESTARTED

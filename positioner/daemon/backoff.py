@@ -1,11 +1,13 @@
 """Back-off: when to try again what failed, and what to say of it.
 
 A device is asked for again at once, for a reply may be lost; then ever more seldom. A kind of failure is said once and
-then counted.
+then counted, and so are the lines that one host causes beyond a few a second.
 """
 
 import math
 from collections.abc import Hashable
+
+from fieldbus.modbus.admission import Allowance
 
 AT_ONCE = 4
 """Failures before the first wait: a reply that was lost, and three attempts."""
@@ -58,3 +60,27 @@ class Sayings:
             self._said.pop(next(iter(self._said)))
         self._said[kind] = now_s, 0
         return passed
+
+
+class LinesPerPeer:
+    """The lines that each host may cause: so many at once, then so many a second; the others are counted."""
+
+    AT_ONCE, PER_S, MOST_HOSTS = 100, 2.0, 256
+
+    def __init__(self) -> None:
+        self._hosts: dict[str, tuple[Allowance, int]] = {}
+
+    def unsaid(self, peer: str, now_s: float) -> int | None:
+        """Return how many lines of a peer's host were passed over since the last; None to pass over this one.
+
+        Args:
+            peer: `host:port`, or `name (role) at host:port`.
+            now_s: of any clock.
+        """
+        host = peer.rpartition(" at ")[2].rpartition(":")[0]
+        if host not in self._hosts and len(self._hosts) >= self.MOST_HOSTS:
+            self._hosts.pop(next(iter(self._hosts)))
+        allowance, passed = self._hosts.get(host) or (Allowance(self.PER_S, self.AT_ONCE), 0)
+        may = allowance.may(now_s)
+        self._hosts[host] = allowance, 0 if may else passed + 1
+        return passed if may else None

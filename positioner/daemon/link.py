@@ -5,7 +5,12 @@ of NO_NUMBER; a device whose sample counter (or clock) stands still, one of REPE
 
 A device that was without commands for too long (its replies were lost, or this daemon stood still) may have acted by
 itself or been restarted. It is looked at before it is commanded: what it holds, and its status, which the next
-command would clear. Supervision judges both.
+command would clear. Supervision judges both. Now and then it is asked what it holds in between: if that is not what
+it was told, another master writes it, and the cycle commands nothing.
+
+The pressure of a sample is that which has acted since the sample before (`positioner.estimation`). A device that
+samples on request, after the write, shows the next one already: its pressures are taken a sample late. Of a device that
+shows none, the command counts: in lockstep the one just sent, under which a period has passed, else the one before.
 """
 
 import logging
@@ -14,7 +19,8 @@ import time
 from dataclasses import dataclass, replace
 
 from config.codes import Quality
-from drivers.boundary import Driver, DriverError, NoNumber, Reading, Refused
+from config.daemon_file import DaemonFile
+from drivers.boundary import Driver, DriverError, NoNumber, Reading, ReadsBack, Refused
 from positioner.control.sample import Sample
 from positioner.daemon.backoff import Backoff, Sayings
 from positioner.daemon.logs import log_event
@@ -24,6 +30,29 @@ log = logging.getLogger(__name__)
 
 MOST_REFUSALS = 2
 """Exceptions in a row on a connection that stays; after more the device is looked at anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSettings:
+    """How a device is attended to, SI units."""
+
+    longest_unattended_s: float = math.inf
+    """From one command to the next; later, the daemon stood still."""
+    read_back_s: float = 0.0
+    """How often it is asked what it holds; 0 is never."""
+    read_back_tolerance_pa: float = 0.0
+    """How far that may be from what it was told."""
+    pressure_is_after: bool = False
+    """Whether the pressure of a reply is that of the command which it answers."""
+    in_lockstep: bool = True
+    """Whether it has obeyed a command for a period when it answers."""
+
+    @classmethod
+    def of(cls, file: DaemonFile, tolerance_pa: float) -> "LinkSettings":
+        """Return what a daemon's file asks for; `tolerance_pa` is that of a restarted device."""
+        lockstep = file.cycle.pace == "device"
+        after = file.device.sampling == "after" and not lockstep
+        return cls(file.longest_unattended_s, file.safety.read_back_s, tolerance_pa, after, lockstep)
 
 
 @dataclass(slots=True)
@@ -40,14 +69,20 @@ class Link:
     Args:
         driver: of the device.
         pace: says what time it is.
-        longest_unattended_s: from one command to the next; later, the daemon stood still.
+        settings: how the device is attended to.
     """
 
-    def __init__(self, driver: Driver, pace: Pace, longest_unattended_s: float = math.inf) -> None:
+    def __init__(self, driver: Driver, pace: Pace, settings: LinkSettings | None = None) -> None:
         self.counts = LinkCounts()
         self._driver = driver
         self._pace = pace
-        self._longest_unattended_s = longest_unattended_s
+        self._settings = settings or LinkSettings()
+        self._longest_unattended_s = self._settings.longest_unattended_s
+        self._read_back_s = -math.inf
+        self._told_pa: float | None = None
+        """The last command, if the device has answered it."""
+        self._pressure_pa: float | None = None
+        """The pressure that acts from the last sample on, if it is known."""
         self._commanded_s = math.inf
         """When the last command set out, or the device was looked at, on the gateway's clock."""
         self._returned_s = math.inf
@@ -79,9 +114,16 @@ class Link:
         now_s = awake_s()
         self._notice_a_stall(now_s, command_pa)
         try:
-            if self._connected:
+            if self._connected and (held_pa := self._overwritten_pa()) is not None:
                 self._commanded_s = now_s
-                self._sample = self._fresh(self._driver.exchange(command_pa), command_pa)
+                sample = self._fresh(self._driver.read(), held_pa)
+                self._sample = replace(sample, held_pa=held_pa, overwritten=True)
+            elif self._connected:
+                self._commanded_s = now_s
+                told_pa, self._told_pa = self._told_pa, None
+                reading = self._driver.exchange(command_pa)
+                self._sample = self._fresh(reading, command_pa, told_pa)
+                self._told_pa = command_pa
                 self._backoff.succeeded()
                 self._refusals = 0
             elif self._unattended_s > 0 or self._backoff.may_try(now_s):
@@ -127,12 +169,27 @@ class Link:
             commanded_pa=command_pa,
         )
 
+    def _overwritten_pa(self) -> float | None:
+        """Return what the device holds, if it is time to ask, and it is not what it was told."""
+        every_s, told_pa, driver = self._settings.read_back_s, self._told_pa, self._driver
+        now_s = self._sample.now_s
+        if every_s == 0 or told_pa is None or now_s - self._read_back_s < every_s or not isinstance(driver, ReadsBack):
+            return None
+        self._read_back_s = now_s
+        held_pa = driver.held_pa()
+        if abs(held_pa - told_pa) <= self._settings.read_back_tolerance_pa:
+            return None
+        self._told_pa = None
+        self._say(logging.ERROR, "another master wrote the set point", held_pa=held_pa, told_pa=told_pa)
+        return held_pa
+
     def _found_again(self) -> Sample:
         """Connect anew, and look at what the device holds and says without commanding it."""
         self._driver.close()
         held_pa = self._driver.open()
         reading = self._driver.read()
         before, self._reading = self._reading, None
+        self._told_pa = self._pressure_pa = None
         sample = replace(self._fresh(reading, held_pa), held_pa=held_pa, unattended_s=self._unattended_s)
         self._connected, self._refusals, self._unattended_s = True, 0, 0.0
         self._commanded_s = awake_s()
@@ -157,7 +214,9 @@ class Link:
 
     def _lost(self) -> Sample:
         now_s = self._pace.now_s(None)
-        return replace(self._sample, now_s=now_s, quality=Quality.LOST, held_pa=None, unattended_s=0.0)
+        return replace(
+            self._sample, now_s=now_s, quality=Quality.LOST, held_pa=None, overwritten=False, unattended_s=0.0
+        )
 
     def _say(self, level: int, event: str, kind: str = "", **fields: object) -> None:
         """Log an event, each kind once a minute; then with how many were passed over."""
@@ -165,7 +224,8 @@ class Link:
         if passed is not None:
             log_event(log, level, event, **fields, **({"times_unsaid": passed} if passed else {}))
 
-    def _fresh(self, reading: Reading, command_pa: float) -> Sample:
+    def _fresh(self, reading: Reading, command_pa: float, before_pa: float | None = None) -> Sample:
+        """Return a reading as a sample; it answers `command_pa`, and the command before it was `before_pa`."""
         now_s = self._pace.now_s(reading.device_time_s)
         repeated = self._count(reading)
         self._reading = reading
@@ -173,10 +233,21 @@ class Link:
             now_s=now_s,
             time_s=now_s if reading.device_time_s is None else reading.device_time_s,
             position_m=reading.position_m,
-            pressure_pa=command_pa if reading.pressure_pa is None else reading.pressure_pa,
+            pressure_pa=self._acted_pa(reading, command_pa, before_pa),
             quality=Quality.REPEATED if repeated else Quality.GOOD,
             status=reading.status,
+            emergency=reading.emergency,
         )
+
+    def _acted_pa(self, reading: Reading, command_pa: float, before_pa: float | None) -> float:
+        """Return the pressure that has acted since the sample before."""
+        shown_pa = reading.pressure_pa
+        if shown_pa is None:
+            return command_pa if self._settings.in_lockstep or before_pa is None else before_pa
+        if not self._settings.pressure_is_after:
+            return shown_pa
+        acted_pa, self._pressure_pa = self._pressure_pa, shown_pa
+        return shown_pa if acted_pa is None else acted_pa
 
     def _count(self, reading: Reading) -> bool:
         """Count the samples that were missed; return whether this one came before."""

@@ -18,6 +18,7 @@ from config.registers import WRITER_AT
 from config.roles import Role
 from drivers import driver_for
 from drivers.boundary import DriverError, Reading
+from fieldbus.modbus.admission import ServerLimits
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from positioner.control.controller import Controller
@@ -26,7 +27,7 @@ from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.ending import Endings
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth
-from positioner.daemon.link import Link
+from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
 from positioner.daemon.memory.conditions import conditions_of
@@ -130,7 +131,8 @@ def _assembled(
     refinement: RefinementProcess,
 ) -> ServedValve:
     settings = Settings.of(file, extended)
-    link = Link(driver_for(file.device), pace, file.longest_unattended_s)
+    link_settings = LinkSettings.of(file, settings.limits.restart_tolerance_pa)
+    link = Link(driver_for(file.device), pace, link_settings)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
     unreachable_reason = None
@@ -252,6 +254,7 @@ def _server(valves: Sequence[ServedValve]) -> RegisterServer:
         where.unit,
         _guard(first.file),
         {valve.file.supervisory.unit: valve.served() for valve in others},
+        ServerLimits(where.most_clients, where.clients_per_host, frozenset(where.reserved_hosts), where.requests_per_s),
     )
 
 

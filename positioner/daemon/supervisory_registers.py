@@ -13,6 +13,7 @@ replaces that snapshot whole.
 
 import logging
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
@@ -34,6 +35,7 @@ from config.registers import (
 )
 from fieldbus.modbus.register_answers import RegisterError, Table
 from positioner.control.requests import ExperimentRequest, Requests
+from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.logs import log_event, logging_valve
@@ -63,6 +65,7 @@ class SupervisoryRegisters:
         self._minimum_pa = minimum_pa
         self._maximum_pa = maximum_pa
         self._heartbeat = 0
+        self._lines = LinesPerPeer()
         self._values = _getters(cycle, stroke_m)
 
     def read(self, table: Table, address: int, count: int) -> Sequence[int]:  # noqa: ARG002 - both tables are the same
@@ -93,10 +96,18 @@ class SupervisoryRegisters:
                 values = self._decoded(address, words)
                 self._cycle.requests = self._requested(values)
             except WriteRejected as rejected:
-                log_event(log, logging.WARNING, "write refused", peer=peer, address=address, reason=rejected.reason)
+                self._say(logging.WARNING, "write refused", peer, address=address, reason=rejected.reason)
                 raise RegisterError(rejected.code) from None
             level = logging.DEBUG if values.keys() <= {"reference", "reference_scaled", "heartbeat"} else logging.INFO
-            log_event(log, level, "write", peer=peer, **values)
+            self._say(level, "write", peer, **values)
+
+    def _say(self, level: int, event: str, peer: str, **fields: object) -> None:
+        """Log what a peer did; of much, some, with how many lines of its host were passed over before."""
+        if not log.isEnabledFor(level):
+            return
+        passed = self._lines.unsaid(peer, time.monotonic())
+        if passed is not None:
+            log_event(log, level, event, peer=peer, **fields, **({"times_unsaid": passed} if passed else {}))
 
     def _encoded(self, register: Register, snapshot: Snapshot, requests: Requests) -> list[int]:
         if register.name == "heartbeat":
@@ -255,6 +266,7 @@ def _status_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "delta_r": lambda s, _: s.decision.delta_r_m / stroke_m,
         "sample_age": lambda s, _: s.decision.sample_age_s + cycle.since_s(s),
         "reference_in_force": lambda s, _: s.decision.reference_m / stroke_m,
+        "emergency": lambda s, _: s.sample.emergency,
         "restored": lambda s, _: s.decision.restoration.trust,
         "restored_agreed": lambda s, _: s.decision.restoration.ups + s.decision.restoration.downs,
     }

@@ -17,9 +17,10 @@ import pytest
 from config.registers import BY_NAME, SIZE
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from fieldbus.modbus import server as modbus_server
+from fieldbus.modbus import admission
+from fieldbus.modbus.admission import MOST_CLIENTS
 from fieldbus.modbus.connection import SEND_TIMEOUT_S
-from fieldbus.modbus.server import MOST_CLIENTS, RegisterServer
+from fieldbus.modbus.server import RegisterServer
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
 from sim.slave.clocks import Lockstep
@@ -342,7 +343,7 @@ def test_clients_that_vanish_in_every_way_leave_the_others_their_answers(port: i
 
 def test_when_all_places_are_taken_the_one_unused_for_longest_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """The guide: the oldest unused connection is closed. So clients that vanished without a word lock out nobody."""
-    monkeypatch.setattr(modbus_server, "UNUSED_S", 0.0)
+    monkeypatch.setattr(admission, "UNUSED_S", 0.0)
 
     class Words:
         def read(self, table: str, address: int, count: int) -> list[int]:

@@ -9,7 +9,7 @@ from config.codes import Quality
 from config.quantities import DeviceStatus
 from drivers.boundary import Capabilities, DriverError, NoConnection, NoNumber, NoReply, Reading, Refused
 from positioner.daemon import link as room
-from positioner.daemon.link import Link
+from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import DevicePace
 
 
@@ -121,7 +121,7 @@ def test_a_daemon_that_stood_still_looks_at_the_device_before_it_commands_it(
 ) -> None:
     clock = Stopwatch(monkeypatch)
     driver = Scripted(reading(1), reading(2), reading(4), held_pa=0.0)
-    link = Link(driver, DevicePace(), longest_unattended_s=0.5)
+    link = Link(driver, DevicePace(), LinkSettings(longest_unattended_s=0.5))
     link.open()
     link.begin()
     samples = [link.exchange(5e4)]
@@ -140,7 +140,7 @@ def test_a_daemon_that_stood_still_looks_at_the_device_before_it_commands_it(
 def test_a_stall_is_told_even_where_the_device_is_found_only_later(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Stopwatch(monkeypatch)
     driver = Scripted(reading(1), reading(4))
-    link = Link(driver, DevicePace(), longest_unattended_s=0.5)
+    link = Link(driver, DevicePace(), LinkSettings(longest_unattended_s=0.5))
     link.open()
     link.exchange(5e4)
     clock.now_s += 0.6
@@ -213,3 +213,19 @@ def test_a_device_without_pressure_and_clock_is_taken_at_its_command_and_the_gat
     link = opened(Scripted(Reading(0.05)))
     sample = link.exchange(42e3)
     assert (sample.pressure_pa, sample.quality) == (42e3, Quality.GOOD)
+
+
+def test_pressures_of_after_the_command_are_taken_a_sample_late() -> None:
+    """The pressure of a sample is that which acted since the sample before."""
+    shown = [Reading(0.05, pressure_pa, counter) for counter, pressure_pa in enumerate((40e3, 60e3, 60e3, 80e3))]
+    for is_after, expected in ((False, [40e3, 60e3, 60e3, 80e3]), (True, [40e3, 40e3, 60e3, 60e3])):
+        link = Link(Scripted(*shown), DevicePace(), LinkSettings(pressure_is_after=is_after))
+        link.open()
+        assert [link.exchange(5e4).pressure_pa for _ in shown] == expected
+
+
+def test_a_device_that_shows_no_pressure_has_had_the_command_before_unless_it_is_in_lockstep() -> None:
+    for in_lockstep, expected in ((True, [1e3, 2e3, 3e3]), (False, [1e3, 1e3, 2e3])):
+        link = Link(Scripted(*[Reading(0.05)] * 3), DevicePace(), LinkSettings(in_lockstep=in_lockstep))
+        link.open()
+        assert [link.exchange(pressure_pa).pressure_pa for pressure_pa in (1e3, 2e3, 3e3)] == expected

@@ -10,6 +10,7 @@ from threading import Event
 import pytest
 
 from positioner.daemon import logs
+from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.logs import log_event, start_logging
 
 log = logging.getLogger("test")
@@ -51,3 +52,12 @@ def test_a_log_that_nobody_reads_is_bounded_and_says_what_it_lost(monkeypatch: p
     assert sum(line.get("lines_lost", 0) for line in lines) == 10_000 - len(written)
     assert lines[-1]["lines_lost"] > 0
     assert len(written) < 1000
+
+
+def test_a_host_that_writes_what_is_refused_causes_a_few_lines_and_others_keep_theirs() -> None:
+    """3.5 MB a second came of one client's refused writes."""
+    lines = LinesPerPeer()
+    said = [lines.unsaid(f"10.0.0.9:{40_000 + number % 50}", number * 1e-4) for number in range(100_000)]
+    assert sum(each is not None for each in said) == pytest.approx(LinesPerPeer.AT_ONCE + 20, abs=1)
+    assert lines.unsaid("10.0.0.7:5", 10.0) == 0
+    assert lines.unsaid("anna (operator) at 10.0.0.9:7", 11.0) == pytest.approx(100_000 / 20, rel=0.2), "the same host"

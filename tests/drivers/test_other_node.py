@@ -6,7 +6,7 @@ nothing may be sent to it but questions; where it refuses what it is told, every
 
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ import pytest
 from canopen.sdo.exceptions import SdoAbortedError
 
 from config.canopen_device import SHIPPED_EDS, STATUS_WORD, CanopenDevice
-from drivers.boundary import BadReply, DriverError, NoReply, Refused
-from drivers.canopen.driver import CanopenDriver
+from drivers.boundary import BadReply, DriverError, ForeseesRefusal, NoReply, Reading, Refused
+from drivers.canopen.driver import CanopenDriver, canopen_driver
 from fieldbus.canopen.eds import read_eds
 from fieldbus.canopen.loopback import free_channel
 
@@ -31,18 +31,58 @@ CONFIGURATION = [
 ]
 
 
-def _local_node() -> Any:
-    return canopen.LocalNode(NODE, read_eds(SHIPPED_EDS, NODE))
+MASTER, WATCHED_MS = 126, 125
+MORE_OBJECTS = """
+[1016]
+ParameterName=Consumer heartbeat time
+ObjectType=0x8
+SubNumber=2
+
+[1016sub0]
+ParameterName=Number of entries
+ObjectType=0x7
+DataType=0x0005
+AccessType=const
+DefaultValue=1
+
+[1016sub1]
+ParameterName=Consumer heartbeat 1
+ObjectType=0x7
+DataType=0x0007
+AccessType=rw
+DefaultValue=0
+""" + "".join(
+    f"\n[{record:X}sub5]\nParameterName=Event timer\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\nDefaultValue=0\n"
+    for record in (0x1800, 0x1801)
+)
+"""What some nodes have beyond ours."""
+
+
+def sheet_with_more(folder: Path) -> Path:
+    """Return our data sheet with consumed heartbeats and event timers."""
+    text = SHIPPED_EDS.read_text()
+    for record in ("1800", "1801"):
+        text = text.replace(f"[{record}]\nParameterName=", f"[{record}]\n;with a timer\nParameterName=")
+        head, _, rest = text.partition(f"[{record}]\n")
+        text = head + f"[{record}]\n" + rest.replace("SubNumber=3", "SubNumber=4", 1)
+    text = text.replace("[OptionalObjects]\nSupportedObjects=", "[OptionalObjects]\n999=0x1016\nSupportedObjects=")
+    path = folder / "more.eds"
+    path.write_text(text + MORE_OBJECTS)
+    return path
+
+
+def _local_node(sheet: Path = SHIPPED_EDS) -> Any:
+    return canopen.LocalNode(NODE, read_eds(sheet, NODE))
 
 
 class OtherNode:
     """The node, and what is sent on its bus."""
 
-    def __init__(self, channel: str) -> None:
+    def __init__(self, channel: str, sheet: Path = SHIPPED_EDS) -> None:
         self.channel = channel
         self.network = canopen.Network()
         self.network.connect(interface="loopback", channel=channel, ignore_config=True)
-        self.node = _local_node()
+        self.node = _local_node(sheet)
         self.network.add_node(self.node)
         self.frames: list[tuple[int, bytes]] = []
         self.constant: set[int] = set()
@@ -236,3 +276,113 @@ def test_what_else_an_rpdo_takes_would_be_commanded(other: OtherNode) -> None:
     other.constant = {0x1400, 0x1600}
     with pytest.raises(Refused, match="SDO abort"):
         driver_of(other, map=OBJECTS).open()
+
+
+def test_pdos_that_come_by_themselves_with_a_timer_are_used_as_they_are(tmp_path: Path) -> None:
+    """The newest counts; a sample is new when every such TPDO came anew. No SYNC is sent where none is waited for."""
+    other = OtherNode(free_channel(), sheet_with_more(tmp_path))
+    try:
+        for record in (0x1800, 0x1801):
+            other.node.sdo[record][5].raw = 20
+        fix_pdos(other, transmission=255)
+        other.constant = set()
+        other.node.sdo[0x1400][2].raw = 255
+        other.constant = {index + record for index in (0, 0x200) for record in (*MAPPED, 0x1802, 0x1803)}
+        other.network.subscribe(0x80, other._note)
+        before = other.configuration
+        driver = driver_of(other, map=OBJECTS)
+        assert driver.open() == HELD_PA
+        assert driver.capabilities.sample_counter
+        other.network.send_message(0x1C1, struct.pack("<If", 1, 0.025))
+        other.network.send_message(0x2C1, struct.pack("<ff", 7.0, 41e3))
+        readings = [driver.exchange(33e3), driver.exchange(33e3)]
+        other.network.send_message(0x2C1, struct.pack("<ff", 7.0, 42e3))
+        readings.append(_until(driver, lambda each: each.pressure_pa == pytest.approx(42e3)))
+        other.network.send_message(0x1C1, struct.pack("<If", 1, 0.026))
+        readings.append(_until(driver, lambda each: each.position_m == pytest.approx(0.026)))
+        driver.close()
+        assert [each.sample_counter for each in readings] == [1, 1, 1, 2]
+        assert other.configuration[4:] == before[4:], "no PDO was told anything"
+        assert 0x80 not in {identity for identity, _ in other.frames}
+    finally:
+        other.close()
+
+
+def _until(driver: CanopenDriver, holds: Callable[[Reading], bool]) -> Reading:
+    """Exchange until a reading is as asked."""
+    end_s = time.monotonic() + 10.0
+    while not holds(reading := driver.exchange(33e3)):
+        assert time.monotonic() < end_s
+    return reading
+
+
+def test_a_node_that_shall_watch_its_master_hears_its_heartbeat(tmp_path: Path) -> None:
+    other = OtherNode(free_channel(), sheet := sheet_with_more(tmp_path))
+    try:
+        fix_pdos(other)
+        other.answer_sync({0x1C1: struct.pack("<If", 77, 0.025), 0x2C1: struct.pack("<ff", 7.0, 41e3)})
+        other.network.subscribe(0x700 + MASTER, other._note)
+        driver = driver_of(
+            other, map=OBJECTS, eds=sheet, master_node=MASTER, master_heartbeat_s=0.05, heartbeats_missed=2.5
+        )
+        driver.open()
+        driver.exchange(33e3)
+        assert other.hears(0x700 + MASTER, b"\x05")
+        assert other.node.sdo[0x1016][1].raw == MASTER << 16 | WATCHED_MS
+        driver.close()
+        other.constant |= {0x1016}
+        driver.open()
+        driver.close()
+    finally:
+        other.close()
+
+
+def test_a_node_that_watches_nobody_is_not_told_to(other: OtherNode) -> None:
+    with pytest.raises(Refused, match="watches no heartbeat"):
+        driver_of(other, master_node=MASTER).open()
+    assert other.node.nmt.state == "OPERATIONAL"
+
+
+def test_the_code_of_an_emergency_is_read_until_it_is_over(other: OtherNode) -> None:
+    fix_pdos(other)
+    other.answer_sync({0x1C1: struct.pack("<If", 77, 0.025), 0x2C1: struct.pack("<ff", 7.0, 41e3)})
+    driver = driver_of(other, map=OBJECTS)
+    driver.open()
+    assert driver.exchange(33e3).emergency == 0
+    for code in (0x4210, 0x0000):
+        other.node.emcy.send(code, 0x09)
+        assert _until(driver, lambda each, code=code: each.emergency == code).status == 0  # type: ignore[misc]
+    driver.close()
+
+
+def test_a_set_point_that_another_master_wrote_is_read_back(other: OtherNode) -> None:
+    fix_pdos(other)
+    other.answer_sync({0x1C1: struct.pack("<If", 77, 0.025), 0x2C1: struct.pack("<ff", 7.0, 41e3)})
+    driver = driver_of(other, map=OBJECTS)
+    driver.open()
+    driver.exchange(33e3)
+    other.node.sdo[COMMAND].raw = 70e3
+    assert driver.held_pa() == 70e3
+    driver.close()
+
+
+def test_a_watcher_says_what_driving_would_be_refused(other: OtherNode, tmp_path: Path) -> None:
+    """By the data sheet, before anybody drives it."""
+    fixed = tmp_path / "fixed.eds"
+    text = SHIPPED_EDS.read_text()
+    head, mark, rest = text.partition("[1A01sub1]")
+    fixed.write_text(head + mark + rest.replace("AccessType=rw", "AccessType=ro", 1))
+    other.node.sdo[0x1A01][1].raw = 0x20010020
+    before = other.configuration
+    watching = canopen_driver(CanopenDevice(channel=other.channel, node=NODE, reply_timeout_s=2.0, only_watch=True))
+    watching.open()
+    assert isinstance(watching, ForeseesRefusal)
+    assert watching.refused() is None
+    watching.close()
+    described = {"channel": other.channel, "node": NODE, "reply_timeout_s": 2.0, "only_watch": True, "eds": fixed}
+    watching = canopen_driver(CanopenDevice.model_validate(described))
+    watching.open()
+    assert isinstance(watching, ForeseesRefusal)
+    assert watching.refused() == "0x1a01 sub 1 would have to be set, and the data sheet lets nobody"
+    watching.close()
+    assert other.configuration == before

@@ -9,13 +9,15 @@ from modbus_tk import defines
 from modbus_tk.modbus import Slave
 from modbus_tk.modbus_tcp import TcpServer
 
+from config.codes import Quality
 from config.daemon_file import DaemonFile
 from config.device import ModbusTcpDevice
 from config.modbus_map import ActionCodes, ModbusMap, Place, StatusBits
 from config.quantities import DeviceStatus
 from drivers import driver_for
+from positioner.cli.parts.sampling import when_shown
 from positioner.control.settings import Settings
-from positioner.daemon.link import Link
+from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import RealTimePace
 from tests.other_device import await_listening, free_port
 
@@ -140,3 +142,74 @@ def test_what_lies_in_two_tables_and_behind_a_hole_is_read_in_parts(device: Plai
         assert (reading.pressure_pa, reading.status) == (41e3, status)
     assert device.functions == [6, 3, 3, 4], "and the hole is not tried again"
     driver.close()
+
+
+def test_a_second_master_that_writes_the_set_point_is_seen_by_reading_it_back(device: PlainDevice) -> None:
+    link = Link(driver_for(device.described(None)), RealTimePace(0.01), LinkSettings(read_back_s=1e-9))
+    link.open()
+    for counter in (1, 2):
+        device.show(COUNTER, counter)
+        assert not link.exchange(50e3).overwritten
+    device.show(COMMAND, 70)
+    device.show(COUNTER, 3)
+    sample = link.exchange(50e3)
+    assert (sample.overwritten, sample.held_pa, sample.quality) == (True, 70e3, Quality.GOOD)
+    assert device.command == 70, "nothing was commanded"
+    device.show(COUNTER, 4)
+    assert not link.exchange(70e3).overwritten, "what it holds is what it is told from now on"
+    link.release()
+
+
+@pytest.mark.parametrize("sampling", ["before", "after"])
+def test_when_a_device_samples_is_seen_by_a_change_of_the_command(device: PlainDevice, sampling: str) -> None:
+    """One latches its pressure before it takes a command, the other makes it when it is asked."""
+    pressure = 12
+    device.show(pressure, 40)
+    answers = device.slave.handle_request
+
+    def handle_request(request: bytes, broadcast: bool = False) -> bytes:
+        if request[0] == defines.WRITE_SINGLE_REGISTER:
+            (commanded,) = struct.unpack(">H", request[3:5])
+            device.show(pressure, device.command if sampling == "before" else commanded)
+        reply: bytes = answers(request, broadcast)
+        return reply
+
+    device.slave.handle_request = handle_request
+    described = device.described(None)
+    places = described.map.model_copy(update={"pressure_pa": Place(address=pressure, type="uint16", scale=1000.0)})
+    driver = driver_for(described.model_copy(update={"map": places}))
+    shown = when_shown(driver, driver.open(), 2e3)
+    assert (shown.sampling, device.command) == (sampling, 40), "and the command is put back"
+    driver.close()
+
+
+def test_neither_an_exception_nor_a_number_that_is_none_ends_a_good_connection(device: PlainDevice) -> None:
+    device.slave.remove_block("registers")
+    device.slave.add_block("registers", defines.HOLDING_REGISTERS, 0, 64)
+    registers = ModbusMap(
+        position_m=Place(address=POSITION), command_pa=Place(address=COMMAND, type="uint16", scale=1000.0)
+    )
+    driver = driver_for(ModbusTcpDevice(port=device.port, unit=UNIT, reply_timeout_s=2.0, map=registers))
+    link = Link(driver, RealTimePace(0.01))
+    number, none = struct.unpack(">HH", struct.pack(">f", 0.015)), (0x7FC0, 0)
+    device.slave.set_values("registers", POSITION, number)
+    link.open()
+    busy = [False]
+    answers = device.slave.handle_request
+
+    def handle_request(request: bytes, broadcast: bool = False) -> bytes:
+        if busy[0]:
+            return struct.pack(">BB", request[0] | 0x80, defines.SLAVE_DEVICE_BUSY)
+        reply: bytes = answers(request, broadcast)
+        return reply
+
+    device.slave.handle_request = handle_request
+    socket_before = driver._client._socket  # type: ignore[attr-defined]
+    qualities = []
+    for words, is_busy in ((number, False), (none, False), (number, False), (number, True), (number, False)):
+        device.slave.set_values("registers", POSITION, words)
+        busy[0] = is_busy
+        qualities.append(link.exchange(50e3).quality)
+    assert qualities == [Quality.GOOD, Quality.NO_NUMBER, Quality.GOOD, Quality.LOST, Quality.GOOD]
+    assert driver._client._socket is socket_before  # type: ignore[attr-defined]
+    link.release()

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,11 +19,12 @@ from config.roles import Role
 from config.slave_file import SlaveFile
 from config.tls_table import Tls
 from config.valve_file import shipped_valve
-from drivers.boundary import NoConnection, Refused
+from drivers.boundary import DriverError, NoConnection, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import server as server_module
+from fieldbus.modbus.admission import ServerLimits
 from fieldbus.modbus.server import RegisterServer
-from fieldbus.modbus.tls import Guard, NotAuthorized, client_context, identity_in
+from fieldbus.modbus.tls import Guard, Identity, NotAuthorized, client_context, identity_in
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
@@ -48,9 +50,9 @@ class TestModbusTls(contract.TestModbusTcp):
 
 
 @contextmanager
-def device_with(guard: Guard | None) -> Iterator[tuple[Device, RegisterServer]]:
+def device_with(guard: Guard | None, limits: ServerLimits | None = None) -> Iterator[tuple[Device, RegisterServer]]:
     device = device_of(SlaveFile(), shipped_valve("seed"))
-    server = RegisterServer(DeviceRegisters(device, Lockstep(device)), "127.0.0.1", 0, 1, guard)
+    server = RegisterServer(DeviceRegisters(device, Lockstep(device)), "127.0.0.1", 0, 1, guard, limits=limits)
     server.start()
     try:
         yield device, server
@@ -309,3 +311,50 @@ def test_files_that_do_not_fit_are_one_line_that_names_them(
         assert str(caught.value).startswith(f"{tmp_path / name}: ")
         assert said in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+def test_a_session_ends_with_its_certificate(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    with device_with(guarded()) as (device, server):
+        driver = driver_to(server, tls("daemon"))
+        driver.open()
+        driver.exchange(PUSH_PA)
+        now_s = time.time()
+        with monkeypatch.context() as later:
+            clock = SimpleNamespace(time=lambda: now_s + 40 * 86400.0, monotonic=time.monotonic)
+            later.setattr(server_module, "time", clock)
+            with pytest.raises(NoConnection):
+                driver.exchange(2 * PUSH_PA)
+        assert device.command_pa == PUSH_PA
+        assert "its certificate has ended, and its session with it" in caplog.text
+        driver.close()
+
+
+def test_who_is_not_let_in_takes_nobodys_place() -> None:
+    """Connections without a certificate, however many, end nobody's session."""
+    with device_with(guarded(), ServerLimits(most_clients=1)) as (_, server), ExitStack() as strangers:
+        driver = driver_to(server, tls("daemon"))
+        driver.open()
+        for _ in range(4):
+            strangers.enter_context(socket.create_connection(("127.0.0.1", server.port)))
+        for _ in range(20):
+            driver.exchange(PUSH_PA)
+        second = driver_to(server, tls("daemon"))
+        with pytest.raises(DriverError):
+            second.open()
+        driver.exchange(PUSH_PA)
+        driver.close()
+        second.close()
+
+
+def test_a_count_that_no_request_may_have_is_not_walked_through() -> None:
+    """It cost 15 ms of the interpreter that runs the cycle, even of an observer."""
+    asked: list[int] = []
+
+    def writers(address: int) -> Role:
+        asked.append(address)
+        return Role.OBSERVER
+
+    guard = Guard(tls("device"), writers)
+    guard.authorize(Identity("x", Role.OBSERVER), bytes.fromhex("10 0000 ffff 02 0001"))
+    guard.authorize(Identity("x", Role.OBSERVER), bytes.fromhex("17 0000 0001 0000 ffff 02 0001"))
+    assert len(asked) <= 2 * 123

@@ -1,16 +1,23 @@
 """The register server against the specification: by bytes, by an independent client (modbus-tk), and by bad frames."""
 
+import errno
 import socket
 import struct
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from socketserver import ThreadingTCPServer
+from types import SimpleNamespace
 
 import pytest
 from pymodbus.constants import ExcCodes
 
 from config.errors import InputError
+from fieldbus.modbus import connection as connection_module
+from fieldbus.modbus import server as server_module
+from fieldbus.modbus.admission import MOST_CLIENTS, ServerLimits
 from fieldbus.modbus.register_answers import RegisterError, Table
-from fieldbus.modbus.server import MOST_CLIENTS, RegisterServer
+from fieldbus.modbus.server import RegisterServer
 from tests.independent import independent_client, refused_with
 
 pytestmark = pytest.mark.real_time
@@ -273,3 +280,64 @@ def test_stop_ends_connections_and_frees_the_port(server: RegisterServer, bank: 
         line_again.sendall(frame(bytes.fromhex("04 0005 0001")))
         assert reply(line_again)[2] == bytes.fromhex("04 02 0005")
     again.stop()
+
+
+def test_a_host_that_takes_its_places_leaves_those_of_others(bank: Bank) -> None:
+    """127.0.0.2 is another host."""
+    server = RegisterServer(bank, "127.0.0.1", 0, 7, limits=ServerLimits(clients_per_host=2))
+    server.start()
+    lines = [connection(server) for _ in range(3)]
+    lines.append(socket.create_connection(("127.0.0.1", server.port), 60, source_address=("127.0.0.2", 0)))
+    try:
+        for index in (0, 1, 3):
+            lines[index].sendall(frame(bytes.fromhex("04 0005 0001")))
+            assert reply(lines[index])[2] == bytes.fromhex("04 02 0005")
+        assert lines[2].recv(1) == b""
+    finally:
+        for line in lines:
+            line.close()
+        server.stop()
+
+
+def test_a_client_that_asks_without_end_is_made_to_wait(bank: Bank, monkeypatch: pytest.MonkeyPatch) -> None:
+    waits: list[float] = []
+    monkeypatch.setattr(connection_module, "time", SimpleNamespace(sleep=waits.append))
+    server = RegisterServer(bank, "127.0.0.1", 0, 7, limits=ServerLimits(requests_per_s=10.0))
+    server.start()
+    try:
+        with connection(server) as line:
+            line.sendall(b"".join(frame(struct.pack(">BHH", 4, each, 1), transaction=each) for each in range(40)))
+            for each in range(40):
+                assert reply(line) == (each, 7, struct.pack(">BBH", 4, 2, each))
+    finally:
+        server.stop()
+    assert len(waits) >= 35
+    assert waits[-1] > 3.0
+
+
+def test_out_of_descriptors_it_waits_before_it_accepts_again(
+    bank: Bank, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What knocks goes on knocking: asked at once, the loop would spin."""
+    server = RegisterServer(bank, "127.0.0.1", 0, 7)
+    attempts = [0]
+    waits: list[float] = []
+    accept = ThreadingTCPServer.get_request
+
+    def scarce(listener: ThreadingTCPServer) -> tuple[socket.socket, tuple[str, int]]:
+        attempts[0] += 1
+        if attempts[0] <= 5:
+            raise OSError(errno.EMFILE, "Too many open files")
+        return accept(listener)
+
+    monkeypatch.setattr(ThreadingTCPServer, "get_request", scarce)
+    monkeypatch.setattr(server_module, "time", SimpleNamespace(sleep=waits.append, monotonic=time.monotonic))
+    server.start()
+    try:
+        with connection(server) as line:
+            line.sendall(frame(bytes.fromhex("04 0005 0001")))
+            assert reply(line)[2] == bytes.fromhex("04 02 0005")
+    finally:
+        server.stop()
+    assert waits == [server_module.SCARCE_WAIT_S] * 5
+    assert "Too many open files" in caplog.text

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from config.errors import InputError
 from config.recording import write_recording
 from config.valve_file import load_valve
 from config.writing import valve_toml, write_valve
 from positioner.cli.main import main
+from sim.effect import FOLDERS_ALLOWED, find_effect
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.fit.fitting import fit
 from workbench.select.extension_journal import Journal
@@ -79,3 +81,26 @@ def test_a_file_written_elsewhere_is_read_back_as_the_same_valve(here: Path) -> 
     assert load_valve(here / "valves" / "moved.toml") == valve
     assert (here / "valves" / "moved.toml").read_text().startswith("# a remark\n[valve]\n")
     assert 'name = "../effects/tight_spot.py"' in (here / "valves" / "moved.toml").read_text()
+
+
+def test_an_effect_by_its_path_is_a_program_run_only_from_folders_allowed(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A valve file that came by mail must not run what came with it, nor anything run without a word."""
+    ran = tmp_path / "mail" / "odd.py"
+    ran.parent.mkdir()
+    ran.write_text((folder / "effects" / "tight_spot.py").read_text())
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.delenv(FOLDERS_ALLOWED)
+    for path in (ran, Path("../mail/odd.py")):
+        with pytest.raises(InputError, match=r"lies in no folder allowed.*POSITIONER_EFFECTS=.*mail"):
+            find_effect(str(path), "valve.toml")
+    (tmp_path / "work" / "link.py").symlink_to(ran)
+    with pytest.raises(InputError, match="lies in no folder allowed"):
+        find_effect("link.py", "valve.toml")
+    assert not caplog.records
+    monkeypatch.setenv(FOLDERS_ALLOWED, str(ran.parent))
+    for _ in range(2):
+        assert find_effect(str(ran), "valve.toml").name == "odd"
+    assert caplog.messages == [f"valve.toml names an effect by its path: {ran} is run as a program"]

@@ -1,6 +1,7 @@
 """Where the daemon is, for the commands that talk to its registers."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,8 @@ if TYPE_CHECKING:
     from positioner.dcs import Dcs
 
 HANDSHAKE_TIMEOUT_S = 2.0
+LONGEST_SHOWN = 40
+"""Characters of a wrong argument that a message shows."""
 
 
 def add_connection(parser: argparse.ArgumentParser) -> None:
@@ -15,8 +18,8 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, metavar="CONFIG.toml", help="the daemon's file, which says where")
     parser.add_argument("--valve", metavar="NAME", help="which of that file's valves")
     parser.add_argument("--host", help="the daemon's host (127.0.0.1)")
-    parser.add_argument("--port", type=int, help="its supervisory port (5502)")
-    parser.add_argument("--unit", type=int, help="the valve's Modbus unit (1)")
+    parser.add_argument("--port", type=_whole("a port", 1, 65535), help="its supervisory port (5502)")
+    parser.add_argument("--unit", type=_whole("a Modbus unit", 0, 255), help="the valve's Modbus unit (1)")
     parser.add_argument(
         "--tls",
         nargs=3,
@@ -24,6 +27,16 @@ def add_connection(parser: argparse.ArgumentParser) -> None:
         metavar=("AUTHORITY.pem", "CERTIFICATE.pem", "KEY"),
         help="connect with Modbus/TCP Security: who signed for the daemon, and this end's certificate and key",
     )
+
+
+def _whole(what: str, least: int, most: int) -> Callable[[str], int]:
+    def number(text: str) -> int:
+        if not (text.isascii() and text.isdigit() and len(text) <= len(str(most)) and least <= int(text) <= most):
+            shown = text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}.."
+            raise argparse.ArgumentTypeError(f"{shown!r} is not {what}, {least} to {most}")
+        return int(text)
+
+    return number
 
 
 def connected(arguments: argparse.Namespace) -> "Dcs":

@@ -60,7 +60,7 @@ def _parsed(text: bytes, valve: str) -> HealthRecord:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise _Unreadable(f"is not JSON: {error}") from None
+        raise _Unreadable(f"is not JSON: {str(error).partition(';')[0]}") from None
     names = {field.name for field in fields(HealthRecord)}
     if not isinstance(content, dict) or content.keys() != names | {"version", "valve"}:
         raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))} and nothing else")
@@ -84,5 +84,10 @@ def _problem(name: str, value: object) -> str | None:
 
 
 def _from(value: object, least: float, *, above: bool = False) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    return number and (value > least if above else value >= least)  # type: ignore[operator]
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of more digits than any
+        return False
+    return math.isfinite(number) and (number > least if above else number >= least)

@@ -1,0 +1,149 @@
+"""Files and arguments that somebody else gave: one line that names file, key, value and what is allowed; never more."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from config import plain_file
+from config.daemon_file import load_valves
+from config.errors import InputError
+from config.exports.raw_table import raw_tables
+from config.exports.text_table import text_tables
+from config.plain_file import MOST_BYTES, MOST_COLUMNS, MOST_VALUES
+from config.recording import Recording
+from fieldbus.canopen.eds import read_eds
+from positioner.cli.main import main
+from positioner.daemon.health.health_file import HealthRecord, read_record
+
+DIGITS = "9" * 5000
+VALVE = "[valve]\nstroke_m = 0.1\n"
+DAEMON_FILES = {
+    "valve of 5000 digits": (f"[valve]\nstroke_m = {DIGITS}\n", "is not valid TOML: Exceeds the limit"),
+    "port of 5000 digits": (f"{VALVE}[device]\nport = {DIGITS}\n", "is not valid TOML: Exceeds the limit"),
+    "nested": (f"{VALVE}[device]\nx = {'[' * 100_000}", "is not valid TOML"),
+    "NUL in a folder": (VALVE + '[recorder]\nfolder = "a\\u0000b"\n', "recorder.folder: must be the name"),
+    "NUL in a file": (VALVE + '[law]\nvalve = "a\\u0000b"\n', "law.valve: must be the name"),
+    "no folder": (VALVE + '[memory]\nfolder = ""\n', "memory.folder: must be the name"),
+    "no host": (VALVE + '[supervisory]\nhost = ""\n', "supervisory.host: must be a host name or an IP address, got ''"),
+    "a host of two lines": (VALVE + '[supervisory]\nhost = "a\\nb"\n', "supervisory.host: must be a host name"),
+    "a table that is a number": (f"supervisory = 1\n{VALVE}", "supervisory: Input should be a valid dictionary"),
+    "the same for several": (
+        "supervisory = 1\n[[valve]]\nname = 'a'\nunit = 1\nstroke_m = 0.1\n",
+        "supervisory: must be a table, got 1",
+    ),
+    "several are one number": ("valve = [1]\n", "valve 1: is not a table"),
+}
+
+
+@pytest.mark.parametrize("case", DAEMON_FILES)
+def test_a_daemons_file_that_is_none_is_one_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, said = DAEMON_FILES[case]
+    path = tmp_path / "daemon.toml"
+    path.write_text(text)
+    for words in (["run", str(path)], ["probe", str(path)], ["get", "--config", str(path), "mode"]):
+        assert main(words) == 2
+        printed = capsys.readouterr().err
+        assert printed.startswith(f"positioner {words[0]}: {path}: ")
+        assert said in printed
+        assert printed.count("\n") == 1
+        assert len(printed) < 500 + len(str(path))
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def large(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [(fifo, "is not a regular file"), (large, "bytes, allowed are"), (Path.mkdir, "Is a directory")],
+)
+def test_what_waits_for_ever_or_has_no_end_is_not_opened(
+    make: Callable[[Path], None], said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "file"
+    make(path)
+    for read in (load_valves, lambda each: read_eds(each, 1)):
+        with pytest.raises(InputError, match=said):
+            read(path)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--port", "99999"], ["--port", "0"], ["--port", DIGITS], ["--unit", "999"], ["--unit", "-1"], ["--unit", "1e2"]],
+    ids=lambda words: f"{words[0]} {words[1][:5]}",
+)
+def test_an_address_that_is_none_is_refused_before_anybody_is_called(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["get", *words, "mode"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"positioner get: error: argument {words[0]}: ")
+
+
+HEADER = "time_s,command_pa,position_m"
+
+
+def test_a_field_of_a_million_characters_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "rec.csv"
+    for field in ("1" * 1_000_000, '"' + "x" * 1_000_000 + '"'):
+        path.write_text(f"{HEADER}\n0,1,0.01\n1,1,{field}\n")
+        with pytest.raises(InputError, match="field larger than field limit"):
+            Recording.read(path)
+
+
+def test_a_hundred_thousand_columns_are_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "rec.csv"
+    names = ",".join(f"c{n}" for n in range(100_000))
+    path.write_text(f"{HEADER},{names}\n0,1,0.01{',0' * 100_000}\n")
+    with pytest.raises(InputError, match=f"100003 columns; allowed are {MOST_COLUMNS}"):
+        Recording.read(path)
+    (commas,) = text_tables(path)
+    with pytest.raises(InputError, match=f"line 1: 100003 fields; allowed are {MOST_COLUMNS}"):
+        next(commas.rows())
+
+
+def test_a_parquet_file_that_declares_more_than_fits_is_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    assert MOST_VALUES * 8 <= 2**31, "bytes"
+    monkeypatch.setattr(plain_file, "MOST_VALUES", 999_999)
+    monkeypatch.setattr(parquet, "read_table", None)
+    path = tmp_path / "rec.parquet"
+    parquet.write_table(arrow.table({"time_s": [0.0] * 1_000_000}), path, compression="zstd")
+    assert path.stat().st_size < 5e3
+    for read in (Recording.read, raw_tables):
+        with pytest.raises(InputError, match=r"declares 1000000 rows of 1 columns; allowed are"):
+            read(path)
+
+
+@pytest.mark.parametrize("out", ["nowhere/rec.csv", "nowhere/rec.parquet", "."])
+def test_an_output_to_nowhere_is_one_line(out: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "in.csv").write_text("time_s,command_pa\n0,4e4\n0.001,4e4\n")
+    path = tmp_path / out
+    assert main(["simulate", "seed", "--input", str(tmp_path / "in.csv"), "-o", str(path)]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith(f"positioner simulate: -o {path}: cannot be written: ")
+    assert printed.count("\n") == 1
+    with pytest.raises(InputError, match="cannot be written: "):
+        Recording({}).write(path)
+
+
+def test_a_health_file_with_a_number_beyond_all_is_put_aside(tmp_path: Path) -> None:
+    path = tmp_path / "a.health.json"
+    rest = '"reversals": 0, "stiction_index": 0.0, "moves_judged": 0, "baseline_pa": null'
+    for number, said in (("1" + "0" * 400, "must be a number from 0 up"), (DIGITS, "is not JSON: Exceeds the limit")):
+        path.write_text(f'{{"version": 1, "valve": "a", "travel_m": {number}, {rest}}}')
+        record, problem = read_record(path, "a")
+        assert record == HealthRecord()
+        assert problem is not None
+        assert said in problem
+        assert (tmp_path / "a.health.json.unreadable").exists()
