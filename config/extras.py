@@ -15,6 +15,9 @@ EXTRAS = {
     "can": "canopen",
     "cryptography": "tls",
     "shtab": "completion",
+    "nicegui": "web",
+    "fastapi": "web",
+    "uvicorn": "web",
 }
 """The extra, by the name of the module that is missing."""
 

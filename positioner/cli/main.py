@@ -31,6 +31,7 @@ COMMANDS = (
     "compare",
     "diagnose",
     "extend",
+    "workbench",
     "reproduce",
     "hide",
     "certificates",

@@ -10,6 +10,7 @@ A command imports from here what it needs when it runs.
     noise_argument                              `--noise-m`
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out
+    page_address                                where a page listens
     output_files                                what `--out` and `--json` ask for
     sampling                                    when a device samples, for `doctor --nudge-pa`
     authority, progress                         a test certificate authority; progress on a terminal

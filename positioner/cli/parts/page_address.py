@@ -1,0 +1,31 @@
+"""Where a page listens, from the arguments of a command."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from positioner.pages.parts.server import Listening
+
+MOST_PORT = 65535
+
+
+def listening(arguments: argparse.Namespace) -> "Listening":
+    """Return where to listen.
+
+    Raises:
+        InputError: a port that is none, or a password file that cannot be read or begins with nothing.
+    """
+    from config.errors import InputError
+    from positioner.pages.parts.server import Listening
+
+    if arguments.port is not None and not 0 <= arguments.port <= MOST_PORT:
+        raise InputError("--port", f"must lie between 0 (any free one) and {MOST_PORT}, got {arguments.port}")
+    password = ""
+    if arguments.password_file is not None:
+        try:
+            password = arguments.password_file.read_text(encoding="utf-8").partition("\n")[0].strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(str(arguments.password_file), f"cannot be read: {error}") from None
+        if not password:
+            raise InputError(str(arguments.password_file), "its first line must be the password; it is empty")
+    return Listening(arguments.host, arguments.port, password)

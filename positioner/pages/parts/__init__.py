@@ -1,0 +1,10 @@
+"""What the pages share. Knows neither tower.
+
+Its files:
+
+    server               listens and serves one page, everything of it from this machine
+    gate                 who comes in: by the key in the address or by a password; how much at once
+    sessions             who came in, and how often a password was wrong
+    theme                light and dark, colours of page and plots
+    figure_view          a plotly figure on a page, its colours those of the theme
+"""

@@ -1,0 +1,51 @@
+"""A plotly figure on a page, its colours those of the theme.
+
+Data change without the figure being built anew: `restyle` sends the lines that changed and nothing else.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from nicegui import ui
+
+from positioner.pages.parts.theme import Theme
+
+Figure = dict[str, Any]
+CONFIG = {"displaylogo": False, "scrollZoom": True, "responsive": True, "modeBarButtonsToRemove": ["lasso2d"]}
+
+
+class FigureView:
+    """Shows what `draw` returns; `draw` is asked again when the colours change."""
+
+    def __init__(self, theme: Theme, draw: Callable[[], Figure], height_px: int, name: str) -> None:
+        self._draw = draw
+        self._theme = theme
+        self.plot = ui.plotly(self._themed()).classes("w-full").style(f"height: {height_px}px")
+        self.plot.props(f'data-testid="{name}" role="img" aria-label="{name}"')
+        theme.listen(self.redraw)
+
+    def redraw(self) -> None:
+        """Draw it anew."""
+        self.plot.update_figure(self._themed())
+
+    def restyle(self, changes: Mapping[str, Sequence[Any]], traces: Sequence[int]) -> None:
+        """Change some traces: for each attribute a value a trace."""
+        self.plot.run_plot_method("restyle", dict(changes), list(traces))
+
+    def relayout(self, changes: Mapping[str, Any]) -> None:
+        """Change the layout."""
+        self.plot.run_plot_method("relayout", dict(changes))
+
+    def _themed(self) -> Figure:
+        figure, ink = self._draw(), self._theme.ink
+        layout = dict(figure.get("layout", {}))
+        layout |= {
+            "paper_bgcolor": "rgba(0,0,0,0)",
+            "plot_bgcolor": "rgba(0,0,0,0)",
+            "font": {**layout.get("font", {}), "color": ink.text},
+            "hoverlabel": {"bgcolor": ink.paper, "bordercolor": ink.grid, "font": {"color": ink.text}},
+        }
+        for name, axis in layout.items():
+            if name.startswith(("xaxis", "yaxis")):
+                layout[name] = {**axis, "gridcolor": ink.grid, "linecolor": ink.grid, "tickcolor": ink.grid}
+        return {"data": figure["data"], "layout": layout, "config": CONFIG}

@@ -1,0 +1,81 @@
+"""Light and dark: colours of page and plots, told apart without red and green.
+
+What is measured is ink, a model orange, a better one teal, as in the reports.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nicegui import ui
+
+STYLE = """
+body { font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
+.nicegui-content { padding: 0; gap: 0; align-items: stretch; }
+.q-header { flex-wrap: wrap; }
+.panel { padding: 12px 16px 24px; gap: 12px; width: 100%; max-width: 2560px; margin: 0 auto; }
+.side { flex: 1 1 300px; min-width: min(300px, 100%); max-width: 520px; gap: 8px; }
+.wide { flex: 3 1 480px; min-width: min(480px, 100%); gap: 8px; }
+.together { display: flex; flex-flow: row wrap; gap: 16px; width: 100%; align-items: flex-start; }
+.number { font-variant-numeric: tabular-nums; }
+.figure { font-size: 1.5rem; font-weight: 600; line-height: 1.2; }
+.quiet { opacity: 0.75; font-size: 0.875rem; }
+.said { margin: 0; padding-left: 1.2rem; }
+.said li { margin: 2px 0; }
+h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; }
+*:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
+@media (max-width: 599px) { .panel { padding: 8px 8px 24px; } }
+"""
+DARK_QUERY = 'matchMedia("(prefers-color-scheme: dark)").matches'
+
+
+@dataclass(frozen=True, slots=True)
+class Ink:
+    """Colours of plots."""
+
+    text: str
+    quiet: str
+    grid: str
+    paper: str
+    measured: str
+    model: str
+    better: str
+
+
+LIGHT = Ink("#1f2a37", "#5b6675", "#e3e7ec", "#ffffff", "#1f2a37", "#d9622b", "#1b7f79")
+DARK = Ink("#e6eaf0", "#a3adba", "#333b46", "#12161b", "#e6eaf0", "#ff9a5c", "#4fc3b8")
+
+
+class Theme:
+    """Light or dark, for one tab; tells those who draw when it changes."""
+
+    def __init__(self) -> None:
+        ui.add_css(STYLE)
+        ui.colors(primary="#1b5e8a", dark_page="#12161b", dark="#1a2027")
+        self._mode = ui.dark_mode(None)
+        self._listeners: list[Callable[[], None]] = []
+        self.is_dark = False
+
+    @property
+    def ink(self) -> Ink:
+        """Colours of plots."""
+        return DARK if self.is_dark else LIGHT
+
+    def listen(self, redraw: Callable[[], None]) -> None:
+        """Have it called when the colours change."""
+        self._listeners.append(redraw)
+
+    def choose(self, dark: bool) -> None:
+        """Make it dark or light."""
+        self.is_dark = dark
+        self._mode.set_value(dark)
+        for each in self._listeners:
+            each()
+
+    async def as_the_browser_prefers(self) -> None:
+        """Take what the person has told the browser; the tab must be connected."""
+        self.choose(bool(await ui.run_javascript(DARK_QUERY, timeout=10.0)))
+
+    def switch(self) -> ui.button:
+        """Return a button that turns light into dark and back."""
+        button = ui.button(icon="contrast", on_click=lambda: self.choose(not self.is_dark)).props("flat round dense")
+        return button.props('aria-label="light or dark" color=white').tooltip("light or dark")
