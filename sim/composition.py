@@ -125,6 +125,20 @@ class Composition:
             effect.values(written, f"{self.source}: effect {effect.name}")
         return np.array([float(values[name]) for name in self.names])
 
+    def file(self, theta: Vector) -> ValveFile:
+        """Return the valve file that says theta, (parameters,) in the order of `names`.
+
+        Raises:
+            InputError: a value that no valve file may say.
+        """
+        values: dict[str, Any] = dict(zip(self.names, theta.tolist(), strict=True))
+        base = self.valve.model_dump() | {name: values[name] for name in BASE}
+        tables = [
+            {"name": each.written} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
+            for each in self.effects
+        ]
+        return validated(ValveFile, {"valve": base, "effect": tables}, self.source)
+
 
 def parameter_vector(file: ValveFile, effects: Sequence[Effect], source: str) -> Vector:
     """Return theta of a valve file, `effects` being what its `[[effect]]` tables name, in their order.

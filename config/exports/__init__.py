@@ -11,6 +11,7 @@ From the file to the recording:
     number_notation                         decimal signs and thousands separators
     time_stamps                             dates and times as seconds
     time_order                              newest first, disorder, repeated rows and hours
+    own_format                              whether it is a recording of our own already
     plausibility                            what is odd about a recording, before anything is fitted to it
     export_preview                          what a file holds, and the words that would read it
 """

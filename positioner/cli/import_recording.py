@@ -2,12 +2,8 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from positioner.cli.parts.export_arguments import add_export_arguments, export_options, read_mapped
-
-if TYPE_CHECKING:
-    from config.recording import Recording
 
 HELP = "list what an export holds and the words that read it; with --column, say what is read, and write it with -o"
 EXAMPLE = (
@@ -25,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what the file holds, or what is read of it; 0."""
     from config.errors import InputError
+    from config.exports.own_format import own_recording
     from config.exports.plausibility import oddities
     from config.recording import Recording
     from positioner.cli.parts.output_files import writable
@@ -34,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.column:
         recording = read_mapped(arguments.file, arguments, None)
     else:
-        recording = _own(arguments.file) or Recording({})
+        recording = own_recording(arguments.file) or Recording({})
         if not recording.columns:
             if arguments.out is not None:
                 raise InputError("-o", "needs to know the columns: --column; without -o this command proposes them")
@@ -46,19 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
         recording.write(arguments.out)
         print(f"{arguments.out}: {len(recording)} rows, to be read without --column")
     return 0
-
-
-def _own(path: Path) -> "Recording | None":
-    """Return a recording of our own format; None if the file is none."""
-    from config.errors import InputError
-    from config.recording import Recording
-
-    try:
-        return Recording.read(path)
-    except InputError as error:
-        if "is missing" in error.problem or "not a CSV" in error.problem or "Parquet" in error.problem:
-            return None
-        raise
 
 
 def _list(arguments: argparse.Namespace) -> int:

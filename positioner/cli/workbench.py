@@ -24,5 +24,5 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.page_address import listening
     from positioner.pages.workbench_page.page import serve_workbench
 
-    serve_workbench(listening(arguments), opens_browser=not arguments.no_open)
+    serve_workbench(arguments.recordings, arguments.valve, listening(arguments), opens_browser=not arguments.no_open)
     return 0

@@ -18,8 +18,9 @@ from workbench.data.motion import PARABOLA, directions, velocity_m_per_s
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Forces(Brief):
-    """Moving samples: where, how fast, which way, at what pressure, and the friction, N."""
+    """Moving samples: when, where, how fast, which way, at what pressure, and the friction, N."""
 
+    time_s: Column
     position_m: Column
     velocity_m_per_s: Column
     direction: Column
@@ -43,7 +44,7 @@ def forces(
     from scipy.signal import savgol_filter  # takes as long to load as all else together
 
     if time_s.size < PARABOLA:
-        return Forces(*np.empty((5, 0)))
+        return Forces(*np.empty((6, 0)))
     velocity = velocity_m_per_s(time_s, position_m)
     period_s = float(np.median(np.diff(time_s)))
     acceleration = savgol_filter(position_m, PARABOLA, 2, deriv=2, delta=period_s)
@@ -55,7 +56,8 @@ def forces(
         - valve.mass_kg * acceleration
     )
     moving = way != 0
-    return Forces(*(each[moving] for each in (position_m, velocity, way.astype(np.float64), pressure_pa, friction_n)))
+    every = (time_s, position_m, velocity, way.astype(np.float64), pressure_pa, friction_n)
+    return Forces(*(each[moving] for each in every))
 
 
 def balance(measured: Forces, simulated: Forces) -> FrictionBalance:

@@ -11,12 +11,11 @@ on the number of workers, which are threads.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from config.errors import InputError
-from config.loading import validated
 from config.recording import Column, Recording
 from config.results.block import Block
 from config.results.result import Result
@@ -451,7 +450,7 @@ class BegunFit:
         determined = uncertainty(error, best, found, profile=profile)
         self.tell(1.0)
         return Fit(
-            _fitted_file(self.composition, error.theta(best)),
+            self.composition.file(error.theta(best)),
             {each.name: _fitted(error, best, determined, i) for i, each in enumerate(error.parameters)},
             error.rms_m(best),
             error.run.record.floor_m,
@@ -552,16 +551,6 @@ def _wants_out(error: SimulationError, z: Vector, determined: Uncertainty, i: in
 def _search(error: SimulationError, z: Vector) -> Search:
     theta = error.theta(z)
     return Search(error.cost(z), error.rms_m(z), {each.name: float(theta[each.index]) for each in error.parameters})
-
-
-def _fitted_file(composition: Composition, theta: Vector) -> ValveFile:
-    values: dict[str, Any] = dict(zip(composition.names, theta.tolist(), strict=True))
-    base = composition.valve.model_dump() | {name: values[name] for name in BASE}
-    tables = [
-        {"name": each.written} | {key: values[f"{each.name}.{key}"] for key in each.parameters}
-        for each in composition.effects
-    ]
-    return validated(ValveFile, {"valve": base, "effect": tables}, composition.source)
 
 
 def _each(function: Callable[[T], S], arguments: Sequence[T], workers: int | None, tell: Progress) -> list[S]:

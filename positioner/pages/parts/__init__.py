@@ -6,5 +6,6 @@ Its files:
     gate                 who comes in: by the key in the address or by a password; how much at once
     sessions             who came in, and how often a password was wrong
     theme                light and dark, colours of page and plots
+    telling              errors and sentences, shown
     figure_view          a plotly figure on a page, its colours those of the theme
 """

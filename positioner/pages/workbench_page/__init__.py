@@ -1,6 +1,12 @@
 """The workbench in a browser: open a recording, see where the model fails, drag, diagnose, add what is missing.
 
-Its files:
+Its files; the first four know no browser:
 
-    page    the page of one tab
+    desk                            what lies on the desk of one tab
+    opening                         from a file to a recording
+    live_model                      the model run anew while a parameter moves
+    time_figure, force_figures      what is drawn
+    page                            the page of one tab
+    open_panel                      where a recording and a valve come onto the desk
+    compare_panel, sliders          measured and simulated; the parameters
 """

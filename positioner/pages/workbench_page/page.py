@@ -1,27 +1,108 @@
 """The page of one tab of the workbench."""
 
-from nicegui import ui
+from collections.abc import Sequence
+from pathlib import Path
+
+from nicegui import app, ui
 
 from positioner.pages.parts.server import Listening, serve
+from positioner.pages.parts.telling import errors_told, heading
 from positioner.pages.parts.theme import Theme
+from positioner.pages.workbench_page.compare_panel import ComparePanel
+from positioner.pages.workbench_page.desk import Desk, named_valve
+from positioner.pages.workbench_page.open_panel import OpenPanel, files_of
+from positioner.pages.workbench_page.opening import Opened, opened
 
 TITLE = "positioner workbench"
 
 
-def serve_workbench(where: Listening, *, opens_browser: bool) -> None:
+class Workbench:
+    """The desks of all tabs.
+
+    Args:
+        files: recordings that are offered; of a single one the page begins with it.
+        valve: the valve that the page begins with.
+    """
+
+    def __init__(self, files: Sequence[Path], valve: str | None) -> None:
+        self._files = files
+        self._valve = valve
+        self._desks: dict[str, Desk] = {}
+
+    def desk(self, tab: str) -> Desk:
+        """Return the desk of a tab; a new one has on it what the command line named.
+
+        Raises:
+            InputError: that cannot be simulated.
+        """
+        if tab not in self._desks:
+            desk = self._desks[tab] = Desk()
+            if self._valve is not None:
+                desk.take_valve(named_valve(self._valve))
+            if len(self._files) == 1:
+                found = opened(self._files[0], self._files[0].name)
+                if isinstance(found, Opened):
+                    desk.take_recording(found)
+                else:
+                    desk.export = found
+        return self._desks[tab]
+
+    def clear(self) -> None:
+        """Remove what was written for the desks."""
+        for each in self._desks.values():
+            each.clear()
+
+    async def page(self) -> None:
+        """Build the page of one tab."""
+        theme = Theme()
+        with ui.header().classes("items-center"):
+            ui.label(TITLE).classes("text-weight-medium")
+            ui.space()
+            theme.switch()
+        await ui.context.client.connected()
+        await theme.as_the_browser_prefers()
+        tab = ui.context.client.tab_id
+        assert tab is not None
+        with errors_told():
+            self.desk(tab)
+        TabPage(self._desks[tab], theme, self._files)
+
+
+class TabPage:
+    """The panels of one tab."""
+
+    def __init__(self, desk: Desk, theme: Theme, files: Sequence[Path]) -> None:
+        self._desk = desk
+        self._theme = theme
+        with ui.column().classes("panel"):
+            OpenPanel(desk, files, self._changed)
+            self._rest = ui.column().classes("w-full")
+        self._changed()
+
+    def _changed(self) -> None:
+        """Show what goes with the recording and the valve on the desk."""
+        self._rest.clear()
+        if self._desk.live is None:
+            return
+        with self._rest:
+            heading("Model against measurement")
+            ComparePanel(self._desk, self._theme)
+
+
+def serve_workbench(recordings: Sequence[Path], valve: str | None, where: Listening, *, opens_browser: bool) -> None:
     """Serve the page until the process is told to end.
 
+    Args:
+        recordings: files that the page offers, or folders with some.
+        valve: the valve file that it begins with, or a shipped one's name.
+        where: it listens.
+        opens_browser: at its address.
+
     Raises:
-        InputError: the address cannot be had.
+        InputError: a file is not there or is wrong, or the address cannot be had.
     """
-    serve(TITLE, _build, where, opens_browser=opens_browser)
-
-
-async def _build() -> None:
-    theme = Theme()
-    with ui.header():
-        ui.label(TITLE)
-        ui.space()
-        theme.switch()
-    await ui.context.client.connected()
-    await theme.as_the_browser_prefers()
+    workbench = Workbench(files_of(recordings), valve)
+    if valve is not None:
+        named_valve(valve)
+    app.on_shutdown(workbench.clear)
+    serve(TITLE, workbench.page, where, opens_browser=opens_browser)

@@ -1,0 +1,107 @@
+"""A valve file from what a data sheet says, and what it does not say assumed and told.
+
+    k_s = (p_1 - p_0) A / stroke        F_0 = p_0 A        F_c = 1/2 f (p_1 - p_0) A        F_s = r F_c
+
+p_0, p_1 bench range, Pa; A effective diaphragm area, m^2; f friction, the pressure between opening and closing as a
+share of the range; r break-away over sliding friction. m and F_v are no data sheet's: m goes with the
+area, F_v is 15 ms k_s.
+"""
+
+from dataclasses import dataclass
+
+from config.errors import InputError
+from config.valve_file import EffectTable, ValveFile, ValveParameters
+
+FRICTION_PERCENT = 5.0
+BREAKAWAY_RATIO = 1.3
+KG_PER_M2 = 8.0 / 0.07
+"""Plate, stem and plug: 8 kg go with 700 cm2."""
+DAMPING_S = 15e-3
+"""F_v/k_s: the air that a diaphragm pushes in and out."""
+STRIBECK_M_PER_S = 5e-4
+DEADZONE = 0.5
+ALLOWED = {"area_cm2": 1e5, "stroke_mm": 1500.0, "friction_percent": 90.0, "breakaway_ratio": 10.0, "mass_kg": 1e4}
+"""The most of each."""
+HIGHEST_BAR = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class DataSheet:
+    """What it says, in its own units; None: it does not say.
+
+    Raises:
+        InputError: a number is out of its range; says what is allowed.
+    """
+
+    area_cm2: float
+    """Effective area of the diaphragm."""
+    range_bar: tuple[float, float]
+    """Bench range: gauge pressures at which the stem leaves one end and reaches the other."""
+    stroke_mm: float
+    """Rated travel."""
+    friction_percent: float | None = None
+    """Pressure between opening and closing, of the range."""
+    breakaway_ratio: float | None = None
+    """Break-away over sliding friction."""
+    mass_kg: float | None = None
+    """Plate, stem and plug."""
+    name: str = "from data sheet"
+
+    def __post_init__(self) -> None:
+        for key, most in ALLOWED.items():
+            value, least = getattr(self, key), 1.0 if key == "breakaway_ratio" else 0.0
+            inside = value is None or ((value >= 1.0 if key == "breakaway_ratio" else value > 0.0) and value <= most)
+            if not inside:
+                raise InputError(key, f"must be above {least:g}, at most {most:g}, it is {value:g}")
+        closed, open_ = self.range_bar
+        if not 0.0 <= closed < open_ <= HIGHEST_BAR:
+            raise InputError(
+                "range_bar",
+                f"must be two gauge pressures, the lower first, up to {HIGHEST_BAR:g} bar; it is {closed:g} {open_:g}",
+            )
+
+
+def from_data_sheet(sheet: DataSheet) -> tuple[ValveFile, list[str], list[str]]:
+    """Return the valve, what it says from the data sheet, and what was assumed."""
+    area_m2, stroke_m = 1e-4 * sheet.area_cm2, 1e-3 * sheet.stroke_mm
+    closed_pa, open_pa = (1e5 * each for each in sheet.range_bar)
+    span_n = (open_pa - closed_pa) * area_m2
+    spring = span_n / stroke_m
+    percent = sheet.friction_percent or FRICTION_PERCENT
+    ratio = sheet.breakaway_ratio or BREAKAWAY_RATIO
+    coulomb_n = 0.5 * percent / 100.0 * span_n
+    mass_kg = sheet.mass_kg or KG_PER_M2 * area_m2
+    valve = ValveParameters(
+        name=sheet.name,
+        mass_kg=_rounded(mass_kg),
+        diaphragm_area_m2=_rounded(area_m2),
+        spring_n_per_m=_rounded(spring),
+        viscous_ns_per_m=_rounded(DAMPING_S * spring),
+        coulomb_n=_rounded(coulomb_n),
+        static_n=_rounded(ratio * coulomb_n),
+        stribeck_velocity_m_per_s=STRIBECK_M_PER_S,
+        deadzone_ratio=DEADZONE,
+        stroke_m=_rounded(stroke_m),
+    )
+    preload = EffectTable.model_validate({"name": "preload", "force_n": _rounded(closed_pa * area_m2)})
+    given = [
+        f"spring {valve.spring_n_per_m:g} N/m: {span_n:.6g} N over {sheet.stroke_mm:g} mm",
+        f"preload {closed_pa * area_m2:.6g} N: {sheet.range_bar[0]:g} bar on {sheet.area_cm2:g} cm2",
+    ]
+    friction = f"sliding friction {valve.coulomb_n:g} N: {percent:g} % of the range between opening and closing"
+    breakaway = f"break-away friction {valve.static_n:g} N: {ratio:g} times that"
+    mass = f"mass {valve.mass_kg:g} kg"
+    assumed = [
+        *([friction] if sheet.friction_percent is None else []),
+        *([breakaway] if sheet.breakaway_ratio is None else []),
+        *([f"{mass}: 8 kg go with 700 cm2"] if sheet.mass_kg is None else []),
+        f"damping {valve.viscous_ns_per_m:g} N s/m: F_v/k_s = {1e3 * DAMPING_S:g} ms",
+        f"Stribeck velocity {STRIBECK_M_PER_S:g} m/s; no stops at the ends of the travel",
+    ]
+    given += [each for each in (friction, breakaway, mass) if not any(one.startswith(each) for one in assumed)]
+    return ValveFile(valve=valve, effect=(preload,) if closed_pa > 0.0 else ()), given, assumed
+
+
+def _rounded(value: float) -> float:
+    """Return a value with the six digits that a data sheet never has."""
+    return float(f"{value:.6g}")

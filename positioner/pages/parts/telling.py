@@ -1,0 +1,43 @@
+"""What a page says to a person: an error in its line, a list of sentences."""
+
+import asyncio
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from html import escape
+from typing import TypeVar
+
+from nicegui import ui
+
+from config.errors import CommandFailed, InputError
+
+T = TypeVar("T")
+
+
+@contextmanager
+def errors_told() -> Iterator[None]:
+    """Say what a person did wrong instead of raising it."""
+    try:
+        yield
+    except (InputError, CommandFailed) as error:
+        tell_error(str(error))
+
+
+def tell_error(said: str) -> None:
+    """Say an error; it stays until it is closed."""
+    ui.notification(said, type="negative", timeout=0, close_button="close", multi_line=True, position="top")
+
+
+async def aside(work: Callable[..., T], *arguments: object) -> T:
+    """Do it on a thread, so that other tabs go on; what it raises comes back."""
+    return await asyncio.to_thread(work, *arguments)
+
+
+def sentences(items: Sequence[str], name: str) -> None:
+    """Show sentences as a list."""
+    lines = "".join(f"<li>{escape(each)}</li>" for each in items)
+    ui.html(f'<ul class="said">{lines}</ul>', sanitize=False).props(f'data-testid="{name}"')
+
+
+def heading(text: str) -> None:
+    """Show a section's heading."""
+    ui.html(f"<h2>{escape(text)}</h2>", sanitize=False)

@@ -1,0 +1,179 @@
+"""A valve against a recording, its parameters moved by hand: the whole model runs anew at each move, in milliseconds.
+
+A parameter is moved in the coordinate of a fit (`workbench.model.parameters`), so that a slider's way goes over its
+whole physical range. An effect that is switched off has the parameters with which it vanishes; nothing is compiled.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from config.recording import Column, Recording
+from config.valve_file import ValveFile
+from sim.composition import BASE, Composition
+from sim.karnopp import Vector
+from workbench.compare.comparison import Comparison, compare
+from workbench.compare.friction_balance import Forces, forces
+from workbench.compare.measures import rms, valid_rows
+from workbench.data.record import Record, ready, require_units
+from workbench.model.free_run import FreeRun, Run
+from workbench.model.parameters import Parameter, free_parameters
+
+FIXED = ("diaphragm_area_m2", "deadzone_ratio")
+"""Of the bare valve: only ratios of forces are in a recording, and the dead zone is the method's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What the hand has set: every parameter, and the effects that are switched off."""
+
+    theta: Vector
+    off: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One run: what the model indicates, m, its pressure, Pa, and its error, m, (n,) each; the rms of the error, m."""
+
+    simulated_m: Column
+    pressure_pa: Column
+    residual_m: Column
+    rms_m: float
+
+
+class LiveModel:
+    """Raises InputError as `compare` does."""
+
+    def __init__(self, recording: Recording, valve: ValveFile) -> None:
+        self.recording = recording
+        self.record: Record = ready(recording)
+        require_units(self.record, valve.valve)
+        self._composition = Composition.from_file(valve)
+        self._run = FreeRun(self._composition, self.record)
+        self.parameters = self._movable()
+        self.setting = Setting(np.array(self._composition.theta))
+        self._before: list[Setting] = []
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The names of its effects."""
+        return tuple(each.name for each in self._composition.effects)
+
+    def value(self, parameter: Parameter) -> float:
+        """Return what a parameter is set to, SI."""
+        return float(self.setting.theta[parameter.index])
+
+    def share(self, parameter: Parameter) -> float:
+        """Return where in its range a parameter stands, 0 to 1 in its coordinate."""
+        least, most = parameter.bounds
+        return (parameter.coordinate(self.setting.theta) - least) / (most - least)
+
+    def value_at(self, parameter: Parameter, share: float) -> float:
+        """Return the value, SI, at a place in the range."""
+        theta = np.array(self.setting.theta)
+        _put(theta, parameter, share)
+        return float(theta[parameter.index])
+
+    def share_of(self, parameter: Parameter, value: float) -> float:
+        """Return where in the range a value, SI, stands; outside it, the nearer end."""
+        theta = np.array(self.setting.theta)
+        theta[parameter.index] = value
+        least, most = parameter.bounds
+        return (parameter.coordinate(theta) - least) / (most - least)
+
+    def keep(self) -> None:
+        """Remember the setting: `undo` comes back to it."""
+        self._before.append(self.setting)
+
+    def move(self, parameter: Parameter, share: float) -> None:
+        """Set a parameter by its place in the range, 0 to 1."""
+        theta = np.array(self.setting.theta)
+        _put(theta, parameter, share)
+        self.setting = replace(self.setting, theta=theta)
+
+    def switch(self, effect: str, on: bool) -> None:
+        """Switch an effect on or off."""
+        self.keep()
+        off = self.setting.off - {effect} if on else self.setting.off | {effect}
+        self.setting = replace(self.setting, off=off)
+
+    def undo(self) -> bool:
+        """Go back to the setting kept last; whether there was one."""
+        if not self._before:
+            return False
+        self.setting = self._before.pop()
+        return True
+
+    @property
+    def valve(self) -> ValveFile:
+        """The valve file as it is set: without the effects that are switched off.
+
+        Raises:
+            InputError: a value that no valve file may say.
+        """
+        file = self._composition.file(self.setting.theta)
+        on = [
+            table
+            for effect, table in zip(self._composition.effects, file.effect, strict=True)
+            if effect.name not in self.setting.off
+        ]
+        return file.model_copy(update={"effect": tuple(on)})
+
+    def curve(self) -> Curve:
+        """Run the model through the recording as it is set."""
+        run = self._run.run(self._effective())
+        rows = valid_rows(self.record, run.indicated_m) & (self._run.by.held | self._run.judged)
+        residual_m = np.where(rows, run.indicated_m - self.record.position_m, np.nan)
+        return Curve(run.indicated_m, run.pressure_pa, residual_m, rms(residual_m[rows]))
+
+    def comparison(self) -> Comparison:
+        """Return all that `compare` says of it.
+
+        Raises:
+            InputError: as `compare`.
+        """
+        return compare(self.recording, self.valve)
+
+    def forces(self) -> tuple[Forces, Forces]:
+        """Return the friction that the balance of forces leaves in motion: as measured, and of the model."""
+        run = self._run.run(self._effective())
+        measured = [self._forces(run, self.record.position_m, each) for each in self.record.segments]
+        model = [self._forces(run, run.indicated_m, each) for each in self.record.segments]
+        return _joined(measured), _joined(model)
+
+    def _forces(self, run: Run, position_m: Column, segment: tuple[int, int]) -> Forces:
+        rows = slice(*segment)
+        record, here_m = self.record, position_m[rows]
+        whole = np.isfinite(here_m) & record.valid[rows]
+        along = np.arange(here_m.size)
+        load_n = np.zeros(here_m.size) if record.load_n is None else record.load_n[rows]
+        pressure_pa = run.pressure_pa if record.pressure_pa is None else record.pressure_pa
+        # Only for finding motion: across a bad sample the stem is taken to go straight.
+        straight_m = np.interp(along, along[whole], here_m[whole])
+        valve = self._composition.file(self.setting.theta).valve
+        return forces(valve, record.time_s[rows], straight_m, pressure_pa[rows], load_n, record.scale_m)
+
+    def _effective(self) -> Vector:
+        theta = np.array(self.setting.theta)
+        names = self._composition.names
+        for effect in self._composition.effects:
+            if effect.name in self.setting.off:
+                for key, value in zip(effect.parameters, effect.off(self._composition.valve), strict=True):
+                    theta[names.index(f"{effect.name}.{key}")] = value
+        return theta
+
+    def _movable(self) -> Mapping[str, Parameter]:
+        bare = [name for name in BASE if name not in FIXED and getattr(self._composition.valve, name) > 0.0]
+        rest = [name for name in self._composition.names if name not in BASE]
+        return {each.name: each for each in free_parameters(self._composition, [*bare, *rest])}
+
+
+def _put(theta: Vector, parameter: Parameter, share: float) -> None:
+    least, most = parameter.bounds
+    parameter.put(theta, least + min(max(share, 0.0), 1.0) * (most - least))
+
+
+def _joined(parts: list[Forces]) -> Forces:
+    names = ("time_s", "position_m", "velocity_m_per_s", "direction", "pressure_pa", "friction_n")
+    return Forces(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

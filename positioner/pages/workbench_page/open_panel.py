@@ -1,0 +1,223 @@
+"""Where a recording and a valve come onto the desk: dropped, chosen, made from a data sheet, or hidden."""
+
+import secrets
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from nicegui import events, ui
+
+from config.data_sheet import DataSheet, from_data_sheet
+from config.errors import InputError
+from config.loading import SHIPPED
+from config.writing import write_valve
+from positioner.pages.parts.server import MOST_BYTES
+from positioner.pages.parts.telling import aside, errors_told, heading, sentences, tell_error
+from positioner.pages.workbench_page.desk import Desk, named_valve
+from positioner.pages.workbench_page.opening import OURS, ColumnChoice, Export, Opened, mapped, opened, wrong_with
+
+SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
+"""Of files that a folder offers."""
+MOST_BLIND = 10_000
+OWN_FILE = "a file of mine"
+
+
+class OpenPanel:
+    """The panel; `changed` is called when a recording or a valve is on the desk that was not."""
+
+    def __init__(self, desk: Desk, files: Sequence[Path], changed: Callable[[], None]) -> None:
+        self._desk = desk
+        self._changed = changed
+        with ui.element("section").classes("together"):
+            with ui.column().classes("wide"):
+                self._recording(files)
+            with ui.column().classes("side"):
+                self._valve()
+        self._mapping = ui.column().classes("w-full")
+        self._remarks = ui.column().classes("w-full")
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show what is on the desk."""
+        self._mapping.clear()
+        self._remarks.clear()
+        desk = self._desk
+        if desk.export is not None:
+            with self._mapping:
+                self._columns(desk.export)
+        if desk.opened is None:
+            return
+        recording = desk.opened.recording
+        with self._remarks:
+            ui.label(f"{desk.opened.name}: {recording.summary().splitlines()[0]}").props('data-testid="opened"')
+            stroke_m = desk.valve.file.valve.stroke_m if desk.valve else None
+            with errors_told():
+                said = wrong_with(recording, stroke_m)
+                sentences(said or ("nothing in it had to be left out or cut",), "wrong")
+            if desk.valve is None:
+                ui.label("now choose a valve").classes("quiet")
+
+    def _recording(self, files: Sequence[Path]) -> None:
+        heading("Recording")
+        upload = ui.upload(
+            label="drop a recording here, or press +: CSV, Excel, MATLAB, Parquet",
+            on_upload=self._dropped,
+            on_rejected=lambda: tell_error(f"a file may have {MOST_BYTES >> 20} MiB at most"),
+            max_file_size=MOST_BYTES,
+            auto_upload=True,
+        )
+        upload.classes("w-full").props('flat bordered data-testid="drop"')
+        if files:
+            names = {str(path): path.name for path in files}
+            ui.select(names, label="or one of the folder", on_change=lambda event: self._chosen(event.value)).classes(
+                "w-full"
+            ).props('data-testid="files"')
+        with ui.row().classes("items-center"):
+            ui.button("Blind practice", icon="visibility_off", on_click=self._blind).props("outline no-caps")
+            ui.label("a recording with a hidden effect, its answer sealed").classes("quiet")
+
+    def _valve(self) -> None:
+        heading("Valve")
+        shipped = sorted(path.stem for path in (SHIPPED / "valves").glob("*.toml"))
+        chosen = self._desk.valve.name if self._desk.valve else None
+        names = [*([chosen] if chosen and chosen not in shipped else []), *shipped]
+        self._names = ui.select(names, label="valve", value=chosen, on_change=lambda event: self._named(event.value))
+        self._names.classes("w-full").props('data-testid="valve"')
+        own = ui.upload(label="or drop a valve file, .toml", on_upload=self._valve_dropped, auto_upload=True)
+        own.classes("w-full").props('flat bordered accept=".toml" data-testid="drop-valve"')
+        with ui.expansion("from a data sheet", icon="straighten").classes("w-full"):
+            self._data_sheet()
+
+    def _data_sheet(self) -> None:
+        area = ui.number("diaphragm area, cm²", value=700.0, min=0)
+        low = ui.number("bench range from, bar", value=0.2, min=0, step=0.1)
+        high = ui.number("bench range to, bar", value=1.0, min=0, step=0.1)
+        stroke = ui.number("stroke, mm", value=40.0, min=0)
+        friction = ui.number("friction, % of range (PTFE 2-6, graphite 5-15)", value=5.0, min=0)
+        ratio = ui.number("break-away over sliding friction", value=1.3, min=1, step=0.1)
+        told = ui.column()
+
+        async def made() -> None:
+            with errors_told():
+                values = [each.value for each in (area, low, high, stroke)]
+                if any(each is None for each in values):
+                    raise InputError("data sheet", "area, bench range and stroke are needed")
+                sheet = DataSheet(values[0], (values[1], values[2]), values[3], friction.value, ratio.value)
+                file, given, assumed = from_data_sheet(sheet)
+                path = self._desk.folder / "data-sheet.toml"
+                write_valve(path, file)
+                told.clear()
+                with told:
+                    sentences([*given, *(f"assumed: {each}" for each in assumed)], "assumed")
+                await self._take_valve(str(path))
+
+        ui.button("Make the valve", on_click=made).props("outline no-caps")
+
+    def _columns(self, export: Export) -> None:
+        """Ask which column is which, the proposal filled in."""
+        heading(f"{export.name}: which column is which?")
+        ui.label(f"{export.preview.what}; {export.preview.header}").classes("quiet")
+        sentences(export.preview.open, "open")
+        rows = [
+            {"name": each.name, "unit": each.unit or "", "first": ", ".join(map(str, each.cells[:3]))}
+            for each in export.preview.columns
+        ]
+        heads = {"name": "column", "unit": "unit", "first": "first values"}
+        columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
+        ui.table(rows=rows, columns=columns, row_key="name").props("dense flat bordered").classes("w-full")
+        with ui.row():
+            asked = {
+                ours: ui.input(f"{ours}, name:unit", value=export.proposed.columns[ours]).props("dense")
+                for ours in OURS
+            }
+            stroke = ui.number("stroke, mm, if position is in %").props("dense")
+            time_format = ui.input("how dates are written", value=export.proposed.time_format).props("dense")
+
+        async def confirmed() -> None:
+            stroke_m = 1e-3 * stroke.value if stroke.value else self._stroke_m()
+            choice = ColumnChoice({ours: each.value or "" for ours, each in asked.items()}, stroke_m, time_format.value)
+            with errors_told():
+                await self._take(await aside(mapped, export, choice))
+
+        ui.button("Read it so", on_click=confirmed).props('no-caps data-testid="confirm"')
+
+    def _stroke_m(self) -> float | None:
+        return self._desk.valve.file.valve.stroke_m if self._desk.valve else None
+
+    async def _dropped(self, event: events.UploadEventArguments) -> None:
+        path = await self._kept(event)
+        event.sender.run_method("reset")
+        with errors_told():
+            await self._found(await aside(opened, path, event.file.name))
+
+    async def _chosen(self, text: str) -> None:
+        path = Path(text)
+        with errors_told():
+            await self._found(await aside(opened, path, path.name))
+
+    async def _found(self, found: Opened | Export) -> None:
+        if isinstance(found, Export):
+            self._desk.export = found
+            self.refresh()
+        else:
+            await self._take(found)
+
+    async def _take(self, found: Opened) -> None:
+        await aside(self._desk.take_recording, found)
+        self._desk.export = None
+        self.refresh()
+        self._changed()
+
+    async def _valve_dropped(self, event: events.UploadEventArguments) -> None:
+        path = await self._kept(event)
+        event.sender.run_method("reset")
+        with errors_told():
+            await self._take_valve(str(path))
+
+    async def _named(self, name: str | None) -> None:
+        if name is None or (self._desk.valve and self._desk.valve.name == name):
+            return
+        with errors_told():
+            await self._take_valve(name)
+
+    async def _take_valve(self, name: str) -> None:
+        await aside(self._desk.take_valve, named_valve(name))
+        self._show_name(name)
+        self.refresh()
+        self._changed()
+
+    async def _blind(self) -> None:
+        with errors_told():
+            await aside(self._desk.blind, secrets.randbelow(MOST_BLIND))
+            assert self._desk.valve is not None
+            self._show_name(self._desk.valve.name)
+            self.refresh()
+            self._changed()
+
+    def _show_name(self, name: str) -> None:
+        if name not in self._names.options:
+            self._names.options = [name, *self._names.options]
+        self._names.set_value(name)
+        self._names.update()
+
+    async def _kept(self, event: events.UploadEventArguments) -> Path:
+        """Keep a dropped file under its last name, which says what kind it is; nothing else of its path is taken."""
+        path = self._desk.folder / Path(event.file.name).name
+        await event.file.save(path)
+        return path
+
+
+def files_of(paths: Sequence[Path]) -> list[Path]:
+    """Return the recordings that a command line named, those of its folders too.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found += sorted(each for each in path.iterdir() if each.suffix.lower() in SUFFIXES)
+        elif path.is_file():
+            found.append(path)
+        else:
+            raise InputError(str(path), "is not there")
+    return found

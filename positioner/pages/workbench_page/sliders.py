@@ -1,0 +1,119 @@
+"""A slider for each parameter, a switch for each effect, and what undoes them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from nicegui import events, ui
+
+from positioner.pages.parts.telling import heading
+from positioner.pages.workbench_page.live_model import LiveModel
+from workbench.fit.fitted_parameter import Fitted
+from workbench.model.parameters import Parameter
+from workbench.report.units import parameter as in_words
+
+STEP = 0.0005
+"""Of the way of a slider: of a range of a factor 2500 a step is 0.4 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What shows one parameter."""
+
+    parameter: Parameter
+    slider: ui.slider
+    value: ui.label
+    factor: float
+    unit: str
+
+
+class Sliders:
+    """Sets a model by hand.
+
+    Args:
+        live: the model.
+        fitted: values and intervals of a fit, by the parameter's name.
+        moved: called while something moves,
+        settled: and when it has come to rest.
+    """
+
+    def __init__(
+        self, live: LiveModel, fitted: Mapping[str, Fitted], moved: Callable[[], None], settled: Callable[[], None]
+    ) -> None:
+        self._live = live
+        self._moved = moved
+        self._settled = settled
+        self._held = False
+        self._following = False
+        heading("Parameters")
+        self._rows = [self._row(each, fitted.get(each.name)) for each in live.parameters.values()]
+        self._switches: dict[str, ui.switch] = {}
+        if live.effects:
+            heading("Effects")
+            for name in live.effects:
+                self._switches[name] = ui.switch(
+                    name.rpartition("/")[2], value=True, on_change=lambda event, name=name: self._switched(name, event)
+                ).props(f'data-testid="switch-{name}"')
+        undo = ui.button("Undo", icon="undo", on_click=self._undo).props('outline no-caps dense data-testid="undo"')
+        undo.classes("q-mt-sm")
+        self._follow()
+
+    def _row(self, parameter: Parameter, fitted: Fitted | None) -> Row:
+        words, factor, unit = in_words(parameter.name)
+        with ui.column().classes("w-full").style("gap: 0"):
+            with ui.row().classes("w-full items-baseline justify-between no-wrap"):
+                ui.label(words)
+                value = ui.label().classes("number").props(f'data-testid="value-{parameter.name}"')
+            slider = ui.slider(min=0.0, max=1.0, step=STEP, value=self._live.share(parameter))
+            slider.props(f'aria-label="{words}" data-testid="slider-{parameter.name}"')
+            low, high = (factor * self._live.value_at(parameter, share) for share in (0.0, 1.0))
+            told = f"{low:.3g} to {high:.3g} {unit}"
+            if fitted is not None:
+                interval = " to ".join(f"{factor * each:.4g}" for each in (fitted.lower, fitted.upper))
+                told += f"; fitted {factor * fitted.value:.4g} ({interval})"
+            ui.label(told).classes("quiet")
+        slider.on_value_change(lambda event: self._dragged(parameter, event.value))
+        slider.on("change", self._released, args=[])
+        return Row(parameter, slider, value, factor, unit)
+
+    def _dragged(self, parameter: Parameter, share: float) -> None:
+        if self._following:
+            return
+        if not self._held:
+            self._live.keep()
+            self._held = True
+        self._live.move(parameter, share)
+        self._show_values()
+        self._moved()
+
+    def _released(self) -> None:
+        self._held = False
+        self._follow()
+        self._settled()
+
+    def _switched(self, name: str, event: events.ValueChangeEventArguments[bool]) -> None:
+        if self._following:
+            return
+        self._live.switch(name, bool(event.value))
+        self._moved()
+        self._settled()
+
+    def _undo(self) -> None:
+        if self._live.undo():
+            self._held = False
+            self._follow()
+            self._moved()
+            self._settled()
+
+    def _follow(self) -> None:
+        """Put every slider and switch to where the model is."""
+        self._following = True
+        for row in self._rows:
+            row.slider.set_value(self._live.share(row.parameter))
+        for name, switch in self._switches.items():
+            switch.set_value(name not in self._live.setting.off)
+        self._following = False
+        self._show_values()
+
+    def _show_values(self) -> None:
+        for row in self._rows:
+            row.value.set_text(f"{row.factor * self._live.value(row.parameter):.4g} {row.unit}")
