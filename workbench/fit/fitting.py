@@ -406,6 +406,11 @@ class BegunFit:
         ordered = sorted(found, key=lambda place: rough.cost(place.z, MIDDLE))
         return replace(self, places=_by_origins(ordered), through=True)
 
+    @property
+    def rms_m(self) -> float:
+        """The rms error of the best that its searches have come to so far, m."""
+        return self.error.rms_m((self.ends or self.places)[0].z)
+
     def settled(self, count: int) -> "BegunFit":
         """Bring at most so many more of the searches to where they stay."""
 

@@ -95,12 +95,17 @@ def facts(comparison: Comparison) -> str:
     )
 
 
-def _verdict(each: Comparison) -> Html:
+def headline(each: Comparison) -> tuple[str, str]:
+    """Return how a comparison is marked, good, open or bad, and its first words."""
     if each.adequate:
-        return verdict("good", "The model holds.", bullets(each.sentences))
+        return "good", "The model holds."
     if each.floor_m is None or not each.over_direction.count.sum():
-        return verdict("open", "This recording cannot judge the model.", bullets(each.sentences))
-    return verdict("bad", "The model does not hold. Where it fails:", bullets(each.sentences))
+        return "open", "This recording cannot judge the model."
+    return "bad", "The model does not hold. Where it fails:"
+
+
+def _verdict(each: Comparison) -> Html:
+    return verdict(*headline(each), bullets(each.sentences))
 
 
 def _key_figures(each: Comparison, stroke_m: float) -> Html:

@@ -20,7 +20,7 @@ from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
-from workbench.select.effect_search import EffectSearch, Progress
+from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
@@ -119,6 +119,7 @@ def diagnose(
     workers: int | None = None,
     on_preview: Callable[[tuple[TangentScore, ...]], None] | None = None,
     progress: Progress | None = None,
+    race: Race | None = None,
 ) -> Diagnosis:
     """Find the effects that a valve file lacks to explain a recording.
 
@@ -131,6 +132,7 @@ def diagnose(
         workers: threads, by default one a core; the result does not depend on it.
         on_preview: given the tangent preview as soon as it is there.
         progress: called with what is being done, and the fraction of it done.
+        race: called with each candidate's error as its search goes on.
 
     Raises:
         InputError: the recording holds too little or other units than SI, an unknown effect.
@@ -143,7 +145,7 @@ def diagnose(
     library = {each.written: each for each in named if each.written not in there and each.written not in unseen}
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
-    search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell)
+    search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell, race=race)
 
     base = search.base(valve)
     first = {name: each for name, each in library.items() if each.after not in library}

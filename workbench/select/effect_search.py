@@ -43,6 +43,8 @@ OUT_OF_RACE = 10.0
 """Factor on the cost of the best search of a step, above which an effect is not searched further."""
 
 Progress = Callable[[str, float], None]
+Race = Callable[[int, str, float], None]
+"""Told of a candidate that is refitted: step, effect, and the rms error, m, that its search has come to so far."""
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -62,6 +64,7 @@ class EffectSearch:
         seed: int,
         workers: int,
         progress: Progress,
+        race: Race | None = None,
     ) -> None:
         self._split = split
         self._library = library
@@ -69,6 +72,7 @@ class EffectSearch:
         self._seed = seed
         self._workers = workers
         self._progress = progress
+        self._race = race or (lambda _step, _name, _rms_m: None)
 
     def base(self, valve: ValveFile) -> EvaluatedModel:
         """Fit a valve as it is, without intervals.
@@ -281,6 +285,9 @@ class EffectSearch:
         found: dict[str, T] = {}
         for name, each in zip(by_name, on_threads(function, tuple(by_name.values()), self._workers), strict=True):
             found[name] = each
+            rms_m = _rms_so_far_m(each)
+            if rms_m is not None:
+                self._race(number, name, rms_m)
             self._progress(
                 f"step {number}: {what} {len(by_name)} effects", begin + (end - begin) * len(found) / len(by_name)
             )
@@ -296,6 +303,13 @@ def _parted(racers: Mapping[str, BegunFit]) -> tuple[dict[str, BegunFit], dict[s
     least = min((each.screening_cost for each in racers.values()), default=inf)
     fast = {name: each for name, each in racers.items() if each.screening_cost <= OUT_OF_RACE * least}
     return fast, {name: each for name, each in racers.items() if name not in fast}
+
+
+def _rms_so_far_m(found: object) -> float | None:
+    """Return the rms error, m, of what a search has come to; None if it was refused."""
+    if isinstance(found, BegunFit):
+        return found.rms_m
+    return found.fit.rms_m if isinstance(found, EvaluatedModel) else None
 
 
 def _best(step: EffectStep) -> EvaluatedModel:

@@ -4,11 +4,12 @@ Data change without the figure being built anew: `restyle` sends the lines that 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 from nicegui import ui
 
-from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.theme import LIGHT, Ink, Theme
 
 Figure = dict[str, Any]
 CONFIG = {"displaylogo": False, "scrollZoom": True, "responsive": True, "modeBarButtonsToRemove": ["lasso2d"]}
@@ -37,7 +38,9 @@ class FigureView:
         self.plot.run_plot_method("relayout", dict(changes))
 
     def _themed(self) -> Figure:
-        figure, ink = self._draw(), self._theme.ink
+        ink = self._theme.ink
+        changed = {getattr(LIGHT, each.name): getattr(ink, each.name) for each in fields(Ink)}
+        figure = _recoloured(self._draw(), changed)
         layout = dict(figure.get("layout", {}))
         layout |= {
             "paper_bgcolor": "rgba(0,0,0,0)",
@@ -49,3 +52,12 @@ class FigureView:
             if name.startswith(("xaxis", "yaxis")):
                 layout[name] = {**axis, "gridcolor": ink.grid, "linecolor": ink.grid, "tickcolor": ink.grid}
         return {"data": figure["data"], "layout": layout, "config": CONFIG}
+
+
+def _recoloured(part: Any, colours: Mapping[str, str]) -> Any:
+    """Return a figure, or a part of it, with the light theme's colours changed to those of the theme."""
+    if isinstance(part, dict):
+        return {key: _recoloured(value, colours) for key, value in part.items()}
+    if isinstance(part, list) and part and isinstance(part[0], dict):
+        return [_recoloured(each, colours) for each in part]
+    return colours.get(part, part) if isinstance(part, str) else part

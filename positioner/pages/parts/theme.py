@@ -16,6 +16,10 @@ body { font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neu
 .side { flex: 1 1 300px; min-width: min(300px, 100%); max-width: 520px; gap: 8px; }
 .wide { flex: 3 1 480px; min-width: min(480px, 100%); gap: 8px; }
 .together { display: flex; flex-flow: row wrap; gap: 16px; width: 100%; align-items: flex-start; }
+.w-full { width: 100%; }
+.q-uploader { width: 100%; max-height: none; }
+.q-uploader__list { min-height: 36px; padding: 4px; }
+.q-uploader__subtitle { display: none; }
 .number { font-variant-numeric: tabular-nums; }
 .figure { font-size: 1.5rem; font-weight: 600; line-height: 1.2; }
 .quiet { opacity: 0.75; font-size: 0.875rem; }

@@ -1,12 +1,14 @@
 """The workbench in a browser: open a recording, see where the model fails, drag, diagnose, add what is missing.
 
-Its files; the first four know no browser:
+Its files; those up to `search` know no browser:
 
     desk                            what lies on the desk of one tab
     opening                         from a file to a recording
     live_model                      the model run anew while a parameter moves
     time_figure, force_figures      what is drawn
+    background, search              long work in a process of its own; what it has told so far
     page                            the page of one tab
     open_panel                      where a recording and a valve come onto the desk
     compare_panel, sliders          measured and simulated; the parameters
+    search_panel, journal_panel     which effect is missing; what was added, and what is taken home
 """

@@ -12,6 +12,7 @@ from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.sliders import Sliders
 from positioner.pages.workbench_page.time_figure import LINES, MARKS, TimeFigure, Window, window_of
 from workbench.compare.comparison import Comparison
+from workbench.report.comparison_report import headline
 from workbench.report.units import length, of_stroke
 
 AROUND_S = 2.0
@@ -96,7 +97,7 @@ class ComparePanel:
         self._fit.set_text(f"{compared.fit_percent:.1f} %")
         self._said.clear()
         with self._said:
-            kind, first = _verdict(compared)
+            kind, first = headline(compared)
             ui.label(first).classes("text-weight-medium").props(f'data-testid="verdict" data-kind="{kind}"')
             sentences(compared.sentences, "sentences")
             stroke_m = self._live.valve.valve.stroke_m
@@ -156,14 +157,6 @@ def _figure_of_merit(what: str, name: str) -> ui.label:
     with ui.column().style("gap: 0"):
         ui.label(what).classes("quiet")
         return ui.label().classes("figure number").props(f'data-testid="{name}"')
-
-
-def _verdict(compared: Comparison) -> tuple[str, str]:
-    if compared.adequate:
-        return "good", "The model holds."
-    if compared.floor_m is None:
-        return "open", "This recording cannot judge the model."
-    return "bad", "The model does not hold. Where it fails:"
 
 
 def _largest_s(compared: Comparison) -> float:

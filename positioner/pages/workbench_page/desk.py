@@ -3,30 +3,46 @@
 A desk knows no browser. It stays while its tab is there, so a page that is loaded again finds it as it was.
 """
 
+import shlex
 import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, find_valve, load_valve
+from config.writing import valve_toml, write_valve
+from positioner.pages.workbench_page.background import Task, Work
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
+from positioner.pages.workbench_page.search import Search
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
 from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.fitting import Fit
+from workbench.select.extension import Extension
+from workbench.select.extension_journal import Journal, write_extended
 
 
 @dataclass(frozen=True, slots=True)
 class NamedValve:
-    """A valve file, by the name that a command line would give it."""
+    """A valve file: what it is called on the page, and where it lies."""
 
     name: str
     path: Path
     file: ValveFile
+
+
+@dataclass(frozen=True, slots=True)
+class JournalStep:
+    """What was added, and the valve before."""
+
+    before: NamedValve
+    extension: Extension
 
 
 @dataclass(slots=True)
@@ -34,6 +50,8 @@ class Desk:
     """The desk; `folder` is its own, for what was dropped on it and what is written for it."""
 
     folder: Path = field(default_factory=lambda: Path(tempfile.mkdtemp(prefix="positioner-workbench-")))
+    pages: int = 0
+    """How many pages show it: a page that is loaded anew is there before the old one is gone."""
     opened: Opened | None = None
     export: Export | None = None
     """A file whose columns are not confirmed yet."""
@@ -44,8 +62,13 @@ class Desk:
     """Values and intervals of the last fit, by the parameter's name."""
     variants: dict[str, Column] = field(default_factory=dict)
     """Positions, m, of other variants that are laid over, by the line's name."""
+    journal: tuple[JournalStep, ...] = ()
+    """What was added, in order."""
+    search: Search | None = None
+    """A search under way, or what the last one has come to."""
     sealed: Path | None = None
     """The folder of a blind case."""
+    _written: int = 0
 
     def take_recording(self, opened: Opened) -> None:
         """Put a recording on the desk.
@@ -54,6 +77,7 @@ class Desk:
             InputError: it cannot be simulated, or not with this valve.
         """
         self._held(opened, self.valve)
+        self.export = self.sealed = None
 
     def take_valve(self, valve: NamedValve) -> None:
         """Put a valve on the desk.
@@ -62,14 +86,6 @@ class Desk:
             InputError: it cannot be simulated with this recording.
         """
         self._held(self.opened, valve)
-
-    def _held(self, opened: Opened | None, valve: NamedValve | None) -> None:
-        """Hold a recording and a valve against each other; nothing changes where that fails."""
-        live = LiveModel(opened.recording, valve.file) if opened and valve else None
-        compared = live.comparison() if live else None
-        self.opened, self.valve, self.live, self.compared = opened, valve, live, compared
-        self.fitted = {}
-        self.variants = {"as opened": live.curve().simulated_m} if live else {}
 
     def blind(self, seed: int) -> None:
         """Put a sealed case on the desk: a recording with a hidden effect, and what is known of the valve.
@@ -81,8 +97,8 @@ class Desk:
         if not folder.exists():
             seal(folder, hide(seed))
         opened = Opened(f"blind case {seed}", folder / "fit.csv", Recording.read(folder / "fit.csv"))
-        self._held(opened, named_valve(str(folder / "valve.toml")))
-        self.sealed = folder
+        self._held(opened, named_valve(str(folder / "valve.toml"), "valve.toml"))
+        self.export, self.sealed = None, folder
 
     def compare(self) -> Comparison:
         """Compare the valve as it is set.
@@ -90,21 +106,125 @@ class Desk:
         Raises:
             InputError: there is none, or as `compare`.
         """
-        if self.live is None:
-            raise InputError("workbench", "open a recording and choose a valve first")
-        self.compared = self.live.comparison()
+        self.compared = self._model().comparison()
         return self.compared
 
+    def begin(self, what: str, task: Task, *arguments: Any) -> Search:
+        """Begin a search on the recording with the valve as it is set; one that is under way is stopped.
+
+        Raises:
+            InputError: there is no recording or no valve.
+        """
+        valve = self._model().valve
+        self.stop()
+        assert self.opened is not None
+        self.search = Search(what, valve, Work(task, self.opened.recording, valve, *arguments))
+        return self.search
+
+    def stop(self) -> None:
+        """Stop the search, if one is under way."""
+        if self.search is not None:
+            self.search.cancel()
+
+    def take_fit(self, found: Fit) -> None:
+        """Go on with a fitted valve.
+
+        Raises:
+            InputError: the valve file cannot be written.
+        """
+        path = self._path("fitted")
+        write_valve(path, found.valve)
+        self._go_on(NamedValve(path.name, path, found.valve), found.parameters)
+
+    def add(self, extension: Extension) -> None:
+        """Go on with an extended valve; the step joins the journal.
+
+        Raises:
+            InputError: the valve file cannot be written.
+        """
+        before = self.valve
+        assert before is not None
+        path = self._path("better")
+        write_extended(extension, before.path, path)
+        self._go_on(NamedValve(path.name, path, extension.valve), extension.extended.parameters)
+        self.journal = (*self.journal, JournalStep(before, extension))
+
+    def walk_back(self) -> None:
+        """Take the last step of the journal back.
+
+        Raises:
+            InputError: the journal is empty.
+        """
+        if not self.journal:
+            raise InputError("journal", "is empty")
+        *rest, last = self.journal
+        self._held(self.opened, last.before)
+        self.journal = tuple(rest)
+
+    @property
+    def toml(self) -> str:
+        """The valve file as it is set, with a remark for each step of the journal.
+
+        Raises:
+            InputError: there is none.
+        """
+        file = self._model().valve
+        remarks = Journal.beside(self.valve.path).remarks if self.valve else ()
+        return "".join(f"# {each}\n" for each in remarks) + valve_toml(file)
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """What does the same on a command line."""
+        if self.opened is None or self.valve is None:
+            return ()
+        first = self.journal[0].before if self.journal else self.valve
+        recording, words = self.opened.name, self.opened.words
+        lines = [("compare", recording, "--valve", first.name, *words)]
+        lines.append(("diagnose", recording, "--valve", first.name, *words))
+        given = first.name
+        for i, step in enumerate(self.journal, start=1):
+            out = f"better-{i}.toml"
+            effects = step.extension.effects
+            lines.append(("extend", given, "--effect", *effects, "--fit", recording, *words, "-o", out))
+            given = out
+        return tuple(shlex.join(("positioner", *line)) for line in lines)
+
     def clear(self) -> None:
-        """Remove what was written for it."""
+        """Stop what is under way, and remove what was written for it."""
+        self.stop()
         shutil.rmtree(self.folder, ignore_errors=True)
 
+    def _model(self) -> LiveModel:
+        if self.live is None:
+            raise InputError("workbench", "open a recording and choose a valve first")
+        return self.live
 
-def named_valve(text: str) -> NamedValve:
+    def _held(self, opened: Opened | None, valve: NamedValve | None) -> None:
+        """Hold a recording and a valve against each other, all found out before forgotten; if that fails, as it was."""
+        live = LiveModel(opened.recording, valve.file) if opened and valve else None
+        compared = live.comparison() if live else None
+        self.stop()
+        self.opened, self.valve, self.live, self.compared = opened, valve, live, compared
+        self.fitted, self.journal, self.search = {}, (), None
+        self.variants = {"as opened": live.curve().simulated_m} if live else {}
+
+    def _go_on(self, valve: NamedValve, fitted: Mapping[str, Fitted]) -> None:
+        """Take a valve that was found here: the one before stays laid over it, and the journal stays."""
+        journal, search, before = self.journal, self.search, self._model().curve().simulated_m
+        self._held(self.opened, valve)
+        self.journal, self.search, self.fitted = journal, search, fitted
+        self.variants = {"as opened": before, "fitted": self._model().curve().simulated_m}
+
+    def _path(self, name: str) -> Path:
+        self._written += 1
+        return self.folder / f"{name}-{self._written}.toml"
+
+
+def named_valve(text: str, name: str = "") -> NamedValve:
     """Return the valve that a person named: a path, or a shipped one's name.
 
     Raises:
         InputError: there is none, or it is wrong.
     """
     path = find_valve(text)
-    return NamedValve(text, path, load_valve(path))
+    return NamedValve(name or text, path, load_valve(path))

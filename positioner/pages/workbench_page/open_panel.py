@@ -38,6 +38,8 @@ class OpenPanel:
 
     def refresh(self) -> None:
         """Show what is on the desk."""
+        if self._desk.valve is not None:
+            self._show_name(self._desk.valve.name)
         self._mapping.clear()
         self._remarks.clear()
         desk = self._desk
@@ -78,9 +80,7 @@ class OpenPanel:
     def _valve(self) -> None:
         heading("Valve")
         shipped = sorted(path.stem for path in (SHIPPED / "valves").glob("*.toml"))
-        chosen = self._desk.valve.name if self._desk.valve else None
-        names = [*([chosen] if chosen and chosen not in shipped else []), *shipped]
-        self._names = ui.select(names, label="valve", value=chosen, on_change=lambda event: self._named(event.value))
+        self._names = ui.select(shipped, label="valve", on_change=lambda event: self._named(event.value))
         self._names.classes("w-full").props('data-testid="valve"')
         own = ui.upload(label="or drop a valve file, .toml", on_upload=self._valve_dropped, auto_upload=True)
         own.classes("w-full").props('flat bordered accept=".toml" data-testid="drop-valve"')
@@ -108,7 +108,7 @@ class OpenPanel:
                 told.clear()
                 with told:
                     sentences([*given, *(f"assumed: {each}" for each in assumed)], "assumed")
-                await self._take_valve(str(path))
+                await self._take_valve(str(path), path.name)
 
         ui.button("Make the valve", on_click=made).props("outline no-caps")
 
@@ -163,15 +163,13 @@ class OpenPanel:
 
     async def _take(self, found: Opened) -> None:
         await aside(self._desk.take_recording, found)
-        self._desk.export = None
-        self.refresh()
         self._changed()
 
     async def _valve_dropped(self, event: events.UploadEventArguments) -> None:
         path = await self._kept(event)
         event.sender.run_method("reset")
         with errors_told():
-            await self._take_valve(str(path))
+            await self._take_valve(str(path), path.name)
 
     async def _named(self, name: str | None) -> None:
         if name is None or (self._desk.valve and self._desk.valve.name == name):
@@ -179,18 +177,13 @@ class OpenPanel:
         with errors_told():
             await self._take_valve(name)
 
-    async def _take_valve(self, name: str) -> None:
-        await aside(self._desk.take_valve, named_valve(name))
-        self._show_name(name)
-        self.refresh()
+    async def _take_valve(self, text: str, name: str = "") -> None:
+        await aside(self._desk.take_valve, named_valve(text, name))
         self._changed()
 
     async def _blind(self) -> None:
         with errors_told():
             await aside(self._desk.blind, secrets.randbelow(MOST_BLIND))
-            assert self._desk.valve is not None
-            self._show_name(self._desk.valve.name)
-            self.refresh()
             self._changed()
 
     def _show_name(self, name: str) -> None:

@@ -10,10 +10,14 @@ from positioner.pages.parts.telling import errors_told, heading
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.compare_panel import ComparePanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
+from positioner.pages.workbench_page.journal_panel import JournalPanel
 from positioner.pages.workbench_page.open_panel import OpenPanel, files_of
 from positioner.pages.workbench_page.opening import Opened, opened
+from positioner.pages.workbench_page.search_panel import SearchPanel
 
 TITLE = "positioner workbench"
+MOST_LEFT = 10
+"""Desks that are kept though nobody sits at them: a page may be opened again."""
 
 
 class Workbench:
@@ -65,7 +69,20 @@ class Workbench:
         assert tab is not None
         with errors_told():
             self.desk(tab)
-        TabPage(self._desks[tab], theme, self._files)
+        desk = self._desks[tab]
+        desk.pages += 1
+        ui.context.client.on_delete(lambda: self._left(desk))
+        TabPage(desk, theme, self._files)
+
+    def _left(self, desk: Desk) -> None:
+        """Stop what nobody waits for any more, and forget the desks that were left longest ago."""
+        desk.pages -= 1
+        if desk.pages:
+            return
+        desk.stop()
+        left = [tab for tab, each in self._desks.items() if not each.pages]
+        for tab in left[: len(left) - MOST_LEFT]:
+            self._desks.pop(tab).clear()
 
 
 class TabPage:
@@ -75,18 +92,21 @@ class TabPage:
         self._desk = desk
         self._theme = theme
         with ui.column().classes("panel"):
-            OpenPanel(desk, files, self._changed)
+            self._open = OpenPanel(desk, files, self._changed)
             self._rest = ui.column().classes("w-full")
         self._changed()
 
     def _changed(self) -> None:
         """Show what goes with the recording and the valve on the desk."""
+        self._open.refresh()
         self._rest.clear()
         if self._desk.live is None:
             return
         with self._rest:
             heading("Model against measurement")
             ComparePanel(self._desk, self._theme)
+            SearchPanel(self._desk, self._theme, self._changed)
+            JournalPanel(self._desk, self._theme, self._changed)
 
 
 def serve_workbench(recordings: Sequence[Path], valve: str | None, where: Listening, *, opens_browser: bool) -> None:

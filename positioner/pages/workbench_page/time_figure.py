@@ -21,7 +21,7 @@ MOST = 3000
 """Points of a line in the window."""
 BESIDE = 0.5
 """Of the window, drawn on either side of it: panning finds something there."""
-LINES = ("measured", "as opened", "better", "model", "error as opened", "error better", "error", "command", "pressure",
+LINES = ("measured", "as opened", "fitted", "model", "error as opened", "error fitted", "error", "command", "pressure",
          "model's pressure")  # fmt: skip
 MARKS = ("missed slip", "spurious slip", "matched slip", "chosen")
 MARKED = {
@@ -64,7 +64,7 @@ class TimeFigure:
         return Window(0.0, float(self._along_s[-1]))
 
     def show(self, name: str, position_m: Column | None) -> None:
-        """Draw a model's position, m, (n,) and its error; `name` is as opened, better or model."""
+        """Draw a model's position, m, (n,) and its error; `name` is as opened, fitted or model."""
         error = "error" if name == "model" else f"error {name}"
         self._lines[name] = None if position_m is None else 1e3 * position_m
         measured = self._lines["measured"]
@@ -150,7 +150,7 @@ class TimeFigure:
 def _colour(name: str, ink: Ink) -> str:
     if name in ("measured", "pressure"):
         return ink.measured
-    if "better" in name:
+    if "fitted" in name:
         return ink.better
     return ink.quiet if "opened" in name or name == "command" else ink.model
 

@@ -1,0 +1,166 @@
+"""Long work in a process of its own: it tells how far it is, and can be stopped at any moment.
+
+A process and not a thread: a search on all processors leaves the page its own, and what is stopped is gone at once.
+"""
+
+import multiprocessing
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Protocol
+
+from config.errors import CommandFailed, InputError
+from config.recording import Recording
+from config.valve_file import ValveFile
+from workbench.fit.fitting import Fit, fit
+from workbench.select.diagnosis import Diagnosis, diagnose
+from workbench.select.extension import Extension, extend
+from workbench.select.tangent_preview import TangentScore
+
+FRESH = multiprocessing.get_context("spawn")
+"""A fork of a process with threads would hold their locks."""
+END_WITHIN_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Progressed:
+    """What is being done, and the fraction of it done."""
+
+    what: str
+    done: float
+
+
+@dataclass(frozen=True, slots=True)
+class Previewed:
+    """The tangent preview: no verdict."""
+
+    scores: tuple[TangentScore, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Raced:
+    """A candidate of a step, and the rms error, m, that its search has come to so far."""
+
+    step: int
+    name: str
+    rms_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """The result."""
+
+    result: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """Why there is none."""
+
+    said: str
+
+
+News = Progressed | Previewed | Raced | Finished | Failed
+Tell = Callable[[News], None]
+
+
+class Task(Protocol):
+    """What is done; it tells how far it is."""
+
+    def __call__(self, tell: Tell, /, *arguments: Any) -> Any:
+        """Do it, and return the result."""
+
+
+class Work:
+    """A task under way in a process of its own; its arguments and its result must pass between processes."""
+
+    def __init__(self, task: Task, *arguments: Any) -> None:
+        self._heard, said = FRESH.Pipe(duplex=False)
+        self._process = FRESH.Process(target=_work, args=(said, task, arguments), daemon=True)
+        self._process.start()
+        said.close()
+        self.is_over = False
+
+    def news(self) -> list[News]:
+        """Return what it has told since it was asked last; the last of all is Finished or Failed."""
+        told: list[News] = []
+        with suppress(EOFError):
+            while not self.is_over and self._heard.poll():
+                told.append(self._heard.recv())
+                self.is_over = isinstance(told[-1], Finished | Failed)
+            if self.is_over:
+                self._process.join(END_WITHIN_S)
+            return told
+        self.is_over = True
+        self._process.join(END_WITHIN_S)
+        return [*told, Failed(f"the work ended by itself, exit status {self._process.exitcode}")]
+
+    def cancel(self) -> None:
+        """Stop it, if it is not over."""
+        self.is_over = True
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join(END_WITHIN_S)
+        self._heard.close()
+
+
+def _work(said: Connection, task: Task, arguments: Sequence[Any]) -> None:
+    try:
+        end: News = Finished(task(said.send, *arguments))
+    except (InputError, CommandFailed) as error:
+        end = Failed(str(error))
+    except Exception as error:  # whatever it is, the page must say that there is no result
+        end = Failed(f"{type(error).__name__}: {error}")
+    said.send(end)
+
+
+def diagnosed(tell: Tell, recording: Recording, valve: ValveFile, effects: Sequence[str] | None) -> Diagnosis:
+    """Diagnose.
+
+    Args:
+        tell: is told preview, race and progress.
+        recording: of the valve.
+        valve: where the search begins.
+        effects: that are tried; None: all that come with the package.
+
+    Raises:
+        InputError: as `diagnose`.
+    """
+    return diagnose(
+        recording,
+        valve,
+        effects=effects,
+        on_preview=lambda scores: tell(Previewed(scores)),
+        progress=lambda what, done: tell(Progressed(what, done)),
+        race=lambda step, name, rms_m: tell(Raced(step, name, rms_m)),
+    )
+
+
+def extended(tell: Tell, recording: Recording, valve: ValveFile, effects: Sequence[str]) -> Extension:
+    """Add effects and refit.
+
+    Args:
+        tell: is told the progress.
+        recording: of the valve.
+        valve: that is extended.
+        effects: that are added together.
+
+    Raises:
+        InputError: as `extend`.
+    """
+    return extend(recording, valve, effects, progress=lambda what, done: tell(Progressed(what, done)))
+
+
+def refitted(tell: Tell, recording: Recording, valve: ValveFile) -> Fit:
+    """Fit a valve as it is, with intervals.
+
+    Args:
+        tell: is told the progress.
+        recording: of the valve.
+        valve: that is fitted.
+
+    Raises:
+        InputError: as `fit`.
+    """
+    return fit(recording, valve, progress=lambda done: tell(Progressed("fitting the valve as it is", done)))

@@ -1,0 +1,91 @@
+"""What was added, how the error fell, the way back, and what is taken home: valve file, report, command lines."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from nicegui import ui
+
+from positioner.pages.parts.figure_view import Figure, FigureView
+from positioner.pages.parts.telling import aside, errors_told, heading
+from positioner.pages.parts.theme import Theme
+from positioner.pages.workbench_page.desk import Desk
+from workbench.blind.sealing import reveal
+from workbench.report import Subject, report_comparison, report_diagnosis
+from workbench.report.ranking import error_reduction
+from workbench.report.units import LENGTH
+from workbench.select.diagnosis import Diagnosis
+
+FALL_PX = 320
+
+
+class JournalPanel:
+    """The panel; `changed` is called when another valve is on the desk."""
+
+    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[], None]) -> None:
+        self._desk = desk
+        self._changed = changed
+        if desk.journal:
+            heading("How the error fell")
+            FigureView(theme, self._drawn, FALL_PX, "how the error fell")
+            for number, step in enumerate(desk.journal, start=1):
+                added = ", ".join(step.extension.effects)
+                ui.label(f"{number}. {added}: {step.extension.summary().splitlines()[0]}").props(
+                    'data-testid="journal-step"'
+                )
+            back = ui.button("Take the last step back", icon="undo", on_click=self._back)
+            back.props('outline no-caps data-testid="back"')
+        heading("Take it home")
+        with ui.row():
+            ui.button("Valve file", icon="save", on_click=self._save).props('no-caps data-testid="save"')
+            ui.button("Report", icon="description", on_click=self._report).props("outline no-caps")
+            if desk.sealed is not None:
+                ui.button("Reveal what was hidden", icon="visibility", on_click=self._reveal).props("outline no-caps")
+        self._answer = ui.column()
+        ui.label("the same on a command line:").classes("quiet")
+        ui.code("\n".join(desk.commands), language="bash").classes("w-full")
+
+    def _drawn(self) -> Figure:
+        """Every model on the way, as the report of a journal draws it: fitted, held out, and the floor."""
+        stages = []
+        for number, step in enumerate(self._desk.journal, start=1):
+            for name, (train_m, test_m) in step.extension.stages.items():
+                if number == 1 or name.startswith("with"):
+                    stages.append((name, train_m, test_m))
+        return error_reduction(stages, self._desk.journal[-1].extension.split.floor_m, LENGTH)
+
+    async def _back(self) -> None:
+        with errors_told():
+            await aside(self._desk.walk_back)
+            self._changed()
+
+    def _save(self) -> None:
+        with errors_told():
+            assert self._desk.valve is not None
+            ui.download.content(self._desk.toml, self._desk.valve.name.removesuffix(".toml") + ".toml")
+
+    async def _report(self) -> None:
+        with errors_told():
+            path = self._desk.folder / "report.html"
+            await aside(self._write_report, path)
+            ui.download.content(path.read_bytes(), path.name, "text/html")
+
+    def _write_report(self, path: Path) -> None:
+        desk = self._desk
+        assert desk.opened is not None
+        assert desk.live is not None
+        valve = desk.search.valve if desk.search else desk.live.valve
+        subject = Subject(valve, (desk.opened.name,), desk.opened.recording.metadata)
+        if desk.search is not None and isinstance(desk.search.result, Diagnosis):
+            report_diagnosis(desk.search.result, path, subject, desk.commands)
+        else:
+            report_comparison(desk.compare(), path, subject)
+
+    def _reveal(self) -> None:
+        with errors_told():
+            assert self._desk.sealed is not None
+            _, answer = reveal(self._desk.sealed)
+            self._answer.clear()
+            with self._answer:
+                for effect in answer["effects"]:
+                    told = ", ".join(f"{key} = {value:.4g}" for key, value in effect.items() if key != "name")
+                    ui.label(f"hidden: {effect['name']}, {told}").props('data-testid="hidden"')

@@ -1,0 +1,65 @@
+"""A search under way, and what it has told so far: the race of the candidates, the preview, the progress."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from config.valve_file import ValveFile
+from positioner.pages.workbench_page.background import Failed, Finished, Previewed, Progressed, Raced, Work
+from workbench.select.tangent_preview import TangentScore
+
+PREVIEWED = 5
+
+
+@dataclass(slots=True)
+class Search:
+    """What a search of `valve` is for, in words, and what it has come to."""
+
+    what: str
+    valve: ValveFile
+    work: Work
+    doing: str = ""
+    done: float = 0.0
+    step: int = 0
+    race: dict[str, float] = field(default_factory=dict)
+    """The rms error, m, of each candidate of the step; the least that was told."""
+    preview: tuple[TangentScore, ...] = ()
+    result: Any = None
+    failed: str = ""
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it goes on."""
+        return not self.work.is_over
+
+    @property
+    def previewed(self) -> str:
+        """The preview in words; empty before."""
+        named = ", ".join(f"{each.name} {each.score:.2f}" for each in self.preview[:PREVIEWED])
+        return f"tangent preview, not a verdict: {named}" if named else ""
+
+    def look(self) -> bool:
+        """Take in what it has told since; whether there was anything."""
+        if self.work.is_over:
+            return False
+        news = self.work.news()
+        for each in news:
+            match each:
+                case Progressed(what, done):
+                    self.doing, self.done = what, done
+                case Previewed(scores):
+                    self.preview = scores
+                case Raced(step, name, rms_m):
+                    if step != self.step:
+                        self.step, self.race = step, {}
+                    self.race[name] = min(rms_m, self.race.get(name, rms_m))
+                case Finished(result):
+                    self.result, self.done = result, 1.0
+                case Failed(said):
+                    self.failed = said
+        return bool(news)
+
+    def cancel(self) -> None:
+        """Stop it."""
+        if self.is_running:
+            self.work.cancel()
+            self.failed = "cancelled"

@@ -1,0 +1,200 @@
+"""Diagnosis in the background: the race of the candidates as it runs, then the verdict, and what may be added."""
+
+from collections.abc import Callable, Sequence
+
+from nicegui import ui
+
+from positioner.pages.parts.figure_view import Figure, FigureView
+from positioner.pages.parts.telling import aside, errors_told, heading, tell_error
+from positioner.pages.parts.theme import Theme
+from positioner.pages.workbench_page.background import diagnosed, extended, refitted
+from positioner.pages.workbench_page.desk import Desk
+from positioner.pages.workbench_page.search import Search
+from sim.effect import tried_effects
+from workbench.fit.fitting import Fit
+from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
+from workbench.report.effects_table import headline
+from workbench.report.units import length
+from workbench.select.diagnosis import Diagnosis
+from workbench.select.effect_candidates import EffectCandidate
+from workbench.select.extension import Extension, extension_of
+
+LOOK_S = 0.2
+ROW_PX, FRAME_PX = 18, 70
+
+
+class SearchPanel:
+    """Begins searches and shows them; `changed` is called when another valve is on the desk."""
+
+    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[], None]) -> None:
+        self._desk = desk
+        self._theme = theme
+        self._changed = changed
+        heading("Which effect is missing?")
+        with ui.row().classes("w-full items-center"):
+            self._begin = ui.button("Diagnose", icon="search", on_click=self._diagnose)
+            self._begin.props('no-caps data-testid="diagnose"')
+            self._fit = ui.button("Fit the valve as it is", icon="tune", on_click=self._refit).props("outline no-caps")
+            self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
+                "outline no-caps color=negative"
+            )
+            names = ui.select(tried_effects(), label="effects tried (all)", multiple=True, clearable=True)
+            self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
+        with ui.column().classes("w-full") as self._progress:
+            self._doing = ui.label().props('data-testid="doing" aria-live="polite"')
+            self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
+            self._preview = ui.label().classes("quiet")
+        self._race = ui.column().classes("w-full")
+        self._raced: tuple[int, int] = (0, 0)
+        self._view: FigureView | None = None
+        self._result = ui.column().classes("w-full")
+        ui.timer(LOOK_S, self._look)
+        self._show()
+        self._show_race()
+        if desk.search is not None and desk.search.result is not None:
+            self._tell(desk.search)
+
+    def _diagnose(self) -> None:
+        with errors_told():
+            self._desk.begin("diagnose", diagnosed, self._names.value or None)
+        self._began()
+
+    def _refit(self) -> None:
+        with errors_told():
+            self._desk.begin("fit", refitted)
+        self._began()
+
+    def _extend(self, effects: Sequence[str]) -> None:
+        with errors_told():
+            self._desk.begin("extend", extended, tuple(effects))
+        self._began()
+
+    def _began(self) -> None:
+        self._result.clear()
+        self._show()
+        self._show_race()
+
+    def _stop(self) -> None:
+        self._desk.stop()
+        self._show()
+
+    async def _look(self) -> None:
+        """Show what the search has told since."""
+        search = self._desk.search
+        if search is None or not search.look():
+            return
+        self._show()
+        self._show_race()
+        if search.failed:
+            tell_error(search.failed)
+        elif search.result is not None:
+            await self._take(search)
+
+    async def _take(self, search: Search) -> None:
+        """Do what the search was for."""
+        with errors_told():
+            if isinstance(search.result, Fit):
+                await aside(self._desk.take_fit, search.result)
+                self._changed()
+            elif isinstance(search.result, Extension):
+                await aside(self._desk.add, search.result)
+                self._changed()
+            else:
+                self._tell(search)
+
+    def _show(self) -> None:
+        search = self._desk.search
+        running = search is not None and search.is_running
+        self._begin.set_enabled(not running)
+        self._fit.set_enabled(not running)
+        self._cancel.set_visibility(running)
+        self._progress.set_visibility(search is not None)
+        if search is not None:
+            self._bar.set_value(search.done)
+            self._bar.set_visibility(running)
+            said = f"{search.doing or 'starting'}: {search.done:.0%}" if running else search.failed
+            self._doing.set_text(said)
+            self._preview.set_text(search.previewed)
+
+    def _show_race(self) -> None:
+        """Draw the bars; a step with other candidates is another figure."""
+        search = self._desk.search
+        if search is None or not search.race:
+            self._race.clear()
+            self._view, self._raced = None, (0, 0)
+            return
+        if self._view is None or self._raced != (search.step, len(search.race)):
+            self._raced = (search.step, len(search.race))
+            self._race.clear()
+            with self._race:
+                height_px = FRAME_PX + ROW_PX * len(search.race)
+                self._view = FigureView(self._theme, self._drawn, height_px, "race of the candidates")
+        else:
+            self._view.redraw()
+
+    def _drawn(self) -> Figure:
+        search, compared = self._desk.search, self._desk.compared
+        race = {} if search is None else dict(sorted(search.race.items(), key=lambda each: -each[1]))
+        errors_mm = [1e3 * each for each in race.values()]
+        bars = {
+            "type": "bar", "orientation": "h", "x": errors_mm, "y": list(race), "marker": {"color": EXTENDED},
+            "hovertemplate": "%{y}: %{x:.4~g} mm<extra></extra>",
+        }  # fmt: skip
+        floor_m = compared.floor_m if compared else None
+        step = search.step if search else 1
+        return {
+            "data": [bars],
+            "layout": layout(
+                margin={"l": 10, "r": 10, "t": 8, "b": 40},
+                xaxis=axis(f"step {step}: fitted error with this effect added, mm rms", type="log"),
+                yaxis=axis("", tickfont={"size": 11}),
+                shapes=[] if floor_m is None else [marked(1e3 * floor_m, MEASURED)],
+                showlegend=False,
+            ),
+        }
+
+    def _tell(self, search: Search) -> None:
+        """Show the verdict and every candidate, each with why it was refused and a button that adds it."""
+        diagnosis: Diagnosis = search.result
+        self._result.clear()
+        kind, first = headline(diagnosis.verdict, diagnosis.missing)
+        with self._result:
+            ui.label(first).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
+            ui.label(diagnosis.sentence).props('data-testid="found-sentence"')
+            if diagnosis.verdict == "missing":
+                named = ", ".join(diagnosis.missing)
+                ui.button(f"Add {named}", icon="add", on_click=lambda: self._add_found(search)).props(
+                    'no-caps data-testid="add"'
+                )
+            if diagnosis.experiment is not None:
+                ui.label(f"An experiment would tell them apart: {diagnosis.experiment.name}.")
+            for number, step in enumerate(diagnosis.steps, start=1):
+                ui.label(f"step {number}: {length(step.before.errors.test_rmse_m).text} mm held out before").classes(
+                    "quiet"
+                )
+                self._candidates(step.candidates)
+
+    def _candidates(self, candidates: Sequence[EffectCandidate]) -> None:
+        heads = {"effect": "effect", "fitted": "fitted, mm", "test": "held out, mm", "bic": "evidence", "why": ""}
+        columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
+        rows = [
+            {
+                "effect": each.name,
+                "fitted": length(each.model.errors.train_rmse_m).text if each.model else "–",
+                "test": length(each.model.errors.test_rmse_m).text if each.model else "–",
+                "bic": f"{each.gain.bic:.1f}" if each.gain else "–",
+                "why": each.rejection_reason or "accepted",
+            }
+            for each in candidates
+        ]
+        table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
+        table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full")
+        table.on("row-click", lambda event: self._extend([event.args[1]["effect"]]))
+        ui.label("click an effect to add it all the same").classes("quiet")
+
+    async def _add_found(self, search: Search) -> None:
+        """Add what the diagnosis is sure of; nothing is fitted again."""
+        with errors_told():
+            extension = await aside(extension_of, search.result, search.valve)
+            await aside(self._desk.add, extension)
+            self._changed()
