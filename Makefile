@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint bench soak blind docs clean
+.PHONY: venv demo test suite lint browser bench soak blind docs clean
 
 venv: $(READY)
 
@@ -19,7 +19,7 @@ demo: $(READY)          ## a sticking valve identified and controlled over Modbu
 test: $(READY)          ## lint, types, import contracts and the whole test suite, at the same time
 	$(MAKE) --no-print-directory --jobs=2 suite lint
 
-suite: $(READY)
+suite: $(READY) browser
 	$(BIN)/pytest --numprocesses=auto
 
 lint: $(READY)
@@ -27,6 +27,11 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+browser:                ## Debian's Chromium, for the tests of the pages; where nobody may install it, they are skipped
+	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null || \
+	    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq --no-install-recommends chromium; } \
+	    >/dev/null || echo "no chromium to be had: the tests of the pages are skipped"
 
 bench: $(READY)         ## figures that depend on the machine, as ratios in one run
 	$(BIN)/python -m benchmarks

@@ -40,6 +40,10 @@ class Begun:
     def cost(self) -> float:
         return self.first.cost
 
+    @property
+    def rms_m(self) -> float:
+        return self.first.rms_m
+
     def landed(self) -> "Begun":
         return self
 

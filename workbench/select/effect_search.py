@@ -46,7 +46,7 @@ Progress = Callable[[str, float], None]
 Race = Callable[[int, str, float], None]
 """Told of a candidate that is refitted: step, effect, and the rms error, m, that its search has come to so far."""
 S = TypeVar("S")
-T = TypeVar("T")
+T = TypeVar("T", bound="BegunFit | EvaluatedModel | str")
 
 
 class EffectSearch:
@@ -305,11 +305,11 @@ def _parted(racers: Mapping[str, BegunFit]) -> tuple[dict[str, BegunFit], dict[s
     return fast, {name: each for name, each in racers.items() if name not in fast}
 
 
-def _rms_so_far_m(found: object) -> float | None:
+def _rms_so_far_m(found: BegunFit | EvaluatedModel | str) -> float | None:
     """Return the rms error, m, of what a search has come to; None if it was refused."""
-    if isinstance(found, BegunFit):
-        return found.rms_m
-    return found.fit.rms_m if isinstance(found, EvaluatedModel) else None
+    if isinstance(found, str):
+        return None
+    return found.fit.rms_m if isinstance(found, EvaluatedModel) else found.rms_m
 
 
 def _best(step: EffectStep) -> EvaluatedModel:

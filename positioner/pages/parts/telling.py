@@ -1,7 +1,7 @@
 """What a page says to a person: an error in its line, a list of sentences."""
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
 from typing import TypeVar
@@ -14,11 +14,13 @@ T = TypeVar("T")
 
 
 @contextmanager
-def errors_told() -> Iterator[None]:
-    """Say what a person did wrong instead of raising it."""
+def errors_told(names: Mapping[str, str] | None = None) -> Iterator[None]:
+    """Say what a person did wrong instead of raising it; `names`: what a source that errors name is called here."""
     try:
         yield
-    except (InputError, CommandFailed) as error:
+    except InputError as error:
+        tell_error(f"{(names or {}).get(error.source, error.source)}: {error.problem}")
+    except CommandFailed as error:
         tell_error(str(error))
 
 

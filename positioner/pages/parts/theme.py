@@ -11,7 +11,9 @@ from nicegui import ui
 STYLE = """
 body { font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
 .nicegui-content { padding: 0; gap: 0; align-items: stretch; }
-.q-header { flex-wrap: wrap; }
+body.body--dark { --q-primary: #3f92d0 !important; }
+.q-header { background: #1b5e8a !important; align-items: center; }
+.nicegui-code pre { white-space: pre-wrap; }
 .panel { padding: 12px 16px 24px; gap: 12px; width: 100%; max-width: 2560px; margin: 0 auto; }
 .side { flex: 1 1 300px; min-width: min(300px, 100%); max-width: 520px; gap: 8px; }
 .wide { flex: 3 1 480px; min-width: min(480px, 100%); gap: 8px; }
@@ -27,7 +29,10 @@ body { font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neu
 .said li { margin: 2px 0; }
 h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; }
 *:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
-@media (max-width: 599px) { .panel { padding: 8px 8px 24px; } }
+@media (max-width: 599px) { body.body--dark { --q-primary: #3f92d0 !important; }
+.q-header { background: #1b5e8a !important; align-items: center; }
+.nicegui-code pre { white-space: pre-wrap; }
+.panel { padding: 8px 8px 24px; } }
 """
 DARK_QUERY = 'matchMedia("(prefers-color-scheme: dark)").matches'
 

@@ -66,6 +66,8 @@ class Desk:
     """What was added, in order."""
     search: Search | None = None
     """A search under way, or what the last one has come to."""
+    found: Search | None = None
+    """The last diagnosis that has come to its end."""
     sealed: Path | None = None
     """The folder of a blind case."""
     _written: int = 0
@@ -158,8 +160,9 @@ class Desk:
         if not self.journal:
             raise InputError("journal", "is empty")
         *rest, last = self.journal
+        found = self.found
         self._held(self.opened, last.before)
-        self.journal = tuple(rest)
+        self.journal, self.found = tuple(rest), found
 
     @property
     def toml(self) -> str:
@@ -205,14 +208,15 @@ class Desk:
         compared = live.comparison() if live else None
         self.stop()
         self.opened, self.valve, self.live, self.compared = opened, valve, live, compared
-        self.fitted, self.journal, self.search = {}, (), None
+        self.fitted, self.journal, self.search, self.found = {}, (), None, None
         self.variants = {"as opened": live.curve().simulated_m} if live else {}
 
     def _go_on(self, valve: NamedValve, fitted: Mapping[str, Fitted]) -> None:
         """Take a valve that was found here: the one before stays laid over it, and the journal stays."""
-        journal, search, before = self.journal, self.search, self._model().curve().simulated_m
+        kept, before = (self.journal, self.search, self.found), self._model().curve().simulated_m
         self._held(self.opened, valve)
-        self.journal, self.search, self.fitted = journal, search, fitted
+        self.journal, self.search, self.found = kept
+        self.fitted = fitted
         self.variants = {"as opened": before, "fitted": self._model().curve().simulated_m}
 
     def _path(self, name: str) -> Path:

@@ -32,13 +32,14 @@ def force_figure(over: str, clouds: tuple[Forces, Forces], begin_s: float, windo
     """
     title, field = OVER[over]
     traces = []
-    for name, colour, cloud in (("measured", ink.measured, clouds[0]), ("model", ink.model, clouds[1])):
+    kinds = (("measured", ink.measured, clouds[0], "circle-open", 7), ("model", ink.model, clouds[1], "circle", 3))
+    for name, colour, cloud, symbol, size in kinds:
         rows = _thinned(cloud.friction_n.size)
         at_s = cloud.time_s[rows] - begin_s
         inside = (at_s >= window.begin_s) & (at_s <= window.end_s)
-        for seen, opacity, size in ((~inside, 0.15, 3), (inside, 0.85, 4)):
-            chosen = rows[seen]
-            traces.append(_cloud(name, colour, cloud, field, chosen, begin_s, {"opacity": opacity, "size": size}))
+        for seen, opacity in ((~inside, 0.15), (inside, 0.85)):
+            marker = {"opacity": opacity, "size": size, "symbol": symbol, "color": colour}
+            traces.append(_cloud(name, cloud, field, rows[seen], begin_s, marker))
     figure_layout = layout(
         margin={"l": 62, "r": 10, "t": 8, "b": 40},
         dragmode="select",
@@ -51,14 +52,14 @@ def force_figure(over: str, clouds: tuple[Forces, Forces], begin_s: float, windo
 
 
 def _cloud(
-    name: str, colour: str, cloud: Forces, field: str, rows: NDArray[np.int64], begin_s: float, marker: dict[str, Any]
+    name: str, cloud: Forces, field: str, rows: NDArray[np.int64], begin_s: float, marker: dict[str, Any]
 ) -> Figure:
     x: Column = getattr(cloud, field)
     return {
         "type": "scatter", "mode": "markers", "name": name,
         "x": rounded(1e3 * x[rows], 4), "y": rounded(cloud.friction_n[rows], 2),
         "customdata": rounded(cloud.time_s[rows] - begin_s, 4),
-        "marker": {"color": colour, **marker},
+        "marker": marker,
         "hovertemplate": "%{y:.4~g} N at %{x:.4~g}, %{customdata:.3f} s<extra>" + name + "</extra>",
     }  # fmt: skip
 

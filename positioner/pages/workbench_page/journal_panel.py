@@ -13,7 +13,6 @@ from workbench.blind.sealing import reveal
 from workbench.report import Subject, report_comparison, report_diagnosis
 from workbench.report.ranking import error_reduction
 from workbench.report.units import LENGTH
-from workbench.select.diagnosis import Diagnosis
 
 FALL_PX = 320
 
@@ -73,10 +72,10 @@ class JournalPanel:
         desk = self._desk
         assert desk.opened is not None
         assert desk.live is not None
-        valve = desk.search.valve if desk.search else desk.live.valve
+        valve = desk.found.valve if desk.found else desk.live.valve
         subject = Subject(valve, (desk.opened.name,), desk.opened.recording.metadata)
-        if desk.search is not None and isinstance(desk.search.result, Diagnosis):
-            report_diagnosis(desk.search.result, path, subject, desk.commands)
+        if desk.found is not None:
+            report_diagnosis(desk.found.result, path, subject, desk.commands)
         else:
             report_comparison(desk.compare(), path, subject)
 

@@ -146,7 +146,7 @@ class OpenPanel:
     async def _dropped(self, event: events.UploadEventArguments) -> None:
         path = await self._kept(event)
         event.sender.run_method("reset")
-        with errors_told():
+        with errors_told({str(path): event.file.name, "recording": event.file.name}):
             await self._found(await aside(opened, path, event.file.name))
 
     async def _chosen(self, text: str) -> None:
@@ -168,7 +168,7 @@ class OpenPanel:
     async def _valve_dropped(self, event: events.UploadEventArguments) -> None:
         path = await self._kept(event)
         event.sender.run_method("reset")
-        with errors_told():
+        with errors_told({str(path): path.name, "valve file": path.name}):
             await self._take_valve(str(path), path.name)
 
     async def _named(self, name: str | None) -> None:

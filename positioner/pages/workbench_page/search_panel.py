@@ -51,8 +51,8 @@ class SearchPanel:
         ui.timer(LOOK_S, self._look)
         self._show()
         self._show_race()
-        if desk.search is not None and desk.search.result is not None:
-            self._tell(desk.search)
+        if desk.found is not None:
+            self._tell(desk.found)
 
     def _diagnose(self) -> None:
         with errors_told():
@@ -100,6 +100,7 @@ class SearchPanel:
                 await aside(self._desk.add, search.result)
                 self._changed()
             else:
+                self._desk.found = search
                 self._tell(search)
 
     def _show(self) -> None:
@@ -146,7 +147,7 @@ class SearchPanel:
             "data": [bars],
             "layout": layout(
                 margin={"l": 10, "r": 10, "t": 8, "b": 40},
-                xaxis=axis(f"step {step}: fitted error with this effect added, mm rms", type="log"),
+                xaxis=axis(f"step {step}: fitted error with this effect added, mm rms", type="log", dtick="D2"),
                 yaxis=axis("", tickfont={"size": 11}),
                 shapes=[] if floor_m is None else [marked(1e3 * floor_m, MEASURED)],
                 showlegend=False,
@@ -157,11 +158,12 @@ class SearchPanel:
         """Show the verdict and every candidate, each with why it was refused and a button that adds it."""
         diagnosis: Diagnosis = search.result
         self._result.clear()
+        may_add = not self._desk.journal
         kind, first = headline(diagnosis.verdict, diagnosis.missing)
         with self._result:
             ui.label(first).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
             ui.label(diagnosis.sentence).props('data-testid="found-sentence"')
-            if diagnosis.verdict == "missing":
+            if diagnosis.verdict == "missing" and may_add:
                 named = ", ".join(diagnosis.missing)
                 ui.button(f"Add {named}", icon="add", on_click=lambda: self._add_found(search)).props(
                     'no-caps data-testid="add"'
@@ -172,9 +174,9 @@ class SearchPanel:
                 ui.label(f"step {number}: {length(step.before.errors.test_rmse_m).text} mm held out before").classes(
                     "quiet"
                 )
-                self._candidates(step.candidates)
+                self._candidates(step.candidates, may_add=may_add)
 
-    def _candidates(self, candidates: Sequence[EffectCandidate]) -> None:
+    def _candidates(self, candidates: Sequence[EffectCandidate], *, may_add: bool) -> None:
         heads = {"effect": "effect", "fitted": "fitted, mm", "test": "held out, mm", "bic": "evidence", "why": ""}
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         rows = [
@@ -189,8 +191,9 @@ class SearchPanel:
         ]
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full")
-        table.on("row-click", lambda event: self._extend([event.args[1]["effect"]]))
-        ui.label("click an effect to add it all the same").classes("quiet")
+        if may_add:
+            table.on("row-click", lambda event: self._extend([event.args[1]["effect"]]))
+            ui.label("click an effect to add it all the same").classes("quiet")
 
     async def _add_found(self, search: Search) -> None:
         """Add what the diagnosis is sure of; nothing is fitted again."""

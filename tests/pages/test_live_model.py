@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.recording import Column, Recording
+from config.valve_file import EffectTable, ValveFile, valve
+from positioner.pages.parts.theme import LIGHT
+from positioner.pages.workbench_page.live_model import LiveModel
+from positioner.pages.workbench_page.time_figure import LINES, TimeFigure, Window, window_of
+from workbench.blind.hiding import hide
+from workbench.compare.comparison import compare
+from workbench.data.record import ready
+
+HIDDEN = hide(7, duration_s=10.0)
+PRELOADED = ValveFile(
+    valve=HIDDEN.base.valve, effect=(EffectTable.model_validate({"name": "preload", "force_n": 100.0}),)
+)
+
+
+def test_it_says_what_compare_says() -> None:
+    live = LiveModel(HIDDEN.fit, HIDDEN.base)
+    assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-12)
+
+
+def test_a_move_is_a_parameter_of_the_valve_file_and_is_undone() -> None:
+    live = LiveModel(HIDDEN.fit, HIDDEN.base)
+    given = live.curve().rms_m
+    spring = live.parameters["spring_n_per_m"]
+    live.keep()
+    live.move(spring, live.share_of(spring, 50_000.0))
+    assert live.valve.valve.spring_n_per_m == pytest.approx(50_000.0)
+    assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, live.valve).rms_m, rel=1e-12)
+    assert live.undo()
+    assert live.curve().rms_m == given
+    assert not live.undo()
+
+
+@pytest.mark.parametrize("name", ["coulomb_n", "static_n", "preload.force_n", "mass_kg"])
+def test_a_slider_goes_over_the_whole_range_and_static_friction_never_falls_below_sliding(name: str) -> None:
+    live = LiveModel(HIDDEN.fit, PRELOADED)
+    moved = live.parameters[name]
+    for share in (0.0, 0.3, 1.0):
+        live.move(moved, share)
+        assert live.share(moved) == pytest.approx(share, abs=1e-9)
+        assert live.valve.valve.static_n >= live.valve.valve.coulomb_n * (1.0 - 1e-12)
+
+
+def test_an_effect_switched_off_is_the_valve_without_it() -> None:
+    live = LiveModel(HIDDEN.fit, PRELOADED)
+    live.switch("preload", False)
+    assert live.valve.effect == ()
+    assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-9)
+    live.switch("preload", True)
+    assert live.valve == PRELOADED
+
+
+def test_the_figure_keeps_extremes_and_every_sample_when_it_is_looked_at_closely() -> None:
+    count = 100_000
+    time_s: Column = 0.01 * np.arange(count, dtype=np.float64)
+    position_m = 0.05 + 0.02 * np.sin(0.01 * time_s)
+    position_m[77_777] += 1e-3
+    record = ready(Recording({"time_s": time_s, "command_pa": 1e5 * position_m, "position_m": position_m}))
+    figure = TimeFigure(record)
+    drawn = figure.data(("measured",))
+    assert len(drawn["y"][0]) < 4000
+    assert 1e3 * position_m[77_777] == pytest.approx(np.nanmax([each or np.nan for each in drawn["y"][0]]), rel=1e-3)
+    figure.window = Window(777.0, 778.0)
+    close = figure.data(("command",))
+    assert len(close["x"][0]) == pytest.approx(200, abs=5)
+    assert [each["name"] for each in figure.figure(LIGHT)["data"][: len(LINES)]] == list(LINES)
+
+
+def test_a_window_is_what_the_plot_says() -> None:
+    whole = Window(0.0, 9.0)
+    assert window_of({"xaxis.range[0]": 1, "xaxis.range[1]": 2.5}, whole) == Window(1.0, 2.5)
+    assert window_of({"xaxis.autorange": True}, whole) == whole
+    assert window_of({"xaxis.range": [1, 2]}, whole) == Window(1.0, 2.0)
+    assert window_of({"yaxis.range[0]": 1, "yaxis.range[1]": 2.5}, whole) is None
+
+
+def test_what_cannot_be_simulated_is_refused() -> None:
+    with pytest.raises(InputError, match="position_m"):
+        LiveModel(Recording({"time_s": np.arange(9.0), "command_pa": np.arange(9.0)}), valve("seed"))

@@ -1,0 +1,101 @@
+"""A person's way through the workbench page, in a real browser: from a dropped file to an error at the floor."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.pages.browser import needs_chromium, opened, served
+from workbench.blind.hiding import hide
+from workbench.blind.sealing import seal
+
+pytestmark = [pytest.mark.real_time, needs_chromium]
+
+SEED = 7
+"""Hides a preload."""
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("case")
+    seal(folder, hide(SEED, duration_s=10.0))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with served("workbench") as where:
+        yield where
+
+
+def drop(page: Page, where: str, path: Path) -> None:
+    page.get_by_test_id(where).locator("input[type=file]").set_input_files(path)
+
+
+def error_mm(page: Page) -> float:
+    return float(page.get_by_test_id("error").inner_text().removesuffix(" mm"))
+
+
+def shown(page: Page) -> None:
+    expect(page.locator(".scatterlayer .trace").first).to_be_visible()
+
+
+def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Path) -> None:
+    with opened(address) as page:
+        drop(page, "drop", case / "fit.csv")
+        expect(page.get_by_test_id("opened")).to_contain_text("1001 samples over 10 s")
+        drop(page, "drop-valve", case / "valve.toml")
+        expect(page.get_by_test_id("verdict")).to_have_attribute("data-kind", "bad")
+        shown(page)
+        given_mm = error_mm(page)
+
+        # Dragging changes the error, and undo takes it back.
+        slider = page.get_by_test_id("slider-spring_n_per_m")
+        slider.scroll_into_view_if_needed()
+        box = slider.bounding_box()
+        assert box is not None
+        middle_y = box["y"] + box["height"] / 2
+        page.mouse.move(box["x"] + box["width"] / 2, middle_y)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.6 * box["width"], middle_y, steps=3)
+        expect(page.get_by_test_id("error")).not_to_have_text(f"{given_mm:.3f} mm")
+        page.mouse.up()
+        page.get_by_test_id("undo").click()
+        expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.3f} mm")
+
+        # A diagnosis of two effects finds what is hidden; added, the error is at the floor.
+        page.get_by_test_id("effects").click()
+        for name in ("preload", "backlash"):
+            page.get_by_role("option", name=name, exact=True).click()
+        page.keyboard.press("Escape")
+        page.get_by_test_id("diagnose").click()
+        expect(page.get_by_test_id("found")).to_have_attribute("data-kind", "good")
+        expect(page.get_by_test_id("found-sentence")).to_contain_text("preload")
+        expect(page.get_by_test_id("candidates")).to_contain_text("more than 10 needed")
+        page.get_by_test_id("add").click()
+        expect(page.get_by_test_id("journal-step")).to_contain_text("falls from")
+        expect(page.get_by_test_id("verdict")).to_have_attribute("data-kind", "good")
+        with page.expect_download() as saved:
+            page.get_by_test_id("save").click()
+        assert 'name = "preload"' in Path(saved.value.path()).read_text()
+
+        # The page loaded again has it all, and the way back is there.
+        page.reload()
+        expect(page.get_by_test_id("journal-step")).to_contain_text("preload")
+        shown(page)
+        assert error_mm(page) < 0.01 * given_mm
+        page.get_by_test_id("back").click()
+        expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.3f} mm")
+
+
+def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, tmp_path: Path) -> None:
+    rubbish = tmp_path / "rubbish.csv"
+    rubbish.write_bytes(b"\x00\x01 no recording")
+    with opened(address, width_px=400, dark=True) as page:
+        expect(page.get_by_test_id("drop")).to_be_visible()
+        expect(page.get_by_test_id("opened")).to_have_count(0)
+        drop(page, "drop", rubbish)
+        expect(page.get_by_role("alert")).to_have_text(re.compile(r"^(warning)?rubbish\.csv: "))
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
