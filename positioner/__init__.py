@@ -14,6 +14,7 @@ docs/library.md has an example of each. The rooms:
     control      the pure core: supervision, states S0 to S3, the law
     daemon       gives it a bus, a clock and registers
     response     step-response figures of a recording
+    observer     a running daemon as a client sees it, never stale
     cli          the roof: one file a command
 """
 

@@ -110,6 +110,16 @@ class Dcs:
                 asked = ", ".join(f"{each.name} = {values[each.name]:g}" for each in run)
                 raise DcsError(f"{self._where}: {asked} was refused: {_in_words(error)}") from None
 
+    def set_and_read_back(self, name: str, value: float) -> float:
+        """Write a register; return what it reads once the daemon has decided on it.
+
+        Raises:
+            InputError, DcsError: as `set`.
+        """
+        self.set(name, value)
+        self._wait_for_a_cycle()
+        return self.get(name)
+
     def identify(
         self, excitation: Mapping[str, float], timeout_s: float, show: Callable[[float], None] = lambda _: None
     ) -> str | None:

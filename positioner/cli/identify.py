@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identify, print what was found, and whether the law uses it now."""
-    from config.codes import Mode
     from config.errors import CommandFailed
+    from positioner.observer.permissives import IDENTIFY_READS, identify_permissives
 
     asked = {
         "alpha": arguments.alpha_pa,
@@ -32,10 +32,9 @@ def run(arguments: argparse.Namespace) -> int:
         "omega": arguments.omega_rad_per_s,
     }
     with connected(arguments) as dcs:
-        if dcs.get("mode") != Mode.AUTOMATIC:
-            raise CommandFailed(
-                "the mode is not automatic, so nothing may move the valve: positioner set mode automatic"
-            )
+        for permissive in identify_permissives(dcs.get_all(*IDENTIFY_READS)):
+            if not permissive.holds:
+                raise CommandFailed(permissive.remedy)
         excitation = {name: value for name, value in asked.items() if value is not None}
         return _report(dcs, dcs.identify(excitation, arguments.timeout_s))
 

@@ -1,0 +1,16 @@
+"""A running daemon as an observer knows it, over Modbus alone: polled, kept for minutes, said in words, never stale.
+
+`ValveView` takes readings with their time and says at any time what is of now; it needs no browser and no clock.
+
+    valve_view                      what is known of one valve, and what has changed
+    freshness                       whether what was read last is still so
+    trends                          the last minutes, with their gaps, and the states as bands
+    words                           codes, causes and estimates in words
+    poller                          reads a daemon in a thread of its own
+    last_moves                      the last minutes as a recording, and the response figures of their steps
+    permissives, valve_commands     what must hold, and what an operator may do, confirmed by what is read back
+"""
+
+from positioner.observer.valve_view import SeenEvent, ValvePicture, ValveView
+
+__all__ = ["SeenEvent", "ValvePicture", "ValveView"]

@@ -1,0 +1,85 @@
+"""The last minutes as a recording: at full rate from the daemon's recorder where it can be read, else as polled."""
+
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from config.recording import Column, Recording
+from positioner.daemon.recorder import COLUMNS, files_of
+from positioner.observer.valve_view import ValveView
+from positioner.response import ResponseFigures, respond
+
+LONGEST_TAIL_BYTES = 12_000_000
+"""Some two minutes at 1 kHz."""
+
+
+@dataclass(frozen=True, slots=True)
+class LastMoves:
+    """The last minutes, where they come from, in words, and the response figures of their steps."""
+
+    recording: Recording
+    source: str
+    response: ResponseFigures
+
+
+def last_moves(view: ValveView, begin_s: float, folder: Path | None, valve: str, seconds: float) -> LastMoves | None:
+    """Return the last minutes of a valve, None while nothing was measured.
+
+    Args:
+        view: the valve as polled.
+        begin_s: where its last minutes begin, on its clock.
+        folder: where the daemon records, None where it does not, or cannot be read from here.
+        valve: the name that the daemon records it by.
+        seconds: how much of the recording.
+    """
+    recording = None if folder is None else recorded_tail(folder, valve, seconds)
+    source = "the daemon's recording, at its full rate"
+    if recording is None:
+        recording, source = (
+            polled(view.trend(begin_s)),
+            "as polled: the daemon's recording is off, or not on this machine",
+        )
+    return None if recording is None else LastMoves(recording, source, respond(recording))
+
+
+def polled(trend: dict[str, Column]) -> Recording | None:
+    """Return what was polled as a recording, without what was lost; None where there is nothing."""
+    whole = np.isfinite(trend["position_m"]) & np.isfinite(trend["command_pa"])
+    if not whole.any():
+        return None
+    return Recording({name: column[whole] for name, column in trend.items()})
+
+
+def recorded_tail(folder: Path, valve: str, seconds: float) -> Recording | None:
+    """Return the last seconds that were recorded; None where there is no recording that can be read."""
+    try:
+        newest = files_of(folder, valve)[-2:]
+        lines = b"".join(_tail(file) for file in newest)
+    except (OSError, ValueError):
+        return None
+    table = _table(lines)
+    if not len(table):
+        return None
+    recent = table[table[:, 0] >= table[-1, 0] - seconds]
+    return Recording({name: np.ascontiguousarray(recent[:, index]) for index, name in enumerate(COLUMNS)})
+
+
+def _tail(file: Path) -> bytes:
+    """Return the last whole rows of a recording."""
+    with file.open("rb") as opened:
+        size = opened.seek(0, os.SEEK_END)
+        start = opened.seek(max(0, size - LONGEST_TAIL_BYTES // 2))
+        data = opened.read()
+    begin = data.find(b"\n") + 1 if start else 0
+    return data[begin : data.rfind(b"\n") + 1]
+
+
+def _table(lines: bytes) -> Column:
+    """Return the rows, (n, columns), without comments and headers."""
+    rows = b"\n".join(line for line in lines.splitlines() if line[:1] in b"-0123456789" and line)
+    if not rows:
+        return np.empty((0, len(COLUMNS)))
+    return np.loadtxt(io.BytesIO(rows), delimiter=",", ndmin=2)

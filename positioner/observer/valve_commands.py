@@ -1,0 +1,135 @@
+"""What an operator does to a valve, within the rights of a role, and confirmed by what the daemon reads back.
+
+The rights are those of the register table (`Register.writer`), which a daemon with certificates asks for itself. Each
+command has a connection of its own. Nothing is written on values that are not of now.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from threading import Event
+
+from config.codes import Fault, Mode
+from config.errors import CommandFailed, InputError
+from config.registers import register_named
+from config.roles import Role
+from positioner.dcs import Dcs
+from positioner.observer.permissives import identify_permissives
+from positioner.observer.valve_view import ValvePicture
+from positioner.observer.words import CODES, code_text
+
+SAME = 1e-6
+"""Of a value that was written and the one that is read back: a float32 has 24 bits."""
+IDENTIFY_WITHIN_S = 600.0
+EXCITATION = ("eta_1", "eta_2", "eta_3")
+
+
+@dataclass(frozen=True, slots=True)
+class Confirmation:
+    """What became of a command, in one line."""
+
+    done: bool
+    text: str
+
+
+class BrokenOff(CommandFailed):
+    """An identification was broken off by whoever asked for it."""
+
+
+def refusal_for(role: Role, *registers: str) -> str | None:
+    """Return why a role may not write these registers, None where it may.
+
+    >>> refusal_for(Role.OPERATOR, "reference"), refusal_for(Role.OPERATOR, "mode")
+    (None, 'mode needs the role engineer')
+    """
+    for name in registers:
+        needed = register_named(name).writer
+        if role < needed:
+            return f"{name} needs the role {needed.name.lower()}"
+    return None
+
+
+class ValveCommands:
+    """Commands to one valve.
+
+    Args:
+        connect: returns a closed connection for a role.
+        picture: returns what is known of the valve now.
+    """
+
+    def __init__(self, connect: Callable[[Role], Dcs], picture: Callable[[], ValvePicture]) -> None:
+        self._connect = connect
+        self._picture = picture
+        self._break_off = Event()
+
+    def set(self, role: Role, name: str, value: float) -> Confirmation:
+        """Write a register; confirmed when it reads back so."""
+
+        def written(dcs: Dcs) -> Confirmation:
+            read = dcs.set_and_read_back(name, value)
+            said = code_text(name, read) if name in CODES else f"{read:.6g}"
+            if abs(read - value) <= SAME * max(1.0, abs(value)):
+                return Confirmation(True, f"{name} is {said}, as read back")
+            return Confirmation(False, f"{name} was written, but reads back {said}")
+
+        return self._within_rights(role, (name,), written)
+
+    def set_mode(self, role: Role, mode: Mode) -> Confirmation:
+        """Change who commands the pressure."""
+        return self.set(role, "mode", mode)
+
+    def set_reference(self, role: Role, reference_pu: float) -> Confirmation:
+        """Ask for a position."""
+        return self.set(role, "reference", reference_pu)
+
+    def acknowledge(self, role: Role) -> Confirmation:
+        """Acknowledge a fault; confirmed when none is latched any more."""
+
+        def written(dcs: Dcs) -> Confirmation:
+            dcs.set_and_read_back("acknowledge", 1)
+            fault = dcs.get("fault")
+            gone = fault == Fault.NONE
+            said = "no fault is latched any more" if gone else f"the fault stays: {code_text('fault', fault)}"
+            return Confirmation(gone, f"acknowledged, {said}")
+
+        return self._within_rights(role, ("acknowledge",), written)
+
+    def identify(self, role: Role, excitation: Mapping[str, float], show: Callable[[float], None]) -> Confirmation:
+        """Identify the valve, which moves it; returns when it is over. Refused where a permissive does not hold.
+
+        Args:
+            role: of who asks.
+            excitation: alpha, beta, omega as far as they are to differ from what the daemon has.
+            show: called with the progress, 0 to 1.
+        """
+
+        def shown(progress: float) -> None:
+            if self._break_off.is_set():
+                raise BrokenOff("broken off; the law has the command again")
+            show(progress)
+
+        def identified(dcs: Dcs) -> Confirmation:
+            for permissive in identify_permissives(self._picture().values):
+                if not permissive.holds:
+                    return Confirmation(False, permissive.remedy)
+            self._break_off.clear()
+            problem = dcs.identify(excitation, IDENTIFY_WITHIN_S, shown)
+            return Confirmation(problem is None, f"not applied: {problem}" if problem else "identified and applied")
+
+        return self._within_rights(role, (*EXCITATION, *excitation), identified)
+
+    def break_off(self) -> None:
+        """Break off the identification that is under way, if one is."""
+        self._break_off.set()
+
+    def _within_rights(
+        self, role: Role, registers: tuple[str, ...], written: Callable[[Dcs], Confirmation]
+    ) -> Confirmation:
+        if refusal := refusal_for(role, *registers):
+            return Confirmation(False, refusal)
+        if stale := self._picture().freshness.daemon:
+            return Confirmation(False, f"nothing was written: {stale}")
+        try:
+            with self._connect(role) as dcs:
+                return written(dcs)
+        except (CommandFailed, InputError) as failed:
+            return Confirmation(False, str(failed))

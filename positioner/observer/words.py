@@ -1,0 +1,105 @@
+"""What a valve's registers say, in words: the texts of `config.codes`, never others."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from config.codes import (
+    Code,
+    ExperimentState,
+    Fault,
+    InhibitReason,
+    Mode,
+    Ne107Cause,
+    Ne107Status,
+    Quality,
+    Refusal,
+    Restored,
+    State,
+)
+from config.quantities import DeviceStatus
+from config.registers import BY_NAME, ESTIMATED
+
+CODES: dict[str, type[Code]] = {
+    "mode": Mode,
+    "state": State,
+    "fault": Fault,
+    "quality": Quality,
+    "why": InhibitReason,
+    "restored": Restored,
+    "refusal": Refusal,
+    "ne107": Ne107Status,
+    "ne107_cause": Ne107Cause,
+    "experiment_state": ExperimentState,
+}
+"""The code that each register of one serves."""
+
+IDENTIFIED = (*ESTIMATED, "breakaway", "static_slope", "static_up", "static_down")
+"""All that has a value, a standard deviation and a reason."""
+
+NORMAL_95 = 1.96
+"""Standard deviations on either side of 95 % of a normal distribution."""
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateInWords:
+    """An estimate with the half width of its 95 % interval, in its unit; NaN and the reason where it is refused."""
+
+    name: str
+    text: str
+    unit: str
+    value: float
+    half_width: float
+    refusal: str
+
+    @property
+    def valid(self) -> bool:
+        """Whether it may be used."""
+        return not self.refusal
+
+
+def code_text(register: str, value: float) -> str:
+    """Return what a register of a code says; of a number that this version does not know, the number.
+
+    >>> code_text("mode", 2), code_text("fault", 99), code_text("why", math.nan)
+    ('automatic', 'code 99, which this version does not know', 'unknown')
+    """
+    if not math.isfinite(value):
+        return "unknown"
+    try:
+        return CODES[register](int(value)).text
+    except ValueError:
+        return f"code {int(value)}, which this version does not know"
+
+
+def ne107_causes(bits: float) -> list[str]:
+    """Return all causes behind an NE 107 status, first the one that decides.
+
+    >>> ne107_causes(0b100000010)
+    ['not automatic', 'friction low: packing leaks']
+    """
+    number = int(bits) if math.isfinite(bits) else 0
+    return [code_text("ne107_cause", bit + 1) for bit in range(number.bit_length()) if number >> bit & 1]
+
+
+def device_status(word: float) -> str:
+    """Return what the device says of itself.
+
+    >>> device_status(0), device_status(6)
+    ('healthy', 'sensor fault, not ready')
+    """
+    number = int(word) if math.isfinite(word) else 0
+    said = [(each.name or "").lower().replace("_", " ") for each in DeviceStatus if number & each]
+    return ", ".join(said) or "healthy"
+
+
+def estimates_in_words(values: Mapping[str, float]) -> Iterator[EstimateInWords]:
+    """Yield each estimate that was read, with its interval or why there is none."""
+    for name in IDENTIFIED:
+        register = BY_NAME[f"{name}_e"]
+        if f"{name}_reason" not in values:
+            continue
+        valid = bool(values[f"{name}_valid"])
+        refusal = "" if valid else code_text("refusal", values[f"{name}_reason"])
+        value, std = (values[f"{name}_{what}"] if valid else math.nan for what in ("e", "std"))
+        yield EstimateInWords(name, register.text, register.unit, value, NORMAL_95 * std, refusal)
