@@ -32,6 +32,7 @@ COMMANDS = (
     "diagnose",
     "extend",
     "workbench",
+    "page",
     "reproduce",
     "hide",
     "certificates",

@@ -49,7 +49,7 @@ def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *,
         InputError: the address cannot be had, or needs a password and has none.
     """
     if not where.password and not _is_own(where.host):
-        raise InputError("--host", f"{where.host} can be reached by others: it needs a password, --password-file FILE")
+        raise InputError(where.host, "can be reached by others: to listen there needs a password, --password-file FILE")
     bound = _bound(where)
     port = bound.getsockname()[1]
     key = secrets.token_urlsafe(24)

@@ -73,6 +73,10 @@ class Theme:
         """Have it called when the colours change."""
         self._listeners.append(redraw)
 
+    def forget(self) -> None:
+        """Call nobody any more: what drew is gone."""
+        self._listeners.clear()
+
     def choose(self, dark: bool) -> None:
         """Make it dark or light."""
         self.is_dark = dark

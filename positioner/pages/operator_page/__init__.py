@@ -1,0 +1,16 @@
+"""Running valves in a browser: live values and trends of daemons, in words; commands within the rights of a role.
+
+A process of its own that reads daemons as any Modbus client does. What it says comes from `positioner.observer`, and so
+does what counts as live: a page that shows a value that is not of now greys it and says why.
+
+Its files:
+
+    page                    the page of one tab: all valves, or one in full
+    watched_valves          the valves that it looks at, their pollers and connections
+    overview, valve_panel   a line a valve; all of one
+    trend_plot              reference, position and pressure as they come, the states as bands
+    friction_plot           friction against its baseline, a row a minute
+    controls                signing in; mode, reference, identification, acknowledgement
+    role_passwords          the passwords of operator and engineer, kept in a file as scrypt leaves them
+    facts, units            what is said of a valve, a line each; the units it is said in
+"""

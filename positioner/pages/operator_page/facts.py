@@ -1,0 +1,124 @@
+"""What the page says of a valve, a line each: label, text, and what is to be stressed. Pure: no browser, no clock."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from config.codes import Fault, Ne107Status
+from config.registers import BY_NAME
+from positioner.observer.valve_view import ValvePicture
+from positioner.observer.words import EstimateInWords, device_status, estimates_in_words, ne107_causes
+from positioner.pages.operator_page.units import NO_NUMBER, Unit, Units
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A line: what, and its value in words; `help` is what the register table says of it."""
+
+    label: str
+    text: str
+    help: str = ""
+
+
+NE107_LETTER = {
+    Ne107Status.GOOD: "",
+    Ne107Status.MAINTENANCE_REQUIRED: "M",
+    Ne107Status.OUT_OF_SPECIFICATION: "S",
+    Ne107Status.FUNCTION_CHECK: "C",
+    Ne107Status.FAILURE: "F",
+}
+
+
+def figures(picture: ValvePicture, stroke_m: float, units: Units) -> dict[str, str]:
+    """Return the figures that are read from afar, by register; a measurement that is old is none."""
+    position, pressure = units.position_unit(stroke_m), units.pressure
+    measured = picture.value if picture.freshness.measured_live else (lambda _: math.nan)
+    return {
+        "reference": position.text(picture.value("reference_in_force") * stroke_m),
+        "position": position.text(measured("position_m")),
+        "pressure": pressure.text(measured("pressure")),
+        "command": pressure.text(picture.value("command")),
+    }
+
+
+def status(picture: ValvePicture) -> list[Fact]:
+    """Return mode, state, fault, why and the rest in words."""
+    said = [
+        Fact(label, picture.text(name), BY_NAME[name].text)
+        for label, name in (("mode", "mode"), ("state", "state"), ("fault", "fault"), ("doing as asked", "why"))
+    ]
+    return [
+        *said,
+        Fact("measurement", picture.freshness.measurement or picture.text("quality"), BY_NAME["quality"].text),
+        Fact("device", device_status(picture.value("device_status")), BY_NAME["device_status"].text),
+        Fact("knowledge from before", picture.text("restored"), BY_NAME["restored"].text),
+        Fact("experiment", picture.text("experiment_state"), BY_NAME["experiment_state"].text),
+    ]
+
+
+def is_faulty(picture: ValvePicture) -> bool:
+    """Return whether a fault is latched."""
+    return picture.value("fault") != Fault.NONE
+
+
+def condition(picture: ValvePicture) -> tuple[str, str, list[str]]:
+    """Return the NE 107 status, a letter (empty: good) and words, and all its causes, the deciding one first."""
+    number = picture.value("ne107")
+    known = math.isfinite(number) and int(number) in {int(each) for each in Ne107Status}
+    letter = NE107_LETTER[Ne107Status(int(number))] if known else "?"
+    causes = ne107_causes(picture.value("ne107_causes"))
+    decides = picture.text("ne107_cause")
+    return letter, picture.text("ne107"), sorted(causes, key=lambda each: each != decides)
+
+
+def cycle(picture: ValvePicture) -> list[Fact]:
+    """Return how the daemon's loop goes."""
+    milli = Unit("ms", 1e3, 3)
+    times = [("period", "period"), ("jitter, 99 %", "jitter_99"), ("time of a cycle", "cycle_time")]
+    counts = [
+        ("cycles", "cycles"),
+        ("missed periods", "missed_periods"),
+        ("lost samples", "lost_samples"),
+        ("lost replies", "lost_replies"),
+        ("not recorded", "unrecorded"),
+    ]
+    return [
+        *(Fact(label, milli.text(picture.value(name)), BY_NAME[name].text) for label, name in times),
+        Fact("age of the sample", Unit("s", 1.0, 3).text(picture.value("sample_age")), BY_NAME["sample_age"].text),
+        *(Fact(label, _count(picture.value(name)), BY_NAME[name].text) for label, name in counts),
+        Fact("daemon started anew", f"{picture.restarts} times since this page looks"),
+    ]
+
+
+def wear(picture: ValvePicture, units: Units) -> list[Fact]:
+    """Return friction against its baseline, and what is counted of wear."""
+    ratio = picture.value("friction_ratio")
+    return [
+        Fact("friction", units.pressure.text(picture.value("friction")), BY_NAME["friction"].text),
+        Fact("baseline", units.pressure.text(picture.value("friction_baseline")), BY_NAME["friction_baseline"].text),
+        Fact("friction / baseline", _figure(ratio), BY_NAME["friction_ratio"].text),
+        Fact("stiction index", _figure(picture.value("stiction_index")), BY_NAME["stiction_index"].text),
+        Fact("moves judged", _count(picture.value("moves_judged")), BY_NAME["moves_judged"].text),
+        Fact("travel", f"{_figure(picture.value('travel'))} strokes", BY_NAME["travel"].text),
+        Fact("reversals", _count(picture.value("reversals")), BY_NAME["reversals"].text),
+    ]
+
+
+def estimates(picture: ValvePicture) -> Iterator[tuple[str, str, str]]:
+    """Yield name, value with its 95 % interval or why it is refused, and what it is, of each estimate."""
+    for each in estimates_in_words(picture.values):
+        yield each.name, _interval(each), each.text
+
+
+def _interval(each: EstimateInWords) -> str:
+    if not each.valid:
+        return f"refused: {each.refusal}"
+    return f"{each.value:.5g} ± {each.half_width:.2g} {'' if each.unit == '1' else each.unit}".rstrip()
+
+
+def _count(value: float) -> str:
+    return f"{int(value):,}".replace(",", " ") if math.isfinite(value) else NO_NUMBER
+
+
+def _figure(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else NO_NUMBER

@@ -1,0 +1,120 @@
+"""The page of one tab: all valves, or one in full; ten times a second what changes by the reading."""
+
+import time
+from collections.abc import Sequence
+
+from nicegui import ui
+
+from positioner.pages.operator_page.controls import Door, SignedIn
+from positioner.pages.operator_page.overview import Overview
+from positioner.pages.operator_page.units import PERCENT, POSITIONS, PRESSURES, Units
+from positioner.pages.operator_page.valve_panel import STYLE, ValvePanel
+from positioner.pages.operator_page.watched_valves import Place, WatchedValve, watching
+from positioner.pages.parts.server import Listening, serve
+from positioner.pages.parts.sessions import SignIn
+from positioner.pages.parts.theme import Theme
+
+TITLE = "positioner"
+TICK_S = 0.1
+REFRESH_EVERY = 5
+ALL = "all valves"
+
+
+def serve_valves(places: Sequence[Place], where: Listening, sign_in: SignIn | None, *, opens_browser: bool) -> None:
+    """Serve the page of these valves until the process is told to end.
+
+    Raises:
+        InputError: the address cannot be had, or needs a password and has none.
+    """
+    with watching(places) as valves:
+
+        async def build() -> None:
+            await Tab(valves, sign_in).build()
+
+        serve(TITLE, build, where, opens_browser=opens_browser)
+
+
+class Tab:
+    """What one tab shows."""
+
+    def __init__(self, valves: list[WatchedValve], sign_in: SignIn | None) -> None:
+        self._valves = valves
+        self._units = Units()
+        self._signed = SignedIn()
+        self._sign_in = sign_in
+        self._overview: Overview | None = None
+        self._panel: ValvePanel | None = None
+        self._ticks = 0
+
+    async def build(self) -> None:
+        """Build it, and keep it up to date as long as the tab is there."""
+        self._theme = Theme()
+        ui.add_css(STYLE)
+        names = [valve.place.name for valve in self._valves]
+        several = len(names) > 1
+        with ui.header().classes("items-center"):
+            ui.label(TITLE).classes("text-subtitle1")
+            self._chosen = ui.select([ALL, *names] if several else names, value=ALL if several else names[0])
+            self._chosen.props('dense dark options-dense borderless aria-label="valve" data-testid="valve"')
+            self._chosen.on_value_change(self._show)
+            ui.space()
+            self._unit_choices()
+            self._door = Door(self._sign_in, self._signed)
+            self._theme.switch()
+        self._content = ui.element("div").classes("panel column")
+        await ui.context.client.connected()
+        await self._theme.as_the_browser_prefers()
+        self._show()
+        ui.timer(TICK_S, self._tick)
+
+    def _unit_choices(self) -> None:
+        for value, names, take in (
+            (PERCENT, list(POSITIONS), self._choose_position),
+            (self._units.pressure.name, list(PRESSURES), self._choose_pressure),
+        ):
+            select = ui.select(names, value=value, on_change=lambda change, take=take: take(change.value))
+            select.props('dense dark options-dense borderless aria-label="unit"')
+
+    def _choose_position(self, name: str) -> None:
+        self._units.position = name
+        self._redraw()
+
+    def _choose_pressure(self, name: str) -> None:
+        self._units.choose_pressure(name)
+        self._redraw()
+
+    def _redraw(self) -> None:
+        if self._panel is not None:
+            self._panel.redraw()
+
+    def _choose(self, name: str) -> None:
+        self._chosen.set_value(name)
+
+    def _show(self) -> None:
+        """Show what is chosen."""
+        self._theme.forget()
+        self._content.clear()
+        self._overview = self._panel = None
+        chosen = str(self._chosen.value)
+        with self._content:
+            if chosen == ALL:
+                self._overview = Overview(self._valves, self._units, self._choose)
+            else:
+                (valve,) = (each for each in self._valves if each.place.name == chosen)
+                self._panel = ValvePanel(self._theme, valve, self._units, self._signed)
+        self._ticks = 0
+
+    def _tick(self) -> None:
+        slow = self._ticks % REFRESH_EVERY == 0
+        self._ticks += 1
+        now_s = time.monotonic()
+        if self._overview is not None and slow:
+            for valve in self._valves:
+                self._overview.show(valve.view.at(now_s), valve.view.stroke_m)
+        if self._panel is not None:
+            picture = self._panel.valve.view.at(now_s)
+            self._panel.tick(picture)
+            if slow:
+                self._panel.refresh(picture)
+        if slow:
+            self._door.show()

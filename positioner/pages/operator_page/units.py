@@ -1,0 +1,53 @@
+"""The units that a person reads a valve in; inside, all is SI."""
+
+import math
+from dataclasses import dataclass, field
+
+NO_NUMBER = "–"
+"""Shown where there is no number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit: how many of it are 1 SI unit, and to how many places it is read."""
+
+    name: str
+    per_si: float
+    places: int
+
+    def text(self, value_si: float) -> str:
+        """Return a value with its unit.
+
+        >>> Unit("bar", 1e-5, 3).text(44126.0), Unit("bar", 1e-5, 3).text(math.nan)
+        ('0.441 bar', '– bar')
+        """
+        return f"{self.number(value_si)} {self.name}"
+
+    def number(self, value_si: float) -> str:
+        """Return a value without its unit."""
+        return f"{self.per_si * value_si:.{self.places}f}" if math.isfinite(value_si) else NO_NUMBER
+
+
+PRESSURES = {each.name: each for each in (Unit("bar", 1e-5, 3), Unit("kPa", 1e-3, 1), Unit("psi", 1 / 6894.757, 2))}
+LENGTHS = {each.name: each for each in (Unit("mm", 1e3, 2), Unit("in", 1 / 0.0254, 3))}
+PERCENT = "%"
+"""Positions as a part of the stroke."""
+POSITIONS = (PERCENT, *LENGTHS)
+
+
+@dataclass(slots=True)
+class Units:
+    """What a person has chosen; of a valve whose stroke is not known, positions are in mm in place of %."""
+
+    position: str = PERCENT
+    pressure: Unit = field(default_factory=lambda: PRESSURES["bar"])
+
+    def position_unit(self, stroke_m: float) -> Unit:
+        """Return the unit of positions in m."""
+        if self.position == PERCENT:
+            return Unit(PERCENT, 100 / stroke_m, 2) if math.isfinite(stroke_m) else LENGTHS["mm"]
+        return LENGTHS[self.position]
+
+    def choose_pressure(self, name: str) -> None:
+        """Take a pressure's unit by its name."""
+        self.pressure = PRESSURES[name]

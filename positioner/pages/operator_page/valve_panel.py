@@ -1,0 +1,210 @@
+"""One valve in full. Every word comes from `facts` and what that stands on; here it is only put in its place."""
+
+import time
+from collections.abc import Iterable
+
+from nicegui import ui
+
+from config.codes import Ne107Status
+from config.results.block import as_html
+from positioner.observer.last_moves import LastMoves, last_moves
+from positioner.observer.valve_view import SeenEvent, ValvePicture
+from positioner.pages.operator_page import facts
+from positioner.pages.operator_page.controls import Controls, SignedIn
+from positioner.pages.operator_page.facts import Fact
+from positioner.pages.operator_page.friction_plot import FrictionPlot
+from positioner.pages.operator_page.trend_plot import WINDOWS_S, TrendPlot
+from positioner.pages.operator_page.units import Units
+from positioner.pages.operator_page.watched_valves import WatchedValve
+from positioner.pages.parts.telling import aside, heading
+from positioner.pages.parts.theme import Theme
+
+MOVES_S = 120.0
+"""Of which the response figures are worked out."""
+SHOWN_EVENTS = 12
+LABELS = ("reference", "position", "pressure", "command")
+
+
+class FactsCard:
+    """A card of lines, whose texts change in place."""
+
+    def __init__(self, title: str, name: str) -> None:
+        with ui.card().classes("full-width").props(f'data-testid="{name}"') as self.card:
+            heading(title)
+            self._list = ui.element("dl").classes("facts")
+        self._texts: list[ui.label] = []
+
+    def show(self, lines: Iterable[Fact]) -> None:
+        """Show these lines: as many as the first time."""
+        lines = list(lines)
+        if not self._texts:
+            with self._list:
+                for line in lines:
+                    ui.html(line.label, tag="dt", sanitize=False).tooltip(line.help or line.label)
+                    with ui.element("dd"):
+                        self._texts.append(ui.label().classes("number"))
+        for label, line in zip(self._texts, lines, strict=True):
+            label.set_text(line.text)
+
+
+class ValvePanel:
+    """All of one valve, in one tab."""
+
+    def __init__(self, theme: Theme, valve: WatchedValve, units: Units, signed: SignedIn) -> None:
+        self.valve = valve
+        self._units = units
+        self._events: tuple[SeenEvent, ...] = ()
+        self._stale = ui.label().classes("alarm").props('role="alert" data-testid="stale"')
+        with ui.element("div").classes("full-width") as self._body:
+            self._body.props('data-testid="live-values"')
+            self._tiles()
+            with ui.element("div").classes("together"):
+                with ui.element("div").classes("wide column"):
+                    self._trend(theme)
+                    self._moves()
+                with ui.element("div").classes("side column"):
+                    self._controls = Controls(valve, signed)
+                    self._status = FactsCard("Status", "status")
+            with ui.element("div").classes("cards"):
+                self._estimates = FactsCard("Estimates, with 95 % intervals", "estimates")
+                self._wear = FactsCard("Friction and wear", "wear")
+                with self._wear.card:
+                    self._friction = FrictionPlot(theme, valve.view, units)
+                self._cycle = FactsCard("The daemon's cycle", "cycle")
+                self._event_list()
+
+    def tick(self, picture: ValvePicture) -> None:
+        """Show what changes by the reading."""
+        self._stale.set_text(picture.freshness.daemon and f"Not live: {picture.freshness.daemon}")
+        self._stale.set_visibility(not picture.freshness.live)
+        _grey(self._body, not picture.freshness.live)
+        for name, text in facts.figures(picture, self.valve.view.stroke_m, self._units).items():
+            self._figures[name].set_text(text)
+        for name in ("position", "pressure"):
+            _grey(self._figures[name], not picture.freshness.measured_live)
+        self._condition(picture)
+        self.trend.extend()
+
+    def refresh(self, picture: ValvePicture) -> None:
+        """Show what a person reads slowly."""
+        self._status.show(facts.status(picture))
+        self._wear.show(facts.wear(picture, self._units))
+        self._friction.refresh()
+        self._cycle.show(facts.cycle(picture))
+        said = [Fact(name, text, what) for name, text, what in facts.estimates(picture)]
+        if said:
+            self._estimates.show(said)
+        self._controls.show(picture)
+        self._show_events(picture.events)
+
+    def redraw(self) -> None:
+        """Draw it in other units."""
+        self.trend.redraw()
+
+    def _tiles(self) -> None:
+        self._figures: dict[str, ui.label] = {}
+        with ui.element("div").classes("tiles"):
+            for name in LABELS:
+                with ui.element("div").classes("tile"):
+                    ui.label(name).classes("quiet")
+                    self._figures[name] = ui.label().classes("figure number").props(f'data-testid="figure-{name}"')
+            with ui.element("div").classes("tile"):
+                ui.label("mode, state").classes("quiet")
+                self._mode = ui.label().classes("figure").props('data-testid="mode"')
+            with ui.element("div").classes("tile"):
+                ui.label("NE 107").classes("quiet")
+                self._ne107 = ui.label().classes("figure ne107").props('data-testid="ne107"')
+                self._causes = ui.label().classes("quiet").props('data-testid="causes"')
+            with ui.element("div").classes("tile"):
+                ui.label("fault").classes("quiet")
+                self._fault = ui.label().classes("figure").props('data-testid="fault"')
+
+    def _condition(self, picture: ValvePicture) -> None:
+        letter, words, causes = facts.condition(picture)
+        self._mode.set_text(f"{picture.text('mode')}, {picture.text('state')}")
+        self._ne107.set_text(words)
+        self._ne107.classes(replace=f"figure ne107 ne107-{letter or 'good'}")
+        self._causes.set_text("; ".join(causes))
+        self._fault.set_text(picture.text("fault"))
+        if facts.is_faulty(picture):
+            self._fault.classes(add="faulty")
+        else:
+            self._fault.classes(remove="faulty")
+
+    def _trend(self, theme: Theme) -> None:
+        with ui.card().classes("full-width"):
+            with ui.row().classes("items-center full-width justify-between"):
+                heading("Trend")
+                window = ui.toggle(list(WINDOWS_S), value="1 min")
+            window.props('no-caps dense unelevated toggle-color=primary data-testid="window"')
+            trend = self.trend = TrendPlot(theme, self.valve.view, self._units)
+            window.on_value_change(lambda change: trend.show(change.value))
+
+    def _moves(self) -> None:
+        with ui.card().classes("full-width").props('data-testid="moves"'):
+            with ui.row().classes("items-center full-width justify-between"):
+                heading("Response of the last moves")
+                ui.button("Work out", on_click=self._work_out).props('no-caps outline dense data-testid="work-out"')
+            self._moves_said = ui.html("", sanitize=False).classes("scrolling full-width")
+
+    async def _work_out(self) -> None:
+        place = self.valve.place
+        begin_s = time.monotonic() - MOVES_S
+        moves = await aside(last_moves, self.valve.view, begin_s, place.recordings, place.name, MOVES_S)
+        self._moves_said.set_content(_told(moves))
+
+    def _event_list(self) -> None:
+        with ui.card().classes("full-width").props('data-testid="events"'):
+            heading("Seen since this page looks")
+            self._event_rows = ui.element("ul").classes("said")
+
+    def _show_events(self, events: tuple[SeenEvent, ...]) -> None:
+        if events[:SHOWN_EVENTS] == self._events:
+            return
+        self._events = events[:SHOWN_EVENTS]
+        wall_s = time.time() - time.monotonic()
+        self._event_rows.clear()
+        with self._event_rows:
+            for event in self._events:
+                with ui.element("li"):
+                    ui.label(f"{time.strftime('%H:%M:%S', time.localtime(wall_s + event.time_s))} {event.text}")
+
+
+def _told(moves: LastMoves | None) -> str:
+    if moves is None:
+        return "nothing was measured yet"
+    return as_html("", [moves.source, *moves.response.blocks()])
+
+
+def _grey(element: ui.element, stale: bool) -> None:
+    element.classes(add="stale") if stale else element.classes(remove="stale")
+
+
+NE107_COLOURS = {
+    "good": "#1b7f79",
+    facts.NE107_LETTER[Ne107Status.MAINTENANCE_REQUIRED]: "#1b5e8a",
+    facts.NE107_LETTER[Ne107Status.OUT_OF_SPECIFICATION]: "#8a6d00",
+    facts.NE107_LETTER[Ne107Status.FUNCTION_CHECK]: "#b3541e",
+    facts.NE107_LETTER[Ne107Status.FAILURE]: "#b3261e",
+}
+STYLE = """
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 8px; margin-bottom: 16px; }
+.cards { columns: 340px; column-gap: 16px; margin-top: 16px; } .cards > * { break-inside: avoid; margin-bottom: 16px; }
+.wide.column, .side.column { display: flex; flex-flow: column nowrap; gap: 16px; }
+.tile { padding: 8px 12px; border-radius: 6px; background: rgba(128,136,150,0.12); min-width: 0; }
+.tile .figure { overflow-wrap: anywhere; }
+.alarm { background: #b3261e; color: #fff; padding: 8px 12px; border-radius: 6px; width: 100%; font-weight: 600; }
+.stale { opacity: 0.45; filter: grayscale(1); }
+.faulty { color: #b3261e; } .body--dark .faulty { color: #ff8a80; }
+.facts { display: grid; grid-template-columns: max-content 1fr; gap: 2px 16px; margin: 0; width: 100%; }
+.facts dt { opacity: 0.75; } .facts dd { margin: 0; text-align: right; overflow-wrap: anywhere; }
+table.facts { display: table; border-collapse: collapse; } table.facts th { text-align: left; font-weight: 600; }
+table.facts td, table.facts th { padding: 6px 12px 6px 0; vertical-align: top; white-space: nowrap; }
+.scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
+.scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
+.scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
+""" + "".join(
+    f".ne107-{letter}::before {{ content: ''; display: inline-block; width: .7em; height: .7em; margin-right: .4em;"
+    f" border-radius: {'50%' if letter == 'good' else '2px'}; background: {colour}; }}\n"
+    for letter, colour in NE107_COLOURS.items()
+)

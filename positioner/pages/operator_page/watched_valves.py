@@ -1,0 +1,78 @@
+"""The valves that a page looks at: where each one's daemon is, who polls it, and how a role connects to it."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from config.roles import Role
+from config.tls_table import Tls
+from positioner.dcs import Dcs, DcsError
+from positioner.observer.poller import POLL_S, REPLY_WITHIN_S, Poller
+from positioner.observer.valve_commands import ValveCommands
+from positioner.observer.valve_view import ValvePicture, ValveView
+
+WRITE_WITHIN_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a valve is served, and what its daemon's file says of it; None where nobody said."""
+
+    name: str
+    host: str
+    port: int
+    unit: int
+    stroke_m: float | None = None
+    recordings: Path | None = None
+    tls: Tls | None = None
+    """Of an observer."""
+    tls_of: Mapping[Role, Tls] = field(default_factory=dict)
+    """Of those who may write, where the daemon asks for certificates."""
+
+    def connection(self, role: Role) -> Dcs:
+        """Return a closed connection for a role.
+
+        Raises:
+            InputError: a file of its certificate that is not there or does not fit.
+            DcsError: the daemon asks for a certificate, and this role has none.
+        """
+        if role is Role.OBSERVER:
+            return Dcs(self.host, self.port, self.unit, REPLY_WITHIN_S, self.tls)
+        if self.tls is not None and role not in self.tls_of:
+            raise DcsError(f"{self.name}: the page has no certificate of the role {role.name.lower()}")
+        return Dcs(self.host, self.port, self.unit, WRITE_WITHIN_S, self.tls_of.get(role))
+
+
+class WatchedValve:
+    """One valve: polled from `start` to `stop`."""
+
+    def __init__(self, place: Place) -> None:
+        self.place = place
+        self.view = ValveView(place.name, place.stroke_m, POLL_S)
+        self.commands = ValveCommands(place.connection, self.picture)
+        self._poller = Poller(self.view, lambda: place.connection(Role.OBSERVER))
+
+    def picture(self) -> ValvePicture:
+        """Return what is known now."""
+        return self.view.at(time.monotonic())
+
+    def start(self) -> None:
+        """Begin to poll."""
+        self._poller.start()
+
+    def stop(self) -> None:
+        """End."""
+        self._poller.stop()
+
+
+@contextmanager
+def watching(places: Sequence[Place]) -> Iterator[list[WatchedValve]]:
+    """Poll these valves as long as the context lasts."""
+    valves = [WatchedValve(place) for place in places]
+    with ExitStack() as on_exit:
+        for valve in valves:
+            valve.start()
+            on_exit.callback(valve.stop)
+        yield valves
