@@ -55,14 +55,19 @@ class Child:
         with heard:
             self._out = os.fdopen(os.dup(heard.fileno()), encoding="utf-8")
 
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        assert self._process.pid is not None
+        return self._process.pid
+
     def line(self) -> str:
         """Return its next line; empty when it has ended."""
         return self._out.readline().strip()
 
     def signal(self, number: signal.Signals) -> None:
         """Send it a signal."""
-        assert self._process.pid is not None
-        os.kill(self._process.pid, number)
+        os.kill(self.pid, number)
 
     def kill(self) -> None:
         """Kill it, and wait until it is gone."""

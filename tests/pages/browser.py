@@ -19,11 +19,11 @@ expect.set_options(timeout=LONGEST_MS)
 
 
 @contextmanager
-def served(*words: str) -> Iterator[str]:
-    """Run a command that serves a page, and give the address that it prints; it ends as it is told to."""
+def served(*words: str, port: str = "--port") -> Iterator[str]:
+    """Run a command that serves a page, at an option's port, and give the address that it prints; it ends as told."""
     # NiceGUI behaves otherwise where it finds itself under pytest.
     environment = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
-    command = [sys.executable, "-m", "positioner.cli", *words, "--no-open", "--port", "0"]
+    command = [sys.executable, "-m", "positioner.cli", *words, "--no-open", port, "0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
     with process:
         assert process.stdout is not None
@@ -39,11 +39,13 @@ def served(*words: str) -> Iterator[str]:
 
 
 @contextmanager
-def opened(address: str, *, width_px: int = 1400, dark: bool = False) -> Iterator[Page]:
+def opened(
+    address: str, *, width_px: int = 1400, dark: bool = False, executable: str | None = CHROMIUM
+) -> Iterator[Page]:
     """Open a page in a browser of its own."""
     complaints: list[str] = []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox"])
         context = browser.new_context(
             viewport={"width": width_px, "height": 900}, color_scheme="dark" if dark else "light"
         )

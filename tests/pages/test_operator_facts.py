@@ -1,0 +1,150 @@
+"""What the operator's page says, without a browser: figures in a person's units, words, rights, passwords."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.codes import Fault, Mode, Ne107Cause, Ne107Status, State
+from config.errors import InputError
+from config.registers import BY_NAME
+from config.roles import Role
+from positioner.observer.freshness import Freshness
+from positioner.observer.trends import thinned
+from positioner.observer.valve_view import ValvePicture
+from positioner.pages.operator_page import facts
+from positioner.pages.operator_page.controls import SIGNED_IN_S, SignedIn
+from positioner.pages.operator_page.role_passwords import read_passwords, set_password
+from positioner.pages.operator_page.units import LENGTHS, Units
+from positioner.pages.parts.sessions import MOST_WRONG, SignIn
+
+STROKE_M = 0.1
+VALUES = dict.fromkeys(BY_NAME, 0.0) | {
+    "mode": Mode.AUTOMATIC,
+    "state": State.S1_UP,
+    "position_m": 0.05,
+    "pressure": 44126.0,
+    "reference_in_force": 0.5,
+}
+PICTURE = ValvePicture("FV-101", 0.0, Freshness(), VALUES, 0, ())
+
+
+def with_values(**values: float) -> ValvePicture:
+    return replace(PICTURE, values=VALUES | values)
+
+
+def test_figures_are_in_the_units_chosen() -> None:
+    units = Units()
+    assert facts.figures(PICTURE, STROKE_M, units) == {
+        "reference": "50.00 %",
+        "position": "50.00 %",
+        "pressure": "0.441 bar",
+        "command": "0.000 bar",
+    }
+    units.position = "in"
+    units.choose_pressure("psi")
+    told = facts.figures(PICTURE, STROKE_M, units)
+    assert (told["position"], told["pressure"]) == ("1.969 in", "6.40 psi")
+
+
+def test_of_a_valve_whose_stroke_nobody_said_positions_are_lengths() -> None:
+    assert Units().position_unit(math.nan) == LENGTHS["mm"]
+
+
+def test_an_old_measurement_is_no_figure_while_what_is_commanded_is() -> None:
+    old = replace(PICTURE, freshness=Freshness(measurement="the last good measurement is 3.0 s old"))
+    told = facts.figures(old, STROKE_M, Units())
+    assert (told["position"], told["pressure"], told["reference"]) == ("– %", "– bar", "50.00 %")
+    assert "the last good measurement is 3.0 s old" in [each.text for each in facts.status(old)]
+
+
+def test_ne107_has_a_letter_its_words_and_the_deciding_cause_first() -> None:
+    causes = (Ne107Cause.NOT_AUTOMATIC, Ne107Cause.FRICTION_HIGH)
+    bits = sum(1 << (cause - 1) for cause in causes)
+    seen = with_values(ne107=Ne107Status.MAINTENANCE_REQUIRED, ne107_cause=Ne107Cause.FRICTION_HIGH, ne107_causes=bits)
+    assert facts.condition(seen) == (
+        "M",
+        "M maintenance",
+        ["friction high: packing tight", "not automatic"],
+    )
+    assert facts.condition(PICTURE) == ("", "good", [])
+    assert facts.condition(replace(PICTURE, values={}))[:2] == ("?", "unknown")
+
+
+def test_a_fault_that_is_not_known_counts_as_one() -> None:
+    assert not facts.is_faulty(PICTURE)
+    assert facts.is_faulty(with_values(fault=Fault.STALE))
+    assert facts.is_faulty(replace(PICTURE, values={}))
+
+
+def test_nothing_is_left_out_where_nothing_is_known() -> None:
+    known, unknown = PICTURE, replace(PICTURE, values={})
+    for said in (facts.status, facts.cycle, lambda picture: facts.wear(picture, Units())):
+        assert [each.label for each in said(known)] == [each.label for each in said(unknown)]
+    assert "–" in facts.wear(unknown, Units())[0].text
+
+
+def test_refused_estimates_say_why_and_the_others_have_an_interval() -> None:
+    seen = with_values(b_over_c_e=-814542.6, b_over_c_std=1000.0, b_over_c_valid=1.0, a_reason=11.0)
+    told = {name: text for name, text, _ in facts.estimates(seen)}
+    assert told["b_over_c"] == "-8.1454e+05 ± 2e+03 Pa/m"
+    assert told["a"] == "refused: a came out positive: viscous friction would drive the stem"
+
+
+def test_a_window_keeps_its_extremes_and_its_gaps() -> None:
+    time_s = np.arange(0.0, 600.0, 0.05)
+    position_m = np.full(time_s.size, 0.05)
+    position_m[7777], position_m[3333], position_m[5000:5003] = 0.09, 0.01, np.nan
+    kept = thinned({"time_s": time_s, "position_m": position_m}, 1.5)
+    assert len(kept["time_s"]) <= 3 * 400
+    assert (np.nanmax(kept["position_m"]), np.nanmin(kept["position_m"])) == (0.09, 0.01)
+    assert np.isnan(kept["position_m"]).any()
+    assert (np.diff(kept["time_s"]) > 0).all()
+    assert len(thinned({"time_s": time_s[:0], "position_m": position_m[:0]}, 1.5)["time_s"]) == 0
+
+
+def test_a_role_ends_by_itself() -> None:
+    signed = SignedIn()
+    assert signed.at(0.0) is Role.OBSERVER
+    signed.begin(Role.ENGINEER, 10.0)
+    assert signed.at(10.0 + SIGNED_IN_S - 1) is Role.ENGINEER
+    assert signed.at(10.0 + SIGNED_IN_S) is Role.OBSERVER
+    assert signed.at(11.0) is Role.OBSERVER, "it does not come back"
+
+
+def test_passwords_are_kept_as_scrypt_leaves_them_and_for_their_role_alone(tmp_path: Path) -> None:
+    file = tmp_path / "roles.json"
+    set_password(file, "operator", "first-password")
+    set_password(file, "engineer", "other-password")
+    set_password(file, "operator", "valves-and-more")
+    assert "valves" not in file.read_text()
+    assert file.stat().st_mode & 0o077 == 0
+    now_s = 0.0
+    sign_in = SignIn(read_passwords(file), clock=lambda: now_s)
+    assert sign_in.refused("operator", "valves-and-more") == ""
+    assert sign_in.refused("engineer", "other-password") == ""
+    assert sign_in.refused("observer", "valves-and-more") == "wrong password"
+    for _ in range(MOST_WRONG - 1):
+        assert sign_in.refused("engineer", "valves-and-more") == "wrong password"
+    assert sign_in.refused("engineer", "other-password").startswith("too many wrong passwords")
+
+
+def test_passwords_that_are_too_short_or_none_are_refused_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "roles.json"
+    with pytest.raises(InputError, match="must have 8 characters at least, got 5"):
+        set_password(file, "operator", "short")
+    assert not file.exists()
+    for text, said in (
+        ("{", "is no file of passwords"),
+        ("[]", "is no file of passwords"),
+        (json.dumps({"operator": {"salt": "00"}}), "is no file of passwords"),
+        (json.dumps({"admin": {"salt": "00", "digest": "00"}}), "role: allowed are operator, engineer, got admin"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InputError, match=said):
+            read_passwords(file)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_passwords(tmp_path / "nowhere.json")

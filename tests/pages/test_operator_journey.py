@@ -1,0 +1,83 @@
+"""The operator's page in a real browser, against a running daemon and a simulated slave, each a process."""
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from positioner.pages.operator_page.role_passwords import set_password
+from tests.pages.browser import needs_chromium, opened, served
+from tests.pages.valve_site import valve_site
+
+pytestmark = [pytest.mark.real_time, needs_chromium]
+
+PASSWORDS = {"operator": "valves-and-more", "engineer": "friction-matters"}
+
+
+def sign_in(page: Page, role: str, password: str) -> None:
+    page.get_by_test_id("role").click()
+    page.get_by_role("option", name=role).click()
+    page.get_by_test_id("password").fill(password)
+    page.get_by_test_id("enter").click()
+
+
+def test_an_operator_watches_signs_in_moves_the_valve_and_is_told_what_dies(tmp_path: Path) -> None:
+    roles = tmp_path / "roles.json"
+    for role, password in PASSWORDS.items():
+        set_password(roles, role, password)
+    with valve_site(tmp_path) as site:
+        words = ("page", "--config", str(site.config), "--roles", str(roles))
+        with served(*words, port="--listen-port") as address, opened(address) as page:
+            watched(page)
+            signed_in_as_operator(page)
+            moved_by_an_engineer(page)
+            site.slave.kill()
+            expect(page.get_by_test_id("fault")).to_have_text("no reply")
+            expect(page.get_by_test_id("figure-position")).to_have_text("– %")
+            expect(page.get_by_test_id("ne107")).to_have_text("F failure")
+            site.daemon.kill()
+            expect(page.get_by_test_id("stale")).to_contain_text("Not live: no connection")
+            expect(page.get_by_test_id("live-values")).to_have_class(re.compile(r"\bstale\b"))
+            expect(page.get_by_test_id("set-reference")).to_be_disabled()
+
+
+def watched(page: Page) -> None:
+    """See what an observer sees: live values, in words, and nothing to press."""
+    expect(page.get_by_test_id("figure-position")).to_have_text(re.compile(r"29\.\d\d %"))
+    expect(page.get_by_test_id("mode")).to_have_text("hold, S0 start")
+    expect(page.get_by_test_id("causes")).to_have_text("not automatic")
+    expect(page.get_by_test_id("estimates")).to_contain_text("identification has not been started")
+    expect(page.get_by_test_id("trend").locator("canvas")).to_be_visible()
+    expect(page.get_by_test_id("stale")).to_be_hidden()
+    for name in ("set-reference", "mode-automatic", "acknowledge"):
+        expect(page.get_by_test_id(name)).to_be_disabled()
+
+
+def signed_in_as_operator(page: Page) -> None:
+    """A wrong password is told; the right one gives an operator's rights and no more."""
+    page.get_by_test_id("door").click()
+    sign_in(page, "operator", PASSWORDS["engineer"])
+    expect(page.get_by_test_id("sign-in-said")).to_have_text("wrong password")
+    sign_in(page, "operator", PASSWORDS["operator"])
+    expect(page.get_by_test_id("set-reference")).to_be_enabled()
+    expect(page.get_by_test_id("mode-automatic")).to_be_disabled()
+    expect(page.get_by_test_id("rights")).to_contain_text("mode needs the role engineer")
+    page.get_by_test_id("door").click()
+    expect(page.get_by_test_id("set-reference")).to_be_disabled()
+
+
+def moved_by_an_engineer(page: Page) -> None:
+    """The mode and the reference are set, confirmed by what is read back, and the stem follows."""
+    page.get_by_test_id("door").click()
+    sign_in(page, "engineer", PASSWORDS["engineer"])
+    page.get_by_test_id("mode-automatic").click()
+    expect(page.get_by_test_id("said")).to_have_text("✓ mode is automatic, as read back")
+    page.get_by_test_id("reference-input").fill("50")
+    page.get_by_test_id("set-reference").click()
+    expect(page.get_by_test_id("said")).to_have_text("✓ reference is 0.5, as read back")
+    expect(page.get_by_test_id("figure-position")).to_have_text(re.compile(r"(49|50)\.\d\d %"))
+    expect(page.get_by_test_id("mode")).to_have_text("automatic, S1 up")
+    expect(page.get_by_test_id("events")).to_contain_text("mode: hold -> automatic")
+    page.get_by_test_id("work-out").click()
+    expect(page.get_by_test_id("moves")).to_contain_text("reference_m")
