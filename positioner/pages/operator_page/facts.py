@@ -74,6 +74,7 @@ def condition(picture: ValvePicture) -> tuple[str, str, list[str]]:
 def cycle(picture: ValvePicture) -> list[Fact]:
     """Return how the daemon's loop goes."""
     milli = Unit("ms", 1e3, 3)
+    age_s = picture.value("sample_age") if picture.freshness.live else math.nan
     times = [("period", "period"), ("jitter, 99 %", "jitter_99"), ("time of a cycle", "cycle_time")]
     counts = [
         ("cycles", "cycles"),
@@ -84,7 +85,7 @@ def cycle(picture: ValvePicture) -> list[Fact]:
     ]
     return [
         *(Fact(label, milli.text(picture.value(name)), BY_NAME[name].text) for label, name in times),
-        Fact("age of the sample", Unit("s", 1.0, 3).text(picture.value("sample_age")), BY_NAME["sample_age"].text),
+        Fact("age of the sample", Unit("s", 1.0, 3).text(age_s), BY_NAME["sample_age"].text),
         *(Fact(label, _count(picture.value(name)), BY_NAME[name].text) for label, name in counts),
         Fact("daemon started anew", f"{picture.restarts} times since this page looks"),
     ]

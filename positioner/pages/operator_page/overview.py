@@ -1,52 +1,71 @@
-"""All valves, a line each."""
+"""All valves, a card each."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from nicegui import ui
 
 from positioner.observer.valve_view import ValvePicture
 from positioner.pages.operator_page.facts import condition, figures
+from positioner.pages.operator_page.marks import grey, mark_ne107
 from positioner.pages.operator_page.units import Units
 from positioner.pages.operator_page.watched_valves import WatchedValve
 
-HEADINGS = ("valve", "NE 107", "mode", "state", "reference", "position", "pressure", "fault")
+LINES = ("reference", "pressure", "mode", "state", "fault")
+
+
+@dataclass(frozen=True, slots=True)
+class _Card:
+    """What changes of a card."""
+
+    body: ui.element
+    stale: ui.label
+    position: ui.label
+    ne107: ui.label
+    causes: ui.label
+    lines: dict[str, ui.label]
 
 
 class Overview:
-    """The table of all valves; a valve's name opens it."""
+    """The cards of all valves; a valve's name opens it."""
 
     def __init__(self, valves: list[WatchedValve], units: Units, choose: Callable[[str], None]) -> None:
         self._units = units
-        self._rows: dict[str, tuple[ui.element, list[ui.label], ui.label]] = {}
-        with ui.element("div").classes("scrolling full-width"), ui.element("table").classes("facts wide-facts"):
-            with ui.element("thead"), ui.element("tr"):
-                for heading in HEADINGS:
-                    ui.html(heading, tag="th")
-            with ui.element("tbody"):
-                for valve in valves:
-                    name = valve.place.name
-                    with ui.element("tr") as row:
-                        with ui.element("td"):
-                            ui.button(name, on_click=lambda name=name: choose(name)).props("flat dense no-caps")
-                            stale = ui.label().classes("quiet")
-                        cells = []
-                        for _ in HEADINGS[1:]:
-                            with ui.element("td"):
-                                cells.append(ui.label().classes("number"))
-                    self._rows[name] = (row.props(f'data-testid="row-{name}"'), cells, stale)
+        self._cards: dict[str, _Card] = {}
+        with ui.element("div").classes("overview"):
+            for valve in valves:
+                self._cards[valve.place.name] = _card(valve.place.name, choose)
 
     def show(self, picture: ValvePicture, stroke_m: float) -> None:
         """Show a valve as it is now, or that it is not known how it is."""
-        row, cells, stale = self._rows[picture.name]
+        card = self._cards[picture.name]
         letter, words, causes = condition(picture)
-        numbers = figures(picture, stroke_m, self._units)
-        said = [
-            words + (f": {causes[0]}" if letter and causes else ""),
-            *(picture.text(name) for name in ("mode", "state")),
-            *(numbers[name] for name in ("reference", "position", "pressure")),
-            picture.text("fault"),
-        ]
-        for cell, text in zip(cells, said, strict=True):
-            cell.set_text(text)
-        stale.set_text(picture.freshness.daemon)
-        row.classes(add="stale") if not picture.freshness.live else row.classes(remove="stale")
+        said = figures(picture, stroke_m, self._units)
+        said |= {name: picture.text(name) for name in ("mode", "state", "fault")}
+        for name, label in card.lines.items():
+            label.set_text(said[name])
+        card.position.set_text(said["position"])
+        card.ne107.set_text(words)
+        mark_ne107(card.ne107, letter)
+        card.causes.set_text("; ".join(causes))
+        card.stale.set_text(picture.freshness.daemon or picture.freshness.measurement)
+        card.stale.set_visibility(not picture.freshness.measured_live)
+        grey(card.body, not picture.freshness.live)
+
+
+def _card(name: str, choose: Callable[[str], None]) -> _Card:
+    with ui.card().props(f'data-testid="valve-{name}"'):
+        with ui.row().classes("items-center full-width justify-between"):
+            ui.button(name, on_click=lambda: choose(name)).props("flat dense no-caps").classes("text-subtitle1")
+        stale = ui.label().classes("alarm").props('role="alert"')
+        with ui.element("div").classes("full-width") as body:
+            position = ui.label().classes("figure number")
+            ne107 = ui.label()
+            causes = ui.label().classes("quiet")
+            lines = {}
+            with ui.element("dl").classes("facts"):
+                for line in LINES:
+                    ui.html(line, tag="dt", sanitize=False)
+                    with ui.element("dd"):
+                        lines[line] = ui.label().classes("number")
+    return _Card(body, stale, position, ne107, causes, lines)

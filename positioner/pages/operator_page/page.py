@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from nicegui import ui
 
 from positioner.pages.operator_page.controls import Door, SignedIn
+from positioner.pages.operator_page.marks import STYLE
 from positioner.pages.operator_page.overview import Overview
 from positioner.pages.operator_page.units import PERCENT, POSITIONS, PRESSURES, Units
-from positioner.pages.operator_page.valve_panel import STYLE, ValvePanel
+from positioner.pages.operator_page.valve_panel import ValvePanel
 from positioner.pages.operator_page.watched_valves import Place, WatchedValve, watching
 from positioner.pages.parts.server import Listening, serve
 from positioner.pages.parts.sessions import SignIn

@@ -5,7 +5,6 @@ from collections.abc import Iterable
 
 from nicegui import ui
 
-from config.codes import Ne107Status
 from config.results.block import as_html
 from positioner.observer.last_moves import LastMoves, last_moves
 from positioner.observer.valve_view import SeenEvent, ValvePicture
@@ -13,6 +12,8 @@ from positioner.pages.operator_page import facts
 from positioner.pages.operator_page.controls import Controls, SignedIn
 from positioner.pages.operator_page.facts import Fact
 from positioner.pages.operator_page.friction_plot import FrictionPlot
+from positioner.pages.operator_page.marks import grey, mark_fault, mark_ne107
+from positioner.pages.operator_page.recorded_plot import RecordedPlot
 from positioner.pages.operator_page.trend_plot import WINDOWS_S, TrendPlot
 from positioner.pages.operator_page.units import Units
 from positioner.pages.operator_page.watched_valves import WatchedValve
@@ -61,7 +62,7 @@ class ValvePanel:
             with ui.element("div").classes("together"):
                 with ui.element("div").classes("wide column"):
                     self._trend(theme)
-                    self._moves()
+                    self._moves(theme)
                 with ui.element("div").classes("side column"):
                     self._controls = Controls(valve, signed)
                     self._status = FactsCard("Status", "status")
@@ -77,11 +78,11 @@ class ValvePanel:
         """Show what changes by the reading."""
         self._stale.set_text(picture.freshness.daemon and f"Not live: {picture.freshness.daemon}")
         self._stale.set_visibility(not picture.freshness.live)
-        _grey(self._body, not picture.freshness.live)
+        grey(self._body, not picture.freshness.live)
         for name, text in facts.figures(picture, self.valve.view.stroke_m, self._units).items():
             self._figures[name].set_text(text)
         for name in ("position", "pressure"):
-            _grey(self._figures[name], not picture.freshness.measured_live)
+            grey(self._figures[name], not picture.freshness.measured_live)
         self._condition(picture)
         self.trend.extend()
 
@@ -113,7 +114,7 @@ class ValvePanel:
                 self._mode = ui.label().classes("figure").props('data-testid="mode"')
             with ui.element("div").classes("tile"):
                 ui.label("NE 107").classes("quiet")
-                self._ne107 = ui.label().classes("figure ne107").props('data-testid="ne107"')
+                self._ne107 = ui.label().classes("figure").props('data-testid="ne107"')
                 self._causes = ui.label().classes("quiet").props('data-testid="causes"')
             with ui.element("div").classes("tile"):
                 ui.label("fault").classes("quiet")
@@ -123,13 +124,10 @@ class ValvePanel:
         letter, words, causes = facts.condition(picture)
         self._mode.set_text(f"{picture.text('mode')}, {picture.text('state')}")
         self._ne107.set_text(words)
-        self._ne107.classes(replace=f"figure ne107 ne107-{letter or 'good'}")
+        mark_ne107(self._ne107, letter)
         self._causes.set_text("; ".join(causes))
         self._fault.set_text(picture.text("fault"))
-        if facts.is_faulty(picture):
-            self._fault.classes(add="faulty")
-        else:
-            self._fault.classes(remove="faulty")
+        mark_fault(self._fault, facts.is_faulty(picture))
 
     def _trend(self, theme: Theme) -> None:
         with ui.card().classes("full-width"):
@@ -140,11 +138,12 @@ class ValvePanel:
             trend = self.trend = TrendPlot(theme, self.valve.view, self._units)
             window.on_value_change(lambda change: trend.show(change.value))
 
-    def _moves(self) -> None:
+    def _moves(self, theme: Theme) -> None:
         with ui.card().classes("full-width").props('data-testid="moves"'):
             with ui.row().classes("items-center full-width justify-between"):
-                heading("Response of the last moves")
+                heading("Last moves, and their response")
                 ui.button("Work out", on_click=self._work_out).props('no-caps outline dense data-testid="work-out"')
+            self._recorded = RecordedPlot(theme, self._units)
             self._moves_said = ui.html("", sanitize=False).classes("scrolling full-width")
 
     async def _work_out(self) -> None:
@@ -152,6 +151,8 @@ class ValvePanel:
         begin_s = time.monotonic() - MOVES_S
         moves = await aside(last_moves, self.valve.view, begin_s, place.recordings, place.name, MOVES_S)
         self._moves_said.set_content(_told(moves))
+        if moves is not None:
+            self._recorded.show(moves.recording, self.valve.view.stroke_m)
 
     def _event_list(self) -> None:
         with ui.card().classes("full-width").props('data-testid="events"'):
@@ -174,37 +175,3 @@ def _told(moves: LastMoves | None) -> str:
     if moves is None:
         return "nothing was measured yet"
     return as_html("", [moves.source, *moves.response.blocks()])
-
-
-def _grey(element: ui.element, stale: bool) -> None:
-    element.classes(add="stale") if stale else element.classes(remove="stale")
-
-
-NE107_COLOURS = {
-    "good": "#1b7f79",
-    facts.NE107_LETTER[Ne107Status.MAINTENANCE_REQUIRED]: "#1b5e8a",
-    facts.NE107_LETTER[Ne107Status.OUT_OF_SPECIFICATION]: "#8a6d00",
-    facts.NE107_LETTER[Ne107Status.FUNCTION_CHECK]: "#b3541e",
-    facts.NE107_LETTER[Ne107Status.FAILURE]: "#b3261e",
-}
-STYLE = """
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 8px; margin-bottom: 16px; }
-.cards { columns: 340px; column-gap: 16px; margin-top: 16px; } .cards > * { break-inside: avoid; margin-bottom: 16px; }
-.wide.column, .side.column { display: flex; flex-flow: column nowrap; gap: 16px; }
-.tile { padding: 8px 12px; border-radius: 6px; background: rgba(128,136,150,0.12); min-width: 0; }
-.tile .figure { overflow-wrap: anywhere; }
-.alarm { background: #b3261e; color: #fff; padding: 8px 12px; border-radius: 6px; width: 100%; font-weight: 600; }
-.stale { opacity: 0.45; filter: grayscale(1); }
-.faulty { color: #b3261e; } .body--dark .faulty { color: #ff8a80; }
-.facts { display: grid; grid-template-columns: max-content 1fr; gap: 2px 16px; margin: 0; width: 100%; }
-.facts dt { opacity: 0.75; } .facts dd { margin: 0; text-align: right; overflow-wrap: anywhere; }
-table.facts { display: table; border-collapse: collapse; } table.facts th { text-align: left; font-weight: 600; }
-table.facts td, table.facts th { padding: 6px 12px 6px 0; vertical-align: top; white-space: nowrap; }
-.scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
-.scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
-.scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
-""" + "".join(
-    f".ne107-{letter}::before {{ content: ''; display: inline-block; width: .7em; height: .7em; margin-right: .4em;"
-    f" border-radius: {'50%' if letter == 'good' else '2px'}; background: {colour}; }}\n"
-    for letter, colour in NE107_COLOURS.items()
-)

@@ -1,0 +1,60 @@
+"""How the page stresses things: grey is not of now, an NE 107 status has its shape and colour, a fault is red."""
+
+from nicegui import ui
+
+from config.codes import Ne107Status
+from positioner.pages.operator_page.facts import NE107_LETTER
+
+NE107_COLOURS = {
+    Ne107Status.GOOD: "#1b7f79",
+    Ne107Status.MAINTENANCE_REQUIRED: "#2f7fb8",
+    Ne107Status.OUT_OF_SPECIFICATION: "#b08900",
+    Ne107Status.FUNCTION_CHECK: "#c8641f",
+    Ne107Status.FAILURE: "#c62f26",
+}
+"""Beside the words, which say it without any colour."""
+
+STYLE = """
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 8px; margin-bottom: 16px; }
+.tile { padding: 8px 12px; border-radius: 6px; background: rgba(128,136,150,0.12); min-width: 0; }
+.figure { overflow-wrap: anywhere; }
+.overview { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(270px, 100%), 1fr)); gap: 16px; }
+.overview { align-items: start; }
+.cards { columns: 340px; column-gap: 16px; margin-top: 16px; } .cards > * { break-inside: avoid; margin-bottom: 16px; }
+.wide.column, .side.column { display: flex; flex-flow: column nowrap; gap: 16px; }
+.alarm { background: #b3261e; color: #fff; padding: 8px 12px; border-radius: 6px; width: 100%; font-weight: 600; }
+.stale { opacity: 0.45; filter: grayscale(1); }
+.faulty { color: #b3261e; } .body--dark .faulty { color: #ff8a80; }
+.facts { display: grid; grid-template-columns: max-content 1fr; gap: 2px 16px; margin: 0; width: 100%; }
+.facts dt { opacity: 0.75; } .facts dd { margin: 0; text-align: right; overflow-wrap: anywhere; }
+.scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
+.scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
+.scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
+""" + "".join(
+    f".ne107-{NE107_LETTER[status] or 'good'}::before {{ content: ''; display: inline-block; width: .7em; height: .7em;"
+    f" margin-right: .4em; border-radius: {'50%' if status is Ne107Status.GOOD else '2px'}; background: {colour}; }}\n"
+    for status, colour in NE107_COLOURS.items()
+)
+
+
+def grey(element: ui.element, stale: bool) -> None:
+    """Grey what is not of now, or take that back."""
+    if stale:
+        element.classes(add="stale")
+    else:
+        element.classes(remove="stale")
+
+
+def mark_ne107(label: ui.label, letter: str) -> None:
+    """Mark a status by its letter, empty for good."""
+    wanted = f"ne107-{letter or 'good'}"
+    others = {f"ne107-{each or 'good'}" for each in (*NE107_LETTER.values(), "?")} - {wanted}
+    label.classes(add=wanted, remove=" ".join(sorted(others)))
+
+
+def mark_fault(label: ui.label, faulty: bool) -> None:
+    """Mark a fault, or take that back."""
+    if faulty:
+        label.classes(add="faulty")
+    else:
+        label.classes(remove="faulty")
