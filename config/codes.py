@@ -34,6 +34,18 @@ class Mode(Code):
     AUTOMATIC = 2, "automatic"
 
 
+class ServiceState(Code):
+    """What the service does for a valve, beside the law's own states."""
+
+    STARTING = 0, "starting: no good measurement yet, what the device has is held"
+    SHADOW = 1, "shadow: reads and never writes"
+    STANDBY = 2, "standby: the pressure is held, nobody commands"
+    ACTIVE = 3, "active: an operator or the law commands"
+    FAULT_HOLD = 4, "fault, and the pressure is held"
+    FAULT_SAFE = 5, "fault, and the pressure is the safe one"
+    STOPPED = 6, "stopped: the valve is left as configured, nobody is served"
+
+
 class State(Code):
     """The states of the seed's control logic (4.1)."""
 
@@ -55,6 +67,11 @@ class Fault(Code):
     DCS_SILENT = 6, "DCS silent"
     STALLED = 7, "the daemon stood still"
     OTHER_MASTER = 8, "another master wrote the set point"
+    TRAVEL_DEVIATION = 9, "the stem is away from its reference for too long"
+    FROZEN_SENSOR = 10, "the position stands still while the pressure changes"
+    POSITION_RATE = 11, "the position changes faster than the valve can"
+    SATURATED = 12, "the command is at its limit for too long"
+    OVERRUN = 13, "cycles or replies take longer than their period"
 
 
 class Quality(Code):
@@ -188,3 +205,8 @@ class Ne107Cause(Code):
     STICTION = 10, "stiction"
     TRAVEL = 11, "travel"
     REVERSALS = 12, "reversals"
+    TRAVEL_DEVIATION = 13, "away from the reference"
+    FROZEN_SENSOR = 14, "position stands still while the pressure changes"
+    POSITION_RATE = 15, "position changes faster than the valve can"
+    SATURATED = 16, "command at its limit"
+    OVERRUN = 17, "cycles or replies too slow"

@@ -19,7 +19,7 @@ from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
 from config.loading import FolderName, Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
-from config.quantities import ActionName
+from config.supervision_table import SafetyTable, SupervisionTable
 from config.tls_table import Tls
 
 
@@ -38,6 +38,8 @@ class CycleTable(Schema):
     pace: Literal["real_time", "device"] = "real_time"
     period_s: Annotated[float, Field(ge=2e-4, le=10)] = 1e-3
     """Of the loop in real time; a device in lockstep has its own."""
+    shadow: bool = False
+    """Read the device and never write to it: what would be commanded is served and recorded, not given."""
 
 
 class PressureTable(Schema):
@@ -51,23 +53,6 @@ class PressureTable(Schema):
         if self.minimum_pa >= self.maximum_pa:
             raise ValueError(f"minimum_pa must be below maximum_pa ({self.maximum_pa:g} Pa)")
         return self
-
-
-class SafetyTable(Schema):
-    """Table `[safety]`: what ends in the safe state, and what that is."""
-
-    action: ActionName = "hold"
-    """On a fault of the device or its bus, and when the daemon ends."""
-    lost_after_cycles: Annotated[int, Field(ge=1)] = 3
-    stale_after_s: Positive = 0.1
-    """Without a new measurement, or later than its cycle was due: then the daemon stood still."""
-    travel_margin: Fraction = 0.1
-    """A position farther than this fraction of the stroke outside the stroke is implausible."""
-    read_back_s: NonNegative = 1.0
-    """How often the device is asked for the command it holds, that another master may have written; 0 is never."""
-    heartbeat_timeout_s: NonNegative = 0.0
-    """Silence of the DCS that is a fault; 0 is never."""
-    heartbeat_action: ActionName = "hold"
 
 
 class IdentificationTable(Schema):
@@ -247,6 +232,7 @@ class DaemonFile(Schema):
     cycle: CycleTable = CycleTable()
     pressure: PressureTable = PressureTable()
     safety: SafetyTable = SafetyTable()
+    supervision: SupervisionTable = SupervisionTable()
     identification: IdentificationTable = IdentificationTable()
     excitation: ExcitationTable = ExcitationTable()
     experiment: ExperimentTable = ExperimentTable()
@@ -257,6 +243,17 @@ class DaemonFile(Schema):
     health: HealthTable = HealthTable()
     memory: MemoryTable = MemoryTable()
     log: LogTable = LogTable()
+
+    @model_validator(mode="after")
+    def _safe_pressure_is_known(self) -> Self:
+        monitors = (getattr(self.supervision, name).action for name in SupervisionTable.model_fields)
+        safe_pa = self.safety.safe_pressure_pa
+        if "safe" in (self.safety.action, self.safety.heartbeat_action, *monitors) and safe_pa is None:
+            raise ValueError('safety.safe_pressure_pa is required by the action "safe" and missing')
+        if safe_pa is not None and not self.pressure.minimum_pa <= safe_pa <= self.pressure.maximum_pa:
+            allowed = f"{self.pressure.minimum_pa:g} to {self.pressure.maximum_pa:g} Pa ([pressure])"
+            raise ValueError(f"safety.safe_pressure_pa: allowed is {allowed}, got {safe_pa:g}")
+        return self
 
     @model_validator(mode="after")
     def _device_waits_for_a_cycle(self) -> Self:

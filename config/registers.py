@@ -18,6 +18,7 @@ from config.codes import (
     Ne107Status,
     Quality,
     Restored,
+    ServiceState,
     State,
     listed,
 )
@@ -122,6 +123,7 @@ STATUS = (
     Register("reference_in_force", 118, "float32", "p.u.", "what the law follows; outside automatic, the stem"),
     Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {listed(Restored)}"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
+    Register("service", 125, "uint16", "1", f"what the service does: {listed(ServiceState)}"),
     Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
 

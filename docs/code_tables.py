@@ -1,6 +1,6 @@
 """The tables of the documents that repeat a code, written from the code: `python -m docs.code_tables`.
 
-`codes.md` is written whole; in `health.md` what stands between two marks is.
+`codes.md` is written whole; in `health.md` and `reliability.md` what stands between two marks is.
 """
 
 from pathlib import Path
@@ -16,13 +16,17 @@ from config.codes import (
     Quality,
     Refusal,
     Restored,
+    ServiceState,
     State,
 )
 from positioner.daemon.health.ne107 import CLASS
+from positioner.daemon.service_state import table
 
 HERE = Path(__file__).parent
 BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"
 END = "<!-- end of the classes -->"
+STATES_BEGIN = "<!-- states: written by `python -m docs.code_tables` -->"
+STATES_END = "<!-- end of the states -->"
 HEAD = """# What the numbers say
 
 Written by `python -m docs.code_tables` from `config/codes.py`, from which `positioner map` has its texts, too. A number
@@ -31,6 +35,7 @@ never gets a new meaning.
 SERVED: dict[type[Code], str] = {
     Mode: "mode",
     State: "state",
+    ServiceState: "service",
     Fault: "fault",
     Quality: "quality",
     InhibitReason: "why",
@@ -66,7 +71,16 @@ def _causes(status: Ne107Status) -> str:
     return ", ".join(f"{int(cause)} {cause.text}" for cause, own in CLASS.items() if own is status)
 
 
+def with_states(document: str) -> str:
+    """Return `reliability.md` with the service's states between its marks."""
+    head, _, rest = document.partition(STATES_BEGIN)
+    _, _, tail = rest.partition(STATES_END)
+    return "\n".join([head + STATES_BEGIN, *table(), STATES_END + tail])
+
+
 if __name__ == "__main__":
     (HERE / "codes.md").write_text(codes(), encoding="utf-8")
     health = HERE / "health.md"
     health.write_text(renewed(health.read_text(encoding="utf-8")), encoding="utf-8")
+    reliability = HERE / "reliability.md"
+    reliability.write_text(with_states(reliability.read_text(encoding="utf-8")), encoding="utf-8")

@@ -6,6 +6,7 @@ real time.
 
     controller, settings, requests, sample      one step, what it is given and what it is given once
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
+    monitors                                    conditions of stem, command and cycle that must not last
     balance_law                                 the seed's law: the pressure that balances spring and friction
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
     slide_law, slide_memory                     the law of slides: nothing, one or two

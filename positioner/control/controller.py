@@ -13,6 +13,7 @@ from positioner.control import pressure_path
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
 from positioner.control.law_memory import held_pa as held_by_law_pa
+from positioner.control.monitors import MonitorMemory, Watched, after_cycle
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
@@ -51,6 +52,7 @@ class ControllerMemory(NamedTuple):
     held_pa: float
     """What S0 holds, and what it gets back after S3."""
     supervision: SupervisionMemory
+    monitoring: MonitorMemory
     reference: Reference
     applied: Applied
     consumed: ConsumedRequests
@@ -81,6 +83,10 @@ class Decision(NamedTuple):
     static_law: StaticLaw
     restoration: Restoration
     experiment: PlayedExperiment
+    alarms: tuple[Fault, ...] = ()
+    """Monitors whose condition holds for their delay, be they alarms or faults."""
+    measured: bool = True
+    """Whether there was a good measurement since the start."""
 
 
 class Controller:
@@ -110,6 +116,7 @@ class Controller:
             wanted_pa=held_pa,
             held_pa=held_pa,
             supervision=SupervisionMemory(),
+            monitoring=MonitorMemory(),
             reference=Reference(0.0),
             applied=settings.applied if restored is None else Applied(restored.ratios),
             consumed=ConsumedRequests(),
@@ -166,7 +173,17 @@ def step(
 ) -> tuple[ControllerMemory, Decision]:
     """Return what is remembered and what is decided after one sample."""
     fresh = usable(sample, settings.limits)
-    supervision = supervise(memory.supervision, sample, memory.command_pa, requests, settings.limits)
+    acknowledged = requests.acknowledgements != memory.supervision.acknowledgements
+    before = MonitorMemory() if acknowledged else memory.monitoring
+    monitoring = after_cycle(before, _watched(memory, sample, fresh=fresh), settings.monitoring)
+    supervision = supervise(
+        memory.supervision,
+        sample,
+        memory.command_pa,
+        requests,
+        settings.limits,
+        monitoring.fault_among(settings.monitoring) if monitoring.holding else Fault.NONE,
+    )
     consumed = _consumed(memory, supervision.mode, requests)
     waits = _waits(memory, supervision.mode, requests, settings, statics)
     reference = _reference(memory, supervision.mode, consumed, requests, sample.position_m if fresh else None, waits)
@@ -264,12 +281,15 @@ def step(
         static_law=statics.law,
         restoration=restoration,
         experiment=experiment,
+        alarms=monitoring.holding,
+        measured=supervision.measured,
     )
     return ControllerMemory(
         command_pa,
         wanted_pa,
         held_pa,
         supervision,
+        monitoring,
         reference,
         applied,
         consumed,
@@ -281,6 +301,18 @@ def step(
         path,
         restoration,
     ), decision
+
+
+def _watched(memory: ControllerMemory, sample: Sample, *, fresh: bool) -> Watched:
+    """Return what the monitors look at: the stem, and where the law last sent it."""
+    followed = memory.supervision.mode is Mode.AUTOMATIC and memory.state is not State.S3_IDENTIFY
+    asked = followed and memory.reference.delta_m != 0.0
+    return Watched(
+        sample.now_s,
+        sample.position_m if fresh else None,
+        memory.command_pa,
+        memory.reference.value_m if asked else None,
+    )
 
 
 def _experiment(

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 from config.daemon_file import DaemonFile, LawTable
 from config.extended_valve import ExtendedValve
-from config.quantities import ActionName
+from config.supervision_table import SafeActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.conventional_law import ConventionalSettings
+from positioner.control.monitors import MonitorSettings
 from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.slide_memory import DAY_S, SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
@@ -27,6 +28,8 @@ class Settings:
     """The settings of the controller, SI units; they do not change while it runs."""
 
     limits: Limits
+    monitoring: MonitorSettings
+    safe_pressure_pa: float | None
     minimum_pa: float
     maximum_pa: float
     breakaway_pa: float | None
@@ -59,6 +62,7 @@ class Settings:
             valve: what `[law] valve` names, worked out: only the roof, which knows the model, can do that.
         """
         safety, identification = file.safety, file.identification
+        monitoring = MonitorSettings.of(file)
         return cls(
             limits=Limits(
                 stroke_m=file.valve.stroke_m,
@@ -70,7 +74,10 @@ class Settings:
                 restart_tolerance_pa=max(1e-3 * file.pressure.maximum_pa, file.device.command_step_pa),
                 action=safety.action,
                 heartbeat_action=safety.heartbeat_action,
+                actions={each.fault: each.action for each in monitoring.monitors if each.action is not None},
             ),
+            monitoring=monitoring,
+            safe_pressure_pa=safety.safe_pressure_pa,
             minimum_pa=file.pressure.minimum_pa,
             maximum_pa=file.pressure.maximum_pa,
             breakaway_pa=file.valve.breakaway_pa,
@@ -96,9 +103,10 @@ class Settings:
             valve=valve,
         )
 
-    def safe_pa(self, action: ActionName, held_pa: float) -> float:
-        """Return the pressure of a safe action: hold what is held, vent to the minimum, or fill to the maximum."""
-        return {"hold": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa}[action]
+    def safe_pa(self, action: SafeActionName, held_pa: float) -> float:
+        """Return the pressure of a safe action: what is held, the minimum (vent), the maximum (fill), the safe one."""
+        safe_pa = held_pa if self.safe_pressure_pa is None else self.safe_pressure_pa
+        return {"hold": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa, "safe": safe_pa}[action]
 
 
 def _within_supply(file: DaemonFile, valve: ExtendedValve | None) -> DaemonFile:

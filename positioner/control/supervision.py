@@ -5,11 +5,13 @@ acknowledgement after its cause is gone frees the way; then a person or the DCS 
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from config.codes import Fault, Mode, Quality
-from config.quantities import ActionName, DeviceStatus
+from config.quantities import DeviceStatus
+from config.supervision_table import SafeActionName
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 
@@ -25,17 +27,19 @@ class Limits:
     heartbeat_timeout_s: float
     restart_tolerance_pa: float
     """A device that comes back with a command farther than this from ours was restarted."""
-    action: ActionName
-    heartbeat_action: ActionName
+    action: SafeActionName
+    heartbeat_action: SafeActionName
+    actions: Mapping[Fault, SafeActionName] = field(default_factory=dict)
+    """Of faults that have their own."""
 
     def plausible(self, position_m: float) -> bool:
         """Return whether a stem can be there; NaN is nowhere."""
         margin_m = self.travel_margin * self.stroke_m
         return -margin_m <= position_m <= self.stroke_m + margin_m
 
-    def action_on(self, fault: Fault) -> ActionName:
+    def action_on(self, fault: Fault) -> SafeActionName:
         """Return the safe action that answers a fault."""
-        return self.heartbeat_action if fault is Fault.DCS_SILENT else self.action
+        return self.heartbeat_action if fault is Fault.DCS_SILENT else self.actions.get(fault, self.action)
 
 
 class SupervisionMemory(NamedTuple):
@@ -49,6 +53,8 @@ class SupervisionMemory(NamedTuple):
     mode_writes: int = 0
     acknowledgements: int = 0
     heartbeats: int = 0
+    measured: bool = False
+    """Whether there was a good measurement since the start."""
     unanswered_pa: tuple[float, ...] = ()
     """Commands given since the last good measurement, which the device may hold or not."""
 
@@ -62,9 +68,14 @@ def usable(sample: Sample, limits: Limits) -> bool:
 
 
 def supervise(
-    memory: SupervisionMemory, sample: Sample, command_pa: float, requests: Requests, limits: Limits
+    memory: SupervisionMemory,
+    sample: Sample,
+    command_pa: float,
+    requests: Requests,
+    limits: Limits,
+    monitored: Fault = Fault.NONE,
 ) -> SupervisionMemory:
-    """Return what is known after this sample; `command_pa` is the last command given."""
+    """Return what is known after this sample; `command_pa` was given last, `monitored` is what monitors found."""
     good = usable(sample, limits)
     bad = not good and sample.quality is not Quality.REPEATED
     first = math.isinf(memory.good_s)
@@ -77,7 +88,7 @@ def supervise(
     short = memory.bad_in_a_row < limits.lost_after_cycles
     given_pa = (*memory.unanswered_pa, command_pa) if short else (command_pa,)
 
-    cause = _cause(sample, given_pa, bad_in_a_row, sample.now_s - good_s, limits)
+    cause = _cause(sample, given_pa, bad_in_a_row, sample.now_s - good_s, limits) or monitored
     silent = memory.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heartbeat_s
     if cause is Fault.NONE and silent:
         cause = Fault.DCS_SILENT
@@ -93,6 +104,7 @@ def supervise(
         mode_writes=requests.mode_writes,
         acknowledgements=requests.acknowledgements,
         heartbeats=requests.heartbeats,
+        measured=memory.measured or good,
         unanswered_pa=(command_pa,) if good else given_pa,
     )
 

@@ -8,6 +8,8 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     backoff                       when to try again what failed, and what to say of it
     snapshot                      what a cycle leaves for the others
     supervisory_registers         what the DCS reads and writes
+    experiment_registers          the same of a played experiment
+    service_state                 what the service does for a valve: states and transitions
     refinement_process            fits in a process of its own
     recorder, logs                recordings and log lines, written beside the cycle
     memory                        what is known of a valve, kept over restarts

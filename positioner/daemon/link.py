@@ -44,6 +44,8 @@ class LinkSettings:
     """How far that may be from what it was told."""
     pressure_is_after: bool = False
     """Whether the pressure of a reply is that of the command which it answers."""
+    shadow: bool = False
+    """Whether it is only read."""
     in_lockstep: bool = True
     """Whether it has obeyed a command for a period when it answers."""
 
@@ -52,7 +54,8 @@ class LinkSettings:
         """Return what a daemon's file asks for; `tolerance_pa` is that of a restarted device."""
         lockstep = file.cycle.pace == "device"
         after = file.device.sampling == "after" and not lockstep
-        return cls(file.longest_unattended_s, file.safety.read_back_s, tolerance_pa, after, lockstep)
+        read_back_s = 0.0 if file.cycle.shadow else file.safety.read_back_s
+        return cls(file.longest_unattended_s, read_back_s, tolerance_pa, after, file.cycle.shadow, lockstep)
 
 
 @dataclass(slots=True)
@@ -121,7 +124,7 @@ class Link:
             elif self._connected:
                 self._commanded_s = now_s
                 told_pa, self._told_pa = self._told_pa, None
-                reading = self._driver.exchange(command_pa)
+                reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
                 self._sample = self._fresh(reading, command_pa, told_pa)
                 self._told_pa = command_pa
                 self._backoff.succeeded()
@@ -141,7 +144,9 @@ class Link:
         self._returned_s = math.inf
 
     def leave(self, command_pa: float) -> None:
-        """Give the device its last command, in Pa, and say so when it cannot be reached."""
+        """Give the device its last command, in Pa, and say so when it cannot be reached; none if it is only read."""
+        if self._settings.shadow:
+            return
         try:
             if not self._connected:
                 self._driver.open()

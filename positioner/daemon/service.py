@@ -8,6 +8,7 @@ import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 
@@ -34,6 +35,7 @@ from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
+from positioner.daemon.service_state import service_state
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 
 log = logging.getLogger(__name__)
@@ -65,8 +67,9 @@ class ServedValve:
     def served(self) -> SupervisoryRegisters:
         """Return its supervisory registers."""
         settings = self.settings
+        state = partial(service_state, limits=settings.limits, shadow=self.file.cycle.shadow)
         return SupervisoryRegisters(
-            self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name
+            self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name, state
         )
 
     def leave(self) -> None:
@@ -132,7 +135,8 @@ def _assembled(
 ) -> ServedValve:
     settings = Settings.of(file, extended)
     link_settings = LinkSettings.of(file, settings.limits.restart_tolerance_pa)
-    link = Link(driver_for(file.device), pace, link_settings)
+    device = file.device.read_only() if file.cycle.shadow else file.device
+    link = Link(driver_for(device), pace, link_settings)
     on_exit.callback(link.release)
     where = str(source) if is_alone else f"{source}: valve {file.valve.name}"
     unreachable_reason = None
@@ -157,7 +161,9 @@ def _assembled(
         if file.health.folder is None
         else StoredHealth.in_folder(source.parent / file.health.folder, file.valve.name)
     )
-    health = Health(HealthSettings.of(file.health, file.valve.stroke_m), stored.record if stored else None)
+    health = Health(
+        HealthSettings.of(file.health, file.valve.stroke_m, file.supervision), stored.record if stored else None
+    )
     with logging_valve(file.valve.name):
         cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health)
     keepers: list[HealthKeeper | MemoryKeeper] = [

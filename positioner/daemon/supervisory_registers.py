@@ -20,7 +20,7 @@ from importlib.metadata import version
 
 from pymodbus.constants import ExcCodes
 
-from config.codes import Fault, Mode, Quality
+from config.codes import Fault, Mode, Quality, ServiceState
 from config.registers import (
     BY_NAME,
     ESTIMATED,
@@ -34,11 +34,14 @@ from config.registers import (
     Register,
 )
 from fieldbus.modbus.register_answers import RegisterError, Table
-from positioner.control.requests import ExperimentRequest, Requests
+from positioner.control.controller import Decision
+from positioner.control.requests import Requests
 from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.cycle import Cycle
+from positioner.daemon.experiment_registers import WriteRejected, experiment_asked, experiment_getters
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.logs import log_event, logging_valve
+from positioner.daemon.service_state import state_by_mode
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.estimates import Estimate
 
@@ -57,7 +60,13 @@ class SupervisoryRegisters:
     """The registers of one valve, by its name in the log. `maximum_pa` and `minimum_pa` bound the manual pressure."""
 
     def __init__(
-        self, cycle: Cycle, stroke_m: float, minimum_pa: float, maximum_pa: float, valve: str | None = None
+        self,
+        cycle: Cycle,
+        stroke_m: float,
+        minimum_pa: float,
+        maximum_pa: float,
+        valve: str | None = None,
+        state: Callable[[Decision], ServiceState] = state_by_mode,
     ) -> None:
         self._cycle = cycle
         self._valve = valve
@@ -66,7 +75,7 @@ class SupervisoryRegisters:
         self._maximum_pa = maximum_pa
         self._heartbeat = 0
         self._lines = LinesPerPeer()
-        self._values = _getters(cycle, stroke_m)
+        self._values = _getters(cycle, stroke_m) | {"service": lambda s, _: state(s.decision)}
 
     def read(self, table: Table, address: int, count: int) -> Sequence[int]:  # noqa: ARG002 - both tables are the same
         """Return words of one snapshot; addresses between registers read 0.
@@ -165,7 +174,7 @@ class SupervisoryRegisters:
         if values.get("health_reset") == 1:
             requests = replace(requests, health_resets=requests.health_resets + 1)
         if values.keys() & EXPERIMENT_NAMES:
-            requests = replace(requests, experiment=_experiment_asked(requests.experiment, values))
+            requests = replace(requests, experiment=experiment_asked(requests.experiment, values))
         if "heartbeat" in values:
             self._heartbeat = int(values["heartbeat"])
             requests = replace(requests, heartbeats=requests.heartbeats + 1)
@@ -200,14 +209,6 @@ class SupervisoryRegisters:
         return value
 
 
-class WriteRejected(Exception):
-    """A write that is not taken: the Modbus exception that answers it, and the reason for the log."""
-
-    def __init__(self, code: ExcCodes, reason: str) -> None:
-        self.code = code
-        self.reason = reason
-
-
 Getter = Callable[[Snapshot, Requests], float]
 
 
@@ -220,9 +221,9 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         **_statistics_getters(cycle),
         **_identity_getters(),
         **_health_getters(cycle, stroke_m),
-        **_experiment_getters(),
+        **experiment_getters(),
     }
-    assert getters.keys() == BY_NAME.keys() - {"heartbeat"}, getters.keys() ^ BY_NAME.keys()
+    assert getters.keys() == BY_NAME.keys() - {"heartbeat", "service"}, getters.keys() ^ BY_NAME.keys()
     return getters
 
 
@@ -337,51 +338,6 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "reversals": lambda _s, _r: health.record.reversals,
         "stiction_index": lambda _s, _r: health.record.stiction_index,
         "moves_judged": lambda _s, _r: health.record.moves_judged,
-    }
-
-
-def _experiment_asked(before: ExperimentRequest, values: Mapping[str, float]) -> ExperimentRequest:
-    """Return what is asked for after writes to the experiment's registers."""
-    after = replace(
-        before,
-        consented=bool(values.get("experiment_consent", before.consented)),
-        vetoed=bool(values.get("experiment_veto", before.vetoed)),
-    )
-    point = [values.get(f"experiment_{what}") for what in ("point", "time", "pressure")]
-    if any(each is not None for each in point):
-        number, time_s, pressure_pa = point
-        if number is None or time_s is None or pressure_pa is None:
-            raise WriteRejected(ExcCodes.ILLEGAL_VALUE, "experiment_point: point, time and pressure go in one request")
-        if number not in (0, len(after.points)):
-            raise WriteRejected(
-                ExcCodes.ILLEGAL_VALUE, f"experiment_point: the next is {len(after.points)}, or 0, got {number:g}"
-            )
-        after = replace(after, points=(*after.points[: int(number)], (time_s, pressure_pa)))
-    if "experiment_start" in values:
-        if values["experiment_start"] != len(after.points):
-            raise WriteRejected(
-                ExcCodes.ILLEGAL_VALUE,
-                f"experiment_start: there are {len(after.points)} points, not {values['experiment_start']:g}",
-            )
-        after = replace(after, starts=after.starts + 1)
-    return after
-
-
-def _experiment_getters() -> dict[str, Getter]:
-    def last(request: Requests, which: int) -> float:
-        points = request.experiment.points
-        return points[-1][which] if points else 0.0
-
-    return {
-        "experiment_consent": lambda _, r: r.experiment.consented,
-        "experiment_veto": lambda _, r: r.experiment.vetoed,
-        "experiment_point": lambda _, r: max(0, len(r.experiment.points) - 1),
-        "experiment_time": lambda _, r: last(r, 0),
-        "experiment_pressure": lambda _, r: last(r, 1),
-        "experiment_start": lambda _s, _r: 0,
-        "experiment_points": lambda _, r: len(r.experiment.points),
-        "experiment_state": lambda s, _: s.decision.experiment.state,
-        "experiment_elapsed": lambda s, _: s.decision.experiment.elapsed_s(s.sample.now_s),
     }
 
 

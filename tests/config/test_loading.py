@@ -80,7 +80,7 @@ def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> Non
         ("[valve]\nstroke_m = 0.1\n[device.map]\nposition_m = {address = 0}\n", "device.map.command_pa: is required"),
         (
             "[valve]\nstroke_m = 0.1\n[safety]\naction = 'open'\n",
-            "safety.action: Input should be 'hold', 'vent' or 'fill'",
+            "safety.action: Input should be 'hold', 'vent', 'fill' or 'safe'",
         ),
         (
             "[valve]\nstroke_m = 0.1\n[identification]\nwindow_s = 0.1\n",

@@ -213,3 +213,15 @@ def test_neither_an_exception_nor_a_number_that_is_none_ends_a_good_connection(d
     assert qualities == [Quality.GOOD, Quality.NO_NUMBER, Quality.GOOD, Quality.LOST, Quality.GOOD]
     assert driver._client._socket is socket_before  # type: ignore[attr-defined]
     link.release()
+
+
+def test_in_shadow_a_device_is_read_and_never_written_to(device: PlainDevice) -> None:
+    described = device.described(None)
+    link = Link(driver_for(described.read_only()), RealTimePace(0.01), LinkSettings(shadow=True))
+    link.open()
+    device.show(COUNTER, 1)
+    assert link.exchange(90e3).quality is Quality.GOOD
+    link.leave(0.0)
+    link.release()
+    assert device.command == 40
+    assert set(device.functions) <= {3, 4}

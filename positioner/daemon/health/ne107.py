@@ -30,7 +30,15 @@ CLASS = {
     Ne107Cause.TRAVEL: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.REVERSALS: Ne107Status.MAINTENANCE_REQUIRED,
 }
-"""The class of each cause, worst first."""
+"""The class of each cause, worst first; of those that `MONITORED` names, the daemon's file says it."""
+MONITORED = {
+    Fault.TRAVEL_DEVIATION: Ne107Cause.TRAVEL_DEVIATION,
+    Fault.FROZEN_SENSOR: Ne107Cause.FROZEN_SENSOR,
+    Fault.POSITION_RATE: Ne107Cause.POSITION_RATE,
+    Fault.SATURATED: Ne107Cause.SATURATED,
+    Fault.OVERRUN: Ne107Cause.OVERRUN,
+}
+"""What the monitors find, as a cause."""
 
 FEWEST_MOVES = 5
 """Moves judged before the stiction index counts."""
@@ -41,11 +49,8 @@ class Ne107Condition:
     """A status and what it rests on, the first cause deciding."""
 
     causes: tuple[Ne107Cause, ...]
-
-    @property
-    def status(self) -> Ne107Status:
-        """The NE 107 class."""
-        return CLASS[self.causes[0]] if self.causes else Ne107Status.GOOD
+    status: Ne107Status = Ne107Status.GOOD
+    """The NE 107 class."""
 
     @property
     def cause(self) -> Ne107Cause:
@@ -61,8 +66,9 @@ class Ne107Condition:
 def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
     """Return the condition of a valve."""
     silent = decision.fault is Fault.DCS_SILENT
+    monitored = {MONITORED[fault] for fault in (*decision.alarms, decision.fault) if fault in MONITORED}
     holds = {
-        Ne107Cause.FAULT: decision.fault is not Fault.NONE and not silent,
+        Ne107Cause.FAULT: decision.fault is not Fault.NONE and not silent and decision.fault not in MONITORED,
         Ne107Cause.NOT_AUTOMATIC: decision.mode is not Mode.AUTOMATIC and not silent,
         Ne107Cause.EXCITED: decision.state is State.S3_IDENTIFY,
         Ne107Cause.NOT_IDENTIFIED: decision.mode is Mode.AUTOMATIC and decision.applied.ratios is None,
@@ -70,8 +76,10 @@ def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
         Ne107Cause.BEYOND_LIMITS: decision.inhibit_reason is InhibitReason.LAW_BEYOND_LIMITS,
         Ne107Cause.STUCK: decision.inhibit_reason is InhibitReason.STUCK,
     }
-    worn = set(_wear(health))
-    return Ne107Condition(tuple(cause for cause in CLASS if cause in worn or holds.get(cause, False)))
+    classes = {**CLASS, **health.settings.monitor_classes}
+    holding = {cause for cause, now in holds.items() if now} | set(_wear(health)) | monitored
+    causes = sorted(holding, key=lambda cause: (-classes[cause], cause))
+    return Ne107Condition(tuple(causes), classes[causes[0]] if causes else Ne107Status.GOOD)
 
 
 def _wear(health: Health) -> Iterator[Ne107Cause]:

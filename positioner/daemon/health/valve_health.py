@@ -7,11 +7,13 @@
 `enter` is called once a cycle by the cycle thread: a few comparisons, nothing is made anew. Others read what it leaves.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 
-from config.codes import Mode, Quality, State
+from config.codes import Mode, Ne107Cause, Ne107Status, Quality, State
 from config.daemon_file import HealthTable
+from config.supervision_table import Monitor, SupervisionTable
 from positioner.control.controller import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -19,6 +21,8 @@ from positioner.daemon.health.health_file import HealthRecord
 from positioner.daemon.health.stiction_index import StictionIndex
 from positioner.daemon.health.travel_accumulator import TravelAccumulator
 from positioner.estimation.acceptance import Applied
+
+MONITORS = SupervisionTable()
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +37,12 @@ class HealthSettings:
     stiction_limit: float
     travel_limit_m: float
     reversal_limit: int
+    monitor_classes: Mapping[Ne107Cause, Ne107Status]
+    """Of what the monitors of table `[supervision]` find."""
 
     @classmethod
-    def of(cls, health: HealthTable, stroke_m: float) -> "HealthSettings":
-        """Return the settings that table `[health]` asks for, for a valve of that stroke."""
+    def of(cls, health: HealthTable, stroke_m: float, supervision: SupervisionTable = MONITORS) -> "HealthSettings":
+        """Return the settings that tables `[health]` and `[supervision]` ask for, for a valve of that stroke."""
         return cls(
             stroke_m=stroke_m,
             dead_band_m=health.dead_band * stroke_m,
@@ -46,7 +52,18 @@ class HealthSettings:
             stiction_limit=health.stiction_limit,
             travel_limit_m=health.travel_limit_strokes * stroke_m,
             reversal_limit=health.reversal_limit,
+            monitor_classes={
+                Ne107Cause.TRAVEL_DEVIATION: _class(supervision.travel_deviation),
+                Ne107Cause.FROZEN_SENSOR: _class(supervision.frozen_sensor),
+                Ne107Cause.POSITION_RATE: _class(supervision.position_rate),
+                Ne107Cause.SATURATED: _class(supervision.saturation),
+                Ne107Cause.OVERRUN: _class(supervision.overrun),
+            },
         )
+
+
+def _class(monitor: Monitor) -> Ne107Status:
+    return next(each for each in Ne107Status if each.text.startswith(f"{monitor.ne107} "))
 
 
 class Health:

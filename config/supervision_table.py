@@ -1,0 +1,86 @@
+"""Tables `[safety]` and `[supervision]` of the daemon's file: what ends in the safe state, and what else is watched.
+
+Each monitor has a threshold (0: it is not watched), a delay for which it must hold, what is done then, and its class by
+NAMUR NE 107. `alarm` only says so; anything else is a fault, latched, with that action. None knows the law.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from config.loading import Fraction, NonNegative, Positive, Schema
+
+SafeActionName = Literal["hold", "vent", "fill", "safe"]
+"""What is done on a fault: `safe` is the pressure `[safety] safe_pressure_pa`."""
+
+
+class SafetyTable(Schema):
+    """Table `[safety]`: what ends in the safe state, and what that is."""
+
+    action: SafeActionName = "hold"
+    """On a fault of the device or its bus, and when the daemon ends."""
+    lost_after_cycles: Annotated[int, Field(ge=1)] = 3
+    stale_after_s: Positive = 0.1
+    """Without a new measurement, or later than its cycle was due: then the daemon stood still."""
+    travel_margin: Fraction = 0.1
+    """A position farther than this fraction of the stroke outside the stroke is implausible."""
+    read_back_s: NonNegative = 1.0
+    """How often the device is asked for the command it holds, that another master may have written; 0 is never."""
+    heartbeat_timeout_s: NonNegative = 0.0
+    """Silence of the DCS that is a fault; 0 is never."""
+    heartbeat_action: SafeActionName = "hold"
+    safe_pressure_pa: NonNegative | None = None
+    """Of the action "safe"."""
+
+
+class Monitor(Schema):
+    """What every monitor has."""
+
+    threshold: NonNegative = 0.0
+    delay_s: NonNegative = 1.0
+    action: Literal["alarm", "hold", "vent", "fill", "safe"] = "alarm"
+    ne107: Literal["F", "C", "S", "M"] = "S"
+
+
+class TravelDeviation(Monitor):
+    """The stem away from its reference, in automatic outside S3, by a share of the stroke."""
+
+    delay_s: NonNegative = 10.0
+
+
+class FrozenSensor(Monitor):
+    """A position the same to the digit, inside the travel, while the pressure changes by a share of its span."""
+
+    threshold: NonNegative = 0.5
+    action: Literal["alarm", "hold", "vent", "fill", "safe"] = "hold"
+    ne107: Literal["F", "C", "S", "M"] = "F"
+
+
+class PositionRate(Monitor):
+    """A position that changes by more strokes a second than the valve can."""
+
+    delay_s: NonNegative = 0.0
+    action: Literal["alarm", "hold", "vent", "fill", "safe"] = "hold"
+    ne107: Literal["F", "C", "S", "M"] = "F"
+
+
+class Saturation(Monitor):
+    """A command as near to its limit as this share of the span, though the stem is inside its travel."""
+
+    delay_s: NonNegative = 10.0
+
+
+class Overrun(Monitor):
+    """Cycles, or replies, that take so many periods; in real time."""
+
+    threshold: Annotated[float, Field(ge=0)] = 3.0
+
+
+class SupervisionTable(Schema):
+    """The monitors."""
+
+    travel_deviation: TravelDeviation = TravelDeviation()
+    frozen_sensor: FrozenSensor = FrozenSensor()
+    position_rate: PositionRate = PositionRate()
+    saturation: Saturation = Saturation()
+    overrun: Overrun = Overrun()

@@ -1,0 +1,81 @@
+"""What the service does for a valve, beside the states S0 to S3 of its law: a state machine, declared as its table.
+
+The state is a function of what the last cycle decided; the table says which transitions that makes. Both are tested
+against each other on the controller, every cell. `docs/reliability.md` shows the table.
+"""
+
+from enum import StrEnum
+
+from config.codes import Fault, Mode, ServiceState
+from positioner.control.controller import Decision
+from positioner.control.supervision import Limits
+
+
+class ServiceEvent(StrEnum):
+    """What may change the state."""
+
+    MEASURED = "the first good measurement"
+    COMMANDED = "mode manual or automatic is written"
+    HELD = "mode hold is written"
+    FAULT_HOLDS = "a fault whose action is hold"
+    FAULT_SAFE = "a fault whose action is vent, fill or safe"
+    ACKNOWLEDGED = "acknowledged, the cause gone"
+    ENDED = "a signal, or a thread that died"
+
+
+_FAULTS = {ServiceEvent.FAULT_HOLDS: ServiceState.FAULT_HOLD, ServiceEvent.FAULT_SAFE: ServiceState.FAULT_SAFE}
+_END = {ServiceEvent.ENDED: ServiceState.STOPPED}
+
+TRANSITIONS: dict[ServiceState, dict[ServiceEvent, ServiceState]] = {
+    ServiceState.STARTING: {ServiceEvent.MEASURED: ServiceState.STANDBY, **_FAULTS, **_END},
+    ServiceState.SHADOW: _END,
+    ServiceState.STANDBY: {ServiceEvent.COMMANDED: ServiceState.ACTIVE, **_FAULTS, **_END},
+    ServiceState.ACTIVE: {ServiceEvent.HELD: ServiceState.STANDBY, **_FAULTS, **_END},
+    ServiceState.FAULT_HOLD: {ServiceEvent.ACKNOWLEDGED: ServiceState.STANDBY, **_FAULTS, **_END},
+    ServiceState.FAULT_SAFE: {ServiceEvent.ACKNOWLEDGED: ServiceState.STANDBY, **_FAULTS, **_END},
+    ServiceState.STOPPED: {},
+}
+"""Where an event leads; what is not named leaves the state as it is."""
+
+
+def after_event(state: ServiceState, event: ServiceEvent) -> ServiceState:
+    """Return the state after an event, by the table."""
+    return TRANSITIONS[state].get(event, state)
+
+
+def service_state(decision: Decision, limits: Limits, *, shadow: bool) -> ServiceState:
+    """Return the state that a cycle's decision stands for."""
+    if shadow:
+        return ServiceState.SHADOW
+    if decision.fault is not Fault.NONE:
+        holds = limits.action_on(decision.fault) == "hold"
+        return ServiceState.FAULT_HOLD if holds else ServiceState.FAULT_SAFE
+    if not decision.measured:
+        return ServiceState.STARTING
+    return ServiceState.STANDBY if decision.mode is Mode.HOLD else ServiceState.ACTIVE
+
+
+def state_by_mode(decision: Decision) -> ServiceState:
+    """Return the state where nobody says what a fault's action is: as if it were hold."""
+    if decision.fault is not Fault.NONE:
+        return ServiceState.FAULT_HOLD
+    return ServiceState.STANDBY if decision.mode is Mode.HOLD else ServiceState.ACTIVE
+
+
+def table() -> list[str]:
+    """Return the transitions as rows of a table: a row a state, a column an event."""
+    events = list(ServiceEvent)
+    head = ["", *(f"{event}" for event in events)]
+    rows = [
+        [state.name.lower().replace("_", "-"), *(_cell(state, event) for event in events)] for state in ServiceState
+    ]
+    return [_row(head), _row(["---"] * len(head)), *(_row(each) for each in rows)]
+
+
+def _cell(state: ServiceState, event: ServiceEvent) -> str:
+    after = TRANSITIONS[state].get(event)
+    return "" if after in (None, state) else after.name.lower().replace("_", "-")
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
