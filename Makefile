@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint browser bench soak blind docs clean
+.PHONY: venv demo test suite lint browser bench campaign soak blind docs clean
 
 venv: $(READY)
 
@@ -35,6 +35,9 @@ browser:                ## Debian's Chromium, for the tests of the pages; where 
 
 bench: $(READY)         ## figures that depend on the machine, as ratios in one run
 	$(BIN)/python -m benchmarks
+
+campaign: $(READY)      ## every fault in every state on each bus: some twenty minutes, prints the table
+	$(BIN)/python -m benchmarks.campaign --document docs/reliability.md
 
 soak: $(READY)          ## ten minutes of a polled, recording daemon: does its memory stay flat?
 	$(BIN)/python -m benchmarks.memory --minutes 10

@@ -128,18 +128,26 @@ class DeviceFault(Schema):
     drop      it answers nothing                                   (Modbus: as a gateway says it, exception 11)
     freeze    it answers, but its measurements and its clock stand still
     jump      its position transmitter is off by `by_m`
+    drift     the same, by ever more, `by_m` at the end
+    nan       its position is no number
+    supply    its supply falls to `to_pa`, whatever is commanded
     restart   its clock and its settings begin anew; it takes no time
     """
 
-    kind: Literal["drop", "freeze", "jump", "restart"]
+    kind: Literal["drop", "freeze", "jump", "drift", "nan", "supply", "restart"]
     at_s: NonNegative
     over_s: NonNegative = math.inf
     by_m: float = 0.0
+    to_pa: NonNegative | None = None
 
     @model_validator(mode="after")
     def _says_what_its_kind_needs(self) -> Self:
-        if (self.kind == "jump") != (self.by_m != 0.0):
-            raise ValueError("by_m, other than 0, belongs with kind 'jump' and with no other")
+        if (self.kind in ("jump", "drift")) != (self.by_m != 0.0):
+            raise ValueError("by_m, other than 0, belongs with kind 'jump' or 'drift' and with no other")
+        if (self.kind == "supply") != (self.to_pa is not None):
+            raise ValueError("to_pa belongs with kind 'supply' and with no other")
+        if self.kind == "drift" and self.over_s == math.inf:
+            raise ValueError("over_s: a drift has an end")
         if self.kind == "restart" and self.over_s != math.inf:
             raise ValueError("over_s: a restart takes no time")
         return self

@@ -28,6 +28,8 @@ from positioner.daemon.pacing import Pace
 
 log = logging.getLogger(__name__)
 
+LONG_COUNTER = 1 << 16
+"""A counter of fewer numbers may well pass half of them from one reading to the next."""
 MOST_REFUSALS = 2
 """Exceptions in a row on a connection that stays; after more the device is looked at anew."""
 
@@ -125,10 +127,16 @@ class Link:
                 self._commanded_s = now_s
                 told_pa, self._told_pa = self._told_pa, None
                 reading = self._driver.read() if self._settings.shadow else self._driver.exchange(command_pa)
-                self._sample = self._fresh(reading, command_pa, told_pa)
-                self._told_pa = command_pa
                 self._backoff.succeeded()
                 self._refusals = 0
+                if self._began_anew(reading):
+                    self._say(logging.WARNING, "device began anew", device_time_s=reading.device_time_s)
+                    self._driver.close()
+                    self._connected = False
+                    self._sample = self._lost()
+                else:
+                    self._sample = self._fresh(reading, command_pa, told_pa)
+                    self._told_pa = command_pa
             elif self._unattended_s > 0 or self._backoff.may_try(now_s):
                 self._sample = self._found_again()
             else:
@@ -253,6 +261,17 @@ class Link:
             return shown_pa
         acted_pa, self._pressure_pa = self._pressure_pa, shown_pa
         return shown_pa if acted_pa is None else acted_pa
+
+    def _began_anew(self, reading: Reading) -> bool:
+        """Return whether the device's clock, or a long counter, runs from its beginning again: then it is looked at."""
+        before, counted = self._reading, self._driver.capabilities.counter_range
+        if before is None:
+            return False
+        if reading.device_time_s is not None and before.device_time_s is not None:
+            return reading.device_time_s < before.device_time_s
+        if reading.sample_counter is None or before.sample_counter is None or counted < LONG_COUNTER:
+            return False
+        return (reading.sample_counter - before.sample_counter) % counted > counted // 2
 
     def _count(self, reading: Reading) -> bool:
         """Count the samples that were missed; return whether this one came before."""

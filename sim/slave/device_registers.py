@@ -5,13 +5,14 @@ registers between two quantities read 0. A write covers whole writable quantitie
 any of it is obeyed.
 """
 
+import math
 import struct
 from collections.abc import Sequence
 from operator import attrgetter
 
 from pymodbus.constants import ExcCodes
 
-from config.modbus_map import SIMULATED_MAP, ModbusMap
+from config.modbus_map import SIMULATED_MAP, ModbusMap, Place
 from config.quantities import WRITABLE, CommunicationAction
 from fieldbus.modbus.layout import layout
 from fieldbus.modbus.register_answers import RegisterError, Table
@@ -48,7 +49,7 @@ class DeviceRegisters:
         if not 0 <= first <= first + count <= self._layout.words:
             raise RegisterError(ExcCodes.ILLEGAL_ADDRESS)
         self._clock.catch_up()
-        raw = [place.raw(value) for place, value in zip(self._places, self._values(self._device), strict=True)]
+        raw = [_raw(place, value) for place, value in zip(self._places, self._values(self._device), strict=True)]
         return self._words.unpack(self._layout.pack(raw))[first : first + count]
 
     def write(self, address: int, words: Sequence[int], _peer: str) -> None:
@@ -92,3 +93,10 @@ class DeviceRegisters:
             values[name] = place.value(place.format.decode(words[at:end]))
             at = end
         return values
+
+
+def _raw(place: Place, value: float) -> float:
+    """Return the raw number of a value; a broken transmitter's NaN where the registers can say it, else 0."""
+    if not math.isfinite(value):
+        return value if place.is_float else 0
+    return place.raw(value)

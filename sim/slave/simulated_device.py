@@ -12,12 +12,13 @@ sample that it measures (`faults`); `drops` says whether it answers.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 
 from config.quantities import CommunicationAction, DeviceStatus
-from config.slave_file import SlaveFile
+from config.slave_file import DeviceFault, SlaveFile
 from sim.parameter_changes import Changes
 from sim.slave.faults import Faults
 from sim.transmitter import Transmitter
@@ -80,6 +81,7 @@ class Device:
         self._quiet_until_s = 0.0 if file.change else math.inf
         self._samples = self._shown = 0
         self._measured_s = 0.0
+        self._supply_pa = math.inf
         self.position_m = self.pressure_pa = 0.0
         self.drops = False
         self._boot()
@@ -163,6 +165,18 @@ class Device:
         self.communication_action = action
         self._last_heard = self._samples
 
+    def suffer(self, fault: Mapping[str, object]) -> None:
+        """Let something go wrong from now on, beside what its file says: a table `[[fault]]`.
+
+        Raises:
+            ValidationError: it is none.
+        """
+        self._faults = Faults((*self._file.fault, DeviceFault.model_validate(fault)))
+
+    def change_valve(self, **parameters: float) -> None:
+        """Give parameters of the valve new values at once."""
+        self._valve.change(**parameters)
+
     def _boot(self) -> None:
         """Begin with the settings of the file."""
         self._started = self._last_heard = self._samples
@@ -199,7 +213,7 @@ class Device:
             stretch = left
             if self._quiet_until_s < now_s + left * self._period_s:
                 stretch = max(1, min(left, math.ceil((self._quiet_until_s - now_s) / self._period_s)))
-            self._valve.advance(self.command_pa, stretch * self._period_s)
+            self._valve.advance(min(self.command_pa, self._supply_pa), stretch * self._period_s)
             self._samples += stretch
             left -= stretch
 
@@ -207,7 +221,7 @@ class Device:
         now_s = self._samples * self._period_s
         found = self._faults.at(now_s, self._measured_s)
         self._measured_s = now_s
-        self.drops = found.drops
+        self.drops, self._supply_pa = found.drops, found.supply_pa
         if found.restarts:
             self._boot()
         # The transmitter goes on in any case, so that a fault does not change the noise after it.
@@ -217,3 +231,5 @@ class Device:
         self._shown = self._samples - self._started
         self.position_m = position_m + found.jump_m if found.jump_m else position_m
         self.pressure_pa = self._valve.pressure_pa
+        if found.no_number:
+            self.position_m = math.nan

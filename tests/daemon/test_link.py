@@ -68,7 +68,7 @@ def test_a_new_sample_is_good_and_the_same_again_is_repeated() -> None:
     [(32, 1, 2, 0), (32, 1, 5, 3), (32, 2**32 - 1, 0, 0), (32, 2**32 - 2, 1, 2), (16, 65535, 0, 0), (8, 254, 1, 2)],
 )
 def test_missed_samples_are_counted_across_the_counters_wrap(bits: int, first: int, second: int, missed: int) -> None:
-    driver = Scripted(reading(first), reading(second))
+    driver = Scripted(*(Reading(0.05, 50e3, counter) for counter in (first, second)))
     driver.capabilities = replace(driver.capabilities, counter_range=1 << bits)
     link = opened(driver)
     link.exchange(5e4)
@@ -229,3 +229,15 @@ def test_a_device_that_shows_no_pressure_has_had_the_command_before_unless_it_is
         link = Link(Scripted(*[Reading(0.05)] * 3), DevicePace(), LinkSettings(in_lockstep=in_lockstep))
         link.open()
         assert [link.exchange(pressure_pa).pressure_pa for pressure_pa in (1e3, 2e3, 3e3)] == expected
+
+
+def test_a_device_that_begins_anew_on_a_good_connection_is_looked_at_before_it_is_commanded() -> None:
+    """Its clock or its counter says so; it is no loss of four thousand million samples."""
+    driver = Scripted(reading(5), reading(0), reading(2), held_pa=0.0)
+    link = opened(driver)
+    driver.shown = reading(1)
+    samples = [link.exchange(5e4) for _ in range(3)]
+    assert [sample.quality for sample in samples] == [Quality.GOOD, Quality.LOST, Quality.GOOD]
+    assert [sample.held_pa for sample in samples] == [None, None, 0.0]
+    assert driver.sent_pa == [5e4, 5e4]
+    assert link.counts.lost_samples == 0

@@ -1,5 +1,6 @@
 """A simulated device that drops, freezes, jumps and restarts by its file, in lockstep: every sample is counted."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -75,6 +76,17 @@ def test_a_device_that_drops_answers_nothing_obeys_nothing_and_comes_back() -> N
     assert answered == [1e3, ExcCodes.GATEWAY_NO_RESPONSE, ExcCodes.GATEWAY_NO_RESPONSE, 4e3, 5e3, 6e3]
 
 
+def test_a_drift_grows_a_nan_is_no_number_and_a_fallen_supply_gives_no_more() -> None:
+    shown = over_ticks(
+        faulty(kind="drift", at_s=1.0, over_s=1.0, by_m=0.01), lambda each: each.position_m - 1e-6 * each.pressure_pa
+    )
+    assert shown == pytest.approx([0.0, 0.0, 0.005, 0.0, 0.0, 0.0], abs=1e-12)
+    numbers = over_ticks(faulty(kind="nan", at_s=1.0, over_s=1.0), lambda each: math.isnan(each.position_m))
+    assert numbers == [False, True, True, False, False, False]
+    fallen = over_ticks(faulty(kind="supply", at_s=1.0, over_s=1.0, to_pa=1.5e3), lambda each: each.pressure_pa)
+    assert fallen == [1e3, 2e3, 1.5e3, 1.5e3, 5e3, 6e3], "from the sample on at which it fell"
+
+
 def test_several_faults_add_up_and_without_over_s_a_fault_stays() -> None:
     jumps = [{"kind": "jump", "at_s": 1.0, "by_m": 0.01}, {"kind": "jump", "at_s": 2.0, "by_m": 0.02}]
     device, _ = switched_on(clock={"period_s": PERIOD_S}, fault=jumps)
@@ -85,10 +97,13 @@ def test_several_faults_add_up_and_without_over_s_a_fault_stays() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[[fault]]\nkind = 'jump'\nat_s = 1.0\n", "by_m, other than 0, belongs with kind 'jump'"),
-        ("[[fault]]\nkind = 'freeze'\nat_s = 1.0\nby_m = 1.0\n", "belongs with kind 'jump' and with no other"),
+        ("[[fault]]\nkind = 'jump'\nat_s = 1.0\n", "by_m, other than 0, belongs with kind 'jump' or 'drift'"),
+        (
+            "[[fault]]\nkind = 'freeze'\nat_s = 1.0\nby_m = 1.0\n",
+            "belongs with kind 'jump' or 'drift' and with",
+        ),
         ("[[fault]]\nkind = 'restart'\nat_s = 1.0\nover_s = 1.0\n", "a restart takes no time"),
-        ("[[fault]]\nkind = 'melt'\nat_s = 1.0\n", "'drop', 'freeze', 'jump' or 'restart'"),
+        ("[[fault]]\nkind = 'melt'\nat_s = 1.0\n", "'drop', 'freeze', 'jump', 'drift', 'nan', 'supply' or 'restart'"),
         ("[bus]\nkind = 'canopen'\nnode = 5\n[[fault]]\nkind = 'drop'\nat_s = 1.0\n", "drop is for Modbus"),
     ],
 )
