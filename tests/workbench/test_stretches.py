@@ -10,7 +10,7 @@ from workbench.data.stillness import eventful
 from workbench.data.stretches import FITTED_WORK, PARTS, informative
 
 NOISE_M, HELD = 5e-5, 60
-FEW, MANY = 1_000, 3_000
+FEW, MANY = 500, 3_000
 
 
 def steps(count: int, sizes_m: np.ndarray) -> Recording:

@@ -19,7 +19,7 @@ from workbench.data.motion import slips
 from workbench.data.record import SLIP_ROWS, STRETCH, Record, ready
 from workbench.data.stillness import eventful
 
-FITTED_WORK = 60_000
+FITTED_WORK = 40_000
 """Of what is fitted and held out together."""
 PARTS = 24
 NAMED = 3
