@@ -1,0 +1,24 @@
+"""Each promise of `docs/reliability.md` names a test, and there is such a test."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TABLE = (ROOT / "docs" / "reliability.md").read_text().partition("\n| promise | test |\n")[2].partition("\n\n")[0]
+PROMISES = [row.strip("| ").split(" | ") for row in TABLE.splitlines()[1:]]
+
+
+def test_there_are_promises() -> None:
+    assert len(PROMISES) > 30
+    assert all(len(each) == 2 for each in PROMISES)
+
+
+@pytest.mark.parametrize("row", PROMISES, ids=lambda row: row[0][:40])
+def test_a_promise_names_a_test_that_is_there(row: list[str]) -> None:
+    named = re.fullmatch(r"`(tests/[\w/]+\.py)::(test_\w+)`", row[1])
+    assert named, row
+    module = ast.parse((ROOT / named[1]).read_text(encoding="utf-8"))
+    assert named[2] in {each.name for each in ast.walk(module) if isinstance(each, ast.FunctionDef)}
