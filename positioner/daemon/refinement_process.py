@@ -3,18 +3,22 @@
 A job goes down a pipe, its result comes back up another, pickled: both ends are this file. A thread waits for it; the
 control thread only looks whether a result lies there. Jobs of several valves are done one after another. The process
 is started at once, and does a small job of its own first, so that the first window is answered as fast as any. It is
-as nice as can be and leaves the terminal's Ctrl-C to the daemon; it ends when its pipe does. If it dies, jobs are
-refused from then on and the algebraic estimates stand: one line in the log says so.
+as nice as can be and leaves the terminal's Ctrl-C to the daemon; it ends when its pipe does. If it dies, or does not
+answer for `ANSWER_WITHIN_S`, the job is refused and the algebraic estimates stand; one line in the log says so, and the
+process is started again for a later job, ever more seldom while it goes on failing.
 
     python -P -m positioner.daemon.refinement_process      is what it runs; with -P, a `config.py` in the current
     folder is not taken for ours
 """
 
 import logging
+import math
 import os
 import pickle
+import select
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from queue import SimpleQueue
 from threading import Event, Thread
@@ -30,6 +34,11 @@ log = logging.getLogger(__name__)
 
 LONGEST_WAIT_S = 10.0
 """That a patient refiner waits for a result."""
+ANSWER_WITHIN_S = 120.0
+"""Of the process; a job takes a second or two."""
+FIRST_S, LONGEST_S = 1.0, 300.0
+"""Wait before it is started again: after the first failure, and at the most."""
+MOST_FAILURES = 16
 ENDING_S = 2.0
 """Time the process has to end by itself."""
 
@@ -40,7 +49,8 @@ class RefinementProcess:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._jobs: SimpleQueue[tuple[ProcessRefiner, RefinementJob] | None] = SimpleQueue()
-        self.alive = True
+        self._failures = 0
+        self._again_s = -math.inf
         self._thread = Thread(target=self._serve, name="refinement", daemon=True)
         self._thread.start()
 
@@ -52,14 +62,16 @@ class RefinementProcess:
         """End the process."""
         self._jobs.put(None)
         self._thread.join(ENDING_S)
-        if self._process is None:
-            return
-        self._process.terminate()  # it may be starting still, and holds nothing that would be lost
-        try:
-            self._process.wait(ENDING_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        if self._thread.is_alive():  # it waits for an answer: none will come
+            process = self._process
+            if process is not None:
+                process.kill()
+            self._thread.join(ENDING_S)
+
+    @property
+    def alive(self) -> bool:
+        """Whether it takes jobs: it runs, or is to be started again."""
+        return time.monotonic() >= self._again_s
 
     def put(self, refiner: "ProcessRefiner", job: RefinementJob) -> None:
         """Queue a job."""
@@ -76,23 +88,54 @@ class RefinementProcess:
         )
 
     def _serve(self) -> None:
-        """Start the process, and hand it one job after another."""
-        self._process = process = self._started()
-        down, up = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
-        task = self._jobs.get()
-        with suppress(OSError), down, up:
-            while task is not None:
-                refiner, job = task
-                try:
-                    pickle.dump(job, down)
-                    down.flush()
-                    result: BatchResult | None = pickle.load(up)
-                except (OSError, EOFError, pickle.UnpicklingError) as error:
-                    self.alive = False
-                    result = None
-                    log_event(log, logging.ERROR, "the refinement process is gone", reason=str(error))
-                refiner.deliver(result)
-                task = self._jobs.get()
+        """Start the process, and hand it one job after another; start it again where it is gone."""
+        self._process = self._started()
+        while (task := self._jobs.get()) is not None:
+            refiner, job = task
+            result = None
+            try:
+                result = self._done(job)
+                self._failures = 0
+            except (OSError, EOFError, pickle.UnpicklingError) as error:
+                self._give_up(str(error) or "it ended")
+            refiner.deliver(result)
+        self._close()
+
+    def _done(self, job: RefinementJob) -> BatchResult | None:
+        """Have a job done.
+
+        Raises:
+            OSError, EOFError, UnpicklingError: the process is gone, or does not answer.
+        """
+        if self._process is None:
+            self._process = self._started()
+        down, up = cast(IO[bytes], self._process.stdin), cast(IO[bytes], self._process.stdout)
+        pickle.dump(job, down)
+        down.flush()
+        if not select.select((up,), (), (), ANSWER_WITHIN_S)[0]:
+            raise OSError(f"it does not answer within {ANSWER_WITHIN_S:g} s")
+        result: BatchResult | None = pickle.load(up)
+        return result
+
+    def _give_up(self, reason: str) -> None:
+        """End what is left of the process; it is not started again for a while."""
+        wait_s = min(FIRST_S * 2.0**self._failures, LONGEST_S)
+        self._failures = min(self._failures + 1, MOST_FAILURES)
+        self._again_s = time.monotonic() + wait_s
+        log_event(log, logging.ERROR, "the refinement process is gone", reason=reason, again_after_s=wait_s)
+        self._close()
+
+    def _close(self) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        with suppress(OSError), cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout):
+            process.terminate()  # it may be starting still, and holds nothing that would be lost
+        try:
+            process.wait(ENDING_S)
+        except subprocess.TimeoutExpired:
+            process.kill()  # a stopped one does not end by being asked
+            process.wait()
 
 
 class ProcessRefiner:

@@ -4,10 +4,12 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from positioner.daemon import refinement_process as room
 from positioner.daemon.refinement_process import ProcessRefiner, RefinementProcess
 from positioner.estimation.batch import BatchSettings
 from positioner.estimation.refiner import RefinementJob
@@ -49,9 +51,9 @@ def test_it_is_started_before_there_is_a_job_and_ends_at_once() -> None:
         time.sleep(0.005)
     assert made._process is not None
     assert made._process.poll() is None
-    begin = time.monotonic()
+    child, begin = made._process, time.monotonic()
     made.stop()
-    assert made._process.poll() is not None
+    assert child.poll() is not None
     assert time.monotonic() - begin < 2.0
 
 
@@ -74,18 +76,42 @@ def test_a_job_that_makes_no_sense_fails_alone(process: RefinementProcess) -> No
     assert refiner.collect() is not None
 
 
-def test_a_process_that_died_refuses() -> None:
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_process_that_dies_or_does_not_answer_is_told_and_started_again(
+    end: signal.Signals, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     process = RefinementProcess()
     refiner = process.refiner(blocking=True)
     assert refiner.submit(job())
     assert refiner.collect() is not None
     assert process._process is not None
-    os.kill(process._process.pid, signal.SIGKILL)
-    process._process.wait()
-    refiner.submit(job())
-    assert refiner.collect() is None
-    assert not refiner.submit(job())
+    before = process._process
+    with monkeypatch.context() as impatient:
+        impatient.setattr(room, "ANSWER_WITHIN_S", 0.2)
+        impatient.setattr(room, "FIRST_S", 1e6)
+        os.kill(before.pid, end)
+        refiner.submit(job())
+        assert refiner.collect() is None
+        assert not refiner.submit(job()), "not before the back-off is over"
+    assert caplog.messages == ["the refinement process is gone"]
+    process._again_s = 0.0
+    assert refiner.submit(job())
+    assert refiner.collect() is not None
+    assert process._process is not before
+    assert before.poll() is not None, "nothing is left of it"
     process.stop()
+
+
+def test_it_is_started_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
+    process = RefinementProcess()
+    process.stop()
+    monkeypatch.setattr(room, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    waits = []
+    for _ in range(12):
+        process._give_up("it ended")
+        waits.append(process._again_s)
+    assert waits[:4] == [1.0, 2.0, 4.0, 8.0]
+    assert waits[-1] == room.LONGEST_S
 
 
 def until_collected(refiner: ProcessRefiner) -> bool:
