@@ -37,6 +37,7 @@ from sim.kernel_source import kernel_source
 
 BASE = Path(karnopp.__file__)
 SLOW = Path(quasi_static.__file__)
+WRITABLE_BY_OTHERS = 0o022
 KARNOPP_IMPORT = re.compile(r"^from sim\.karnopp import \([^)]*\)\n", re.MULTILINE)
 """What stands in one text with `karnopp.py` need not be imported from it."""
 SHARED = (first_order_lag,)
@@ -205,6 +206,7 @@ def kernel_file(digest: str, text: str) -> Path:
 
 def _write(path: Path, text: str) -> Path:
     (path.parent / "__pycache__").mkdir(parents=True, exist_ok=True)
+    _make_private(path.parent)
     if not os.access(path.parent / "__pycache__", os.W_OK):
         raise PermissionError
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
@@ -212,6 +214,19 @@ def _write(path: Path, text: str) -> Path:
             file.write(text)
         Path(file.name).replace(path)
     return path
+
+
+def _make_private(folder: Path) -> None:
+    """See that nobody else may put a kernel there, which would run as this user.
+
+    Raises:
+        PermissionError: it is somebody else's.
+    """
+    found = folder.stat()
+    if found.st_uid != os.getuid():
+        raise PermissionError
+    if found.st_mode & WRITABLE_BY_OTHERS:
+        folder.chmod(0o700)
 
 
 @contextmanager

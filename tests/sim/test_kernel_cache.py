@@ -84,3 +84,20 @@ def test_without_a_writable_cache_the_text_lies_in_a_private_folder(
     assert path.read_text() == "text"
     assert not path.is_relative_to(tmp_path)
     assert path.parent.stat().st_mode & 0o077 == 0
+
+
+def test_a_cache_that_others_may_write_to_is_made_private_and_somebody_elses_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies there runs as this user."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    kernels = tmp_path / "positioner" / "kernels"
+    kernels.mkdir(parents=True)
+    kernels.chmod(0o777)
+    assert compiled.kernel_file("digest", "text").parent == kernels
+    assert kernels.stat().st_mode & 0o777 == 0o700
+    users = iter((os.getuid() + 1, os.getuid()))  # the temporary folder is this one's
+    monkeypatch.setattr(os, "getuid", lambda: next(users))
+    path = compiled.kernel_file("digest", "text")
+    assert path.read_text() == "text"
+    assert not path.is_relative_to(tmp_path)
