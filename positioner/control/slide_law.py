@@ -62,7 +62,7 @@ FAR = 2.0
 """Margins beyond which a stem that moves is sent the other way."""
 WITHIN_NOISE, WITHIN_QUANTUM = 2.5, 0.6
 """Deviations of a mean, and quanta, that an error may be."""
-WIDENS, FREE_SLIDES = 1.5, 4
+WIDENS, FREE_SLIDES = 1.5, 2
 """Factor on the dead band for each two slides beyond the first few."""
 MOST_SLIDES = 14
 """Given for one reference."""
@@ -252,6 +252,9 @@ def _next_slide(
     # Where the device is told whole numbers, a slide lands up to half a step beside, and no other command is better.
     beside_m = 0.5 * settings.command_step_pa / -balance.ratios.b_over_c
     known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m) + beside_m
+    # Another slide would miss as the ones before have: where they scatter by more than they are wanted to, so will it.
+    if memory.slides > FREE_SLIDES:
+        known_m = max(known_m, balance.scatter_m)
     if abs(error_m) <= max(settings.dead_band_m, known_m) * widened:
         return replace(memory, inhibit_reason=InhibitReason.NOTHING)
     again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0
@@ -313,14 +316,14 @@ def _excursion(
 def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, settings: SlideSettings) -> float:
     """Return what to hold, Pa, if something interrupts the first of two slides now.
 
-    From beyond its margin the stem comes back to its target. From nearer it would not break loose: it goes as far
-    beyond the target on the other side as it lacks, if that is nearer than where it is.
+    From beyond a margin that has broken loose the stem comes back to its target. From nearer it might not break loose:
+    it goes as far beyond the target on the other side as it lacks, if that is nearer than where it is.
     """
     assert memory.target_m is not None
     s, target_m = memory.direction, memory.target_m
     goes_on_m = 0.0 if isnan(memory.last_m) else position_m - memory.last_m
     beyond_m = s * (position_m + goes_on_m - target_m)
-    lacks_m = RETURN * memory.margins.of(-s, turning=True).way_m - beyond_m
+    lacks_m = RETURN * memory.margins.of(-s, turning=True).sure_m - beyond_m
     to_m = target_m - s * max(0.0, lacks_m) if beyond_m > lacks_m else target_m
     return min(max(balance.pressure_pa(to_m, -s), settings.minimum_pa), settings.maximum_pa)
 

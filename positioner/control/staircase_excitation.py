@@ -9,9 +9,10 @@ since the stem last moved:
     from then on       1.05 times the least, or an eighth of the window if that is more: each step is a slide
     at the bound       of the window, or where the next slide would leave it, the staircase turns round
 
-When the landings of both directions give a valid static law it turns round once more, for one landing that closes the
-round as a surveyor closes his: a sensor that was shifted meanwhile lands it elsewhere. Then it has ended, or after
-`MOST_TURNS`. No alpha and beta are
+When the landings of both directions give a valid static law it turns round once more, for a landing that closes the
+round as a surveyor closes his: a sensor that was shifted meanwhile lands it elsewhere. The first slide after a turn
+does not close it: behind a soft packing it is a short one, which a slow pressure lands elsewhere than long ones. Then
+the staircase has ended, or after `MOST_TURNS`. No alpha and beta are
 needed: break-away is found by the ramp of small steps, and nothing is asked for beyond the window and the pressure
 limits.
 """
@@ -34,6 +35,10 @@ MANY_EACH = 8
 """... with which break-away need not be found in both."""
 WIDE = 0.5
 """Of the window, over which the landings of each direction must lie: what changes over the travel shows there."""
+GAVE_WAY = 0.3
+"""Of the way that the rise was worth before: a stem that moved less was not broken loose, its packing gave way."""
+LEAP = 3.0
+"""Rises of the slide before: a rise beyond it is not asked for, for the slope may be that of a packing."""
 NOT_COMPLETE = 0.99
 NEARLY_TURNED = 0.8
 """Of the rise that turned friction round before: the first step of the last turn."""
@@ -125,9 +130,13 @@ class Staircase:
         bound_m = limits.high_m if stairs.direction > 0 else limits.low_m
         left_m = stairs.direction * (bound_m - position_m)
         at_limit_pa = limits.maximum_pa if stairs.direction > 0 else limits.minimum_pa
-        if left_m < stairs.slide_m or left_m <= 0.0 or stairs.level_pa == at_limit_pa:
+        if left_m < max(stairs.slide_m, stairs._goes_m(limits)) or left_m <= 0.0 or stairs.level_pa == at_limit_pa:
             stairs = stairs._turned()
         return stairs._next_step(limits)
+
+    def _goes_m(self, limits: StaircaseLimits) -> float:
+        """Return how far the next slide is to go."""
+        return self._wanted_rise_pa(limits) / self.slope_pa_per_m if self.slide_m and self.slope_pa_per_m else 0.0
 
     def _turned(self) -> "Staircase":
         """Return it in the other direction."""
@@ -150,6 +159,8 @@ class Staircase:
         if not outcome.moved:
             return self if first else replace(self, low_pa=max(self.low_pa, self.rise_pa))
         went_m = abs(outcome.position_m - outcome.from_m)
+        if not first and 0.0 < went_m * self.slope_pa_per_m < GAVE_WAY * self.rise_pa:
+            return replace(self, low_pa=max(self.low_pa, self.rise_pa))
         going_m = self.going_m + went_m if outcome.landing and not first else self.going_m
         counted = replace(
             self,
@@ -161,7 +172,7 @@ class Staircase:
             slide_m=went_m,
             rise_pa=0.0,
             step_pa=0.0,
-            closed=self.closed or (self.closing and outcome.landing),
+            closed=self.closed or (self.closing and outcome.landing and not first),
         )
         if first:
             return replace(counted, reversal_pa=self.rise_pa) if self.turns else counted
@@ -177,7 +188,9 @@ class Staircase:
         """Return the rise of the next slide after the first of a direction."""
         window_pa = limits.window_m * self.slope_pa_per_m
         if self._least_known(limits):
-            wanted_pa = max(SURE * self.high_pa, window_pa / MOST_SLIDES)
+            wanted_pa = max(
+                SURE * self.high_pa, min(window_pa / MOST_SLIDES, LEAP * self.slope_pa_per_m * self.slide_m)
+            )
         else:
             low_pa = max(self.low_pa, SHORTEST * window_pa)
             wanted_pa = sqrt(low_pa * self.high_pa) if self.high_pa > low_pa else GROWTH * low_pa

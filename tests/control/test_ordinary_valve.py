@@ -136,7 +136,7 @@ def test_steps_land(seed: int) -> None:
     for reference_m in references_m(seed):
         move = loop.step_to(reference_m)
         slides = np.count_nonzero(np.diff([each.decision.command_pa for each in move]))
-        assert slides <= 4, "no other whole mbar lands it better"
+        assert slides <= 5, "one may be tried too short; no other whole mbar lands it better"
         end = move[-1]
         assert all(each.decision.command_pa == mbar(each.decision.command_pa) for each in move)
         assert loop.valve.position_m == pytest.approx(reference_m, abs=LANDED_M)

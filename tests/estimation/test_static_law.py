@@ -175,3 +175,17 @@ def test_the_residual_says_how_far_a_bent_valve_lands_off_where_there_were_no_la
     off_m = (law.ratios.balance_pa(0.35 * STROKE_M, -1) - true_pa(0.35, -1)) / SLOPE
     assert abs(off_m) > 5e-3 * STROKE_M
     assert abs(off_m) < 3 * law.residual_m
+
+
+def test_what_the_last_slides_missed_alike_everywhere_is_corrected_everywhere() -> None:
+    """Friction has grown by 300 Pa since: the last slides up, far apart, say so for a place that none has been to."""
+    ratios = Ratios(-SLOPE, -UP)
+    before = [(x, s, 0.0) for x in np.linspace(0.02, 0.08, 8) for s in (1, -1)]
+    lately = [(x, 1, 300.0) for x in (0.08, 0.02, 0.065)]
+    landings = [
+        SlideOutcome(float(i), s, 0.0, SLOPE * x + s * UP + off, x, 1e-6, True, True)
+        for i, (x, s, off) in enumerate([*before, *lately])
+    ]
+    found = landing_pa(0.045, 1, ratios, landings[::-1], STROKE_M) - (SLOPE * 0.045 + UP)
+    assert 60.0 < found < 330.0  # without: 13 Pa
+    assert abs(landing_pa(0.045, -1, ratios, landings[::-1], STROKE_M) - (SLOPE * 0.045 - UP)) < 60.0

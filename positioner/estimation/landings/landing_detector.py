@@ -19,6 +19,8 @@ from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 VISIBLE = 5e-3
 """Of the stroke: a way shorter than this is no slide, but the packing giving way."""
 VISIBLE_NOISES = 6.0
+UNDER_WAY = 0.01
+"""Of the stroke: a stem that went so far before it rests has answered."""
 PRECISE, LONG = 2e-4, 60
 """Of the stroke: a rest known no better is averaged on, up to so many samples."""
 ENOUGH = 400
@@ -35,8 +37,9 @@ SAME = 1e-9
 """Of the stroke: positions nearer than this are one."""
 FINEST_QUANTUM = 1e-6
 """Of the stroke: a sensor that resolves more has none."""
-LARGE = 0.5
-"""Of the largest step: from a smaller one nothing is learnt of a rate limit."""
+LARGE, LARGER = 0.5, 2.0
+"""Of the largest step: from a smaller one nothing is learnt of a rate limit; one so much larger says more than all
+before, for what a small step takes may be a lag, which a large one takes but once."""
 CREEP, INSTANTS = 1e-3, 2
 """Of the stroke, for each second that a slide takes beyond two samples: behind a slow pressure the stem creeps into its
 rest and sticks, its friction risen, a little before the pressure has come to an end."""
@@ -157,6 +160,8 @@ class LandingDetector:
     def _change_level(self, time_s: float, command_pa: float) -> None:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
         step_pa = abs(command_pa - self._level_pa)
+        if self.rest is None and not self._known and self._under_way:
+            self._learn_answer(time_s - self._level_s)
         self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
         self._running_on = self.rest is None
         self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m
@@ -164,6 +169,11 @@ class LandingDetector:
         self._level_pa, self._level_s = command_pa, time_s
         self.rest, self._known = None, isnan(self._from_m)
         self._window.restart(time_s)
+
+    @property
+    def _under_way(self) -> bool:
+        """Whether the stem has visibly followed the last change of the command, though it does not rest yet."""
+        return self._sense * (self._position_m - self._from_m) > UNDER_WAY * self._stroke_m
 
     def _watch(self, time_s: float, position_m: float, rest: Rest) -> None:
         """Find a stem that moves: later than was waited for, or moved by something else than the command."""
@@ -183,7 +193,9 @@ class LandingDetector:
         """Learn how long the stem takes to answer, in all and for a pressure step (a rate limit)."""
         longest_s, slowness_s_per_pa, large_pa = (FORGOTTEN * each for each in self.answers)
         large_pa = max(self._step_pa, large_pa)
-        if self._step_pa > LARGE * large_pa:
+        if self._step_pa > LARGER * self.answers.large_pa:
+            slowness_s_per_pa = answer_s / self._step_pa
+        elif self._step_pa > LARGE * large_pa:
             slowness_s_per_pa = max(answer_s / self._step_pa, slowness_s_per_pa)
         else:
             slowness_s_per_pa = self.answers.slowness_s_per_pa

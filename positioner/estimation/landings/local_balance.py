@@ -1,19 +1,23 @@
 """The pressure that lands a slide at a position: the straight law, bent as its landings are, and what is left near it.
 
-    B(x, s) = κ x + s φ + offset + q_1 + q_2 s + q_3 t + q_4 t^2 + q_5 t^3 + q_6 s t + n_s(x)      t = 2 x/stroke - 1
+    B(x, s) = κ x + s φ + offset + q_1 + q_2 s + q_3 t + q_4 t^2 + q_5 t^3 + q_6 s t + l_s + n_s(x)
+    t       = 2 x/stroke - 1
     q       = (Q' W Q/σ^2 + P^-1)^-1 Q' W e/σ^2             e_j = p_j - (κ x_j + s_j φ + offset)
-    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q leaves of e_j,  s_j = s
+    l_s     = what q leaves of all of the last e_j, s_j = s: the least of them if they have one sign, else 0
+    n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q and l_s leave of e_j,  s_j = s
     w_j     = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
 
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
 that lies apart for less, and σ is what the others scatter by. A slide to x that missed all the same says what is
-missing there: the next one lands. w_0 holds that correction back where there is little to go by.
+missing there: the next one lands. w_0 holds that correction back where there is little to go by. Friction that drifts
+makes the last slides miss alike everywhere: l_s.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from math import copysign, exp
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +31,8 @@ FADING = 0.7
 """ρ"""
 HELD_BACK = 0.1
 """w_0"""
+LATEST = 3
+"""Landings in a direction, of which l_s is taken."""
 BENDS = (0.05, 0.05, 0.05, 0.1, 0.04, 0.03)
 """Of the pressure over the stroke: standard deviations of q, the root of P."""
 FINEST = 2e-4
@@ -61,10 +67,11 @@ def landing_pa(
         landings: the latest first.
         stroke_m: full travel.
     """
-    bend, _ = _bend(ratios, tuple(landings), stroke_m)
+    bend = _bend(ratios, tuple(landings), stroke_m)
 
     def bent_pa(position_m: float, direction: int) -> float:
-        return ratios.balance_pa(position_m, direction) + _bent_by_pa(bend, position_m / stroke_m, direction)
+        straight_pa = ratios.balance_pa(position_m, direction) + bend.lately_pa[direction > 0]
+        return straight_pa + _bent_by_pa(bend.q, position_m / stroke_m, direction)
 
     landed = (each for each in landings if each.direction == direction)
     missed = missed_pa(position_m, landed, bent_pa, WIDTH * stroke_m)
@@ -75,13 +82,13 @@ def bent_by_pa(
     position_m: float, direction: int, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float
 ) -> float:
     """Return by how much the landings are bent away from the straight law at a position, Pa; as of `landing_pa`."""
-    bend, _ = _bend(ratios, tuple(landings), stroke_m)
-    return _bent_by_pa(bend, position_m / stroke_m, direction)
+    bend = _bend(ratios, tuple(landings), stroke_m)
+    return _bent_by_pa(bend.q, position_m / stroke_m, direction)
 
 
 def scatter_m(ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float) -> float:
     """Return how far slides land off the bent law, a standard deviation, m; arguments as of `landing_pa`."""
-    return _bend(ratios, tuple(landings), stroke_m)[1] / -ratios.b_over_c
+    return _bend(ratios, tuple(landings), stroke_m).scatter_pa / -ratios.b_over_c
 
 
 def _bent_by_pa(bend: tuple[float, ...], share: float, direction: int) -> float:
@@ -90,11 +97,21 @@ def _bent_by_pa(bend: tuple[float, ...], share: float, direction: int) -> float:
     return level + friction * s + t * (slope + t * (square + t * cube) + parting * s)
 
 
+class _Bend(NamedTuple):
+    """What landings say of a straight law, Pa."""
+
+    q: tuple[float, ...]
+    scatter_pa: float
+    """Of the landings about it, a standard deviation."""
+    lately_pa: tuple[float, float]
+    """l_s, down and up."""
+
+
 @lru_cache(maxsize=4)
-def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> tuple[tuple[float, ...], float]:
-    """Return q, Pa, zeros where there are too few landings, and what they scatter by, Pa."""
+def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> _Bend:
+    """Return what landings say; q is zeros where there are too few."""
     if len(landings) < FEWEST:
-        return (0.0,) * len(BENDS), FINEST * -ratios.b_over_c * stroke_m
+        return _Bend((0.0,) * len(BENDS), FINEST * -ratios.b_over_c * stroke_m, (0.0, 0.0))
     s = np.array([float(each.direction) for each in landings])
     t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
     e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
@@ -111,7 +128,16 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
         off = np.abs(e - Q @ q)
         sigma_pa = max(FINEST * stroke_pa, 1.4826 * float(np.median(off)))
         weights = known * np.minimum(1.0, HUBER * sigma_pa / np.maximum(off, 1e-9))
-    return tuple(q.tolist()), sigma_pa
+    left_pa = e - Q @ q
+    down_pa, up_pa = (_alike(left_pa[s == way][:LATEST].tolist()) for way in (-1.0, 1.0))
+    return _Bend(tuple(q.tolist()), sigma_pa, (down_pa, up_pa))
+
+
+def _alike(missed_pa: Sequence[float]) -> float:
+    """Return what all have in common: the least of them, if all have one sign."""
+    if len(missed_pa) < LATEST:
+        return 0.0
+    return max(0.0, min(missed_pa)) + min(0.0, max(missed_pa))
 
 
 def missed_pa(
