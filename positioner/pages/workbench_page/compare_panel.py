@@ -10,7 +10,7 @@ from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.force_figures import force_figure
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.sliders import Sliders
-from positioner.pages.workbench_page.time_figure import LINES, MARKS, TimeFigure, Window, window_of
+from positioner.pages.workbench_page.time_figure import LINES, MARKS, MOVING, TimeFigure, Window, window_of
 from workbench.compare.comparison import Comparison
 from workbench.report.comparison_report import headline
 from workbench.report.units import length, of_stroke
@@ -18,7 +18,9 @@ from workbench.report.units import length, of_stroke
 AROUND_S = 2.0
 """Before and after what is jumped to."""
 MOVED = ("model", "error", "model's pressure")
-"""Lines that a slider moves."""
+"""Lines that a slider moves,"""
+MOVED_LINES = [LINES.index(name) for name in MOVED]
+"""and which they are."""
 TIME_PX, FORCE_PX = 520, 300
 
 
@@ -77,11 +79,12 @@ class ComparePanel:
     def _moved(self) -> None:
         """Draw the new curve; nothing else is worked out while a slider moves."""
         rms_m = self._show_curve()
-        self._time.restyle(self._figure.data(MOVED), [LINES.index(name) for name in MOVED])
+        self._time.restyle(self._figure.data(MOVED, MOVING), MOVED_LINES)
         self._error.set_text(f"{length(rms_m).text} mm")
 
     def _settled(self) -> None:
-        """Work out all that hangs on the parameters."""
+        """Draw the curve in full, and work out all that hangs on the parameters."""
+        self._time.restyle(self._figure.data(MOVED), MOVED_LINES)
         with errors_told():
             compared = self._desk.compare()
             self._figure.slips = compared.slips

@@ -101,6 +101,8 @@ class TabPage:
         self._open.refresh()
         self._rest.clear()
         if self._desk.live is None:
+            with self._rest:
+                ui.label("Begin with a recording and a valve, or with a blind case.").classes("quiet")
             return
         with self._rest:
             heading("Model against measurement")

@@ -17,8 +17,8 @@ from workbench.data.record import Record
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import extremes, rounded, running_s
 
-MOST = 3000
-"""Points of a line in the window."""
+MOST, MOVING = 2400, 1200
+"""Points of a line in the window at most; and while a slider moves it, when it is drawn many times a second."""
 BESIDE = 0.5
 """Of the window, drawn on either side of it: panning finds something there."""
 LINES = ("measured", "as opened", "fitted", "model", "error as opened", "error fitted", "error", "command", "pressure",
@@ -74,9 +74,9 @@ class TimeFigure:
         """Draw the model's pressure, Pa, (n,)."""
         self._lines["model's pressure"] = None if self._by_setpoint else 1e-3 * pressure_pa
 
-    def data(self, names: tuple[str, ...] = LINES) -> Mapping[str, list[Any]]:
-        """Return x and y of these lines in the window, a list each."""
-        drawn = [self._points(self._lines[name]) for name in names]
+    def data(self, names: tuple[str, ...] = LINES, most: int = MOST) -> Mapping[str, list[Any]]:
+        """Return x and y of these lines in the window, a list each, of so many points at most."""
+        drawn = [self._points(self._lines[name], most) for name in names]
         return {"x": [x for x, _ in drawn], "y": [y for _, y in drawn]}
 
     def marks(self) -> Mapping[str, list[Any]]:
@@ -136,14 +136,14 @@ class TimeFigure:
             "showlegend": bool(x) and y_axis == "y", "connectgaps": False,
         }  # fmt: skip
 
-    def _points(self, values: Column | None) -> tuple[list[float | None], list[float | None]]:
+    def _points(self, values: Column | None, most: int) -> tuple[list[float | None], list[float | None]]:
         if values is None:
             return [], []
         width_s = self.window.end_s - self.window.begin_s
         ends_s = (self.window.begin_s - BESIDE * width_s, self.window.end_s + BESIDE * width_s)
         first, end = np.searchsorted(self._along_s, ends_s)
         first, end = max(0, int(first) - 1), min(self._along_s.size, int(end) + 1)
-        rows = first + extremes(values[first:end], MOST)
+        rows = first + extremes(values[first:end], most)
         return rounded(self._along_s[rows], 5), rounded(values[rows], 4)
 
 

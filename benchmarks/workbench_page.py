@@ -1,0 +1,129 @@
+"""The workbench page measured in Debian's Chromium: start-up, memory, a slider's curve, and half a million samples.
+
+python -m benchmarks.workbench_page
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+from config.recording import Recording
+from workbench.blind.hiding import hide
+from workbench.blind.sealing import seal
+
+SEED = 7
+PERIOD_S = 0.01
+SLIDER_S, LONG_SAMPLES = 60.0, 500_000
+MOVES = 30
+LONGEST_MS = 30_000
+TIME_PLOT = "position, error and pressure over time"
+WATCHED = """name => {
+    const plot = document.querySelector(`[data-testid="${name}"]`);
+    window.tookMs = undefined;
+    let begin = performance.now();
+    addEventListener("keydown", () => { begin = performance.now(); }, {capture: true, once: true});
+    plot.once("plotly_afterplot", () => { window.tookMs = performance.now() - begin; });
+}"""
+"""Milliseconds from a key, or from now, until the lines that come from the server are drawn."""
+TOOK = "() => window.tookMs"
+PANNED = """([name, begin, end]) => document.querySelector(`[data-testid="${name}"]`).emit(
+    "plotly_relayout", {"xaxis.range[0]": begin, "xaxis.range[1]": end})"""
+
+
+def main() -> None:
+    """Print the figures."""
+    with tempfile.TemporaryDirectory() as folder:
+        seal(Path(folder, "case"), hide(SEED, duration_s=SLIDER_S, period_s=PERIOD_S))
+        case = Path(folder, "case", "fit.csv")
+        valve = str(Path(folder, "case", "valve.toml"))
+        with _served(str(case), "--valve", valve) as (address, process, started_s):
+            print(f"start-up: {started_s:.1f} s until the address is printed")
+            print(f"server alone: {_resident_mb(process):.0f} MB")
+            with _page(address) as page:
+                print(f"first visit: {_first_visit_s(page):.1f} s until the curves stand")
+                slider = page.get_by_role("slider", name="spring stiffness").locator("[tabindex='0']")
+                slider.focus()
+                moves = [_moved_ms(page) for _ in range(MOVES)]
+                print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}")
+                print(f"server with one tab: {_resident_mb(process):.0f} MB")
+        long = Path(folder, "long.csv")
+        _repeated(Recording.read(case), LONG_SAMPLES).write(long)
+        with _served(str(long), "--valve", valve) as (address, process, _), _page(address) as page:
+            print(f"{LONG_SAMPLES} samples, first visit: {_first_visit_s(page):.1f} s")
+            whole_s = LONG_SAMPLES * PERIOD_S
+            windows = [[0.1 * whole_s + 5.0 * i, 0.1 * whole_s + 5.0 * i + 60.0] for i in range(MOVES)]
+            panned = [_panned_ms(page, *each) for each in windows]
+            print(f"{LONG_SAMPLES} samples, panned: {_told(panned)}")
+            print(f"server: {_resident_mb(process):.0f} MB")
+
+
+def _moved_ms(page: Page) -> float:
+    page.evaluate(WATCHED, TIME_PLOT)
+    page.keyboard.press("ArrowRight")
+    return float(page.wait_for_function(TOOK).json_value())
+
+
+def _panned_ms(page: Page, begin_s: float, end_s: float) -> float:
+    page.evaluate(WATCHED, TIME_PLOT)
+    page.evaluate(PANNED, [TIME_PLOT, begin_s, end_s])
+    return float(page.wait_for_function(TOOK).json_value())
+
+
+def _repeated(recording: Recording, count: int) -> Recording:
+    times = -(-count // len(recording))
+    columns = {name: np.tile(column, times)[:count] for name, column in recording.columns.items()}
+    return Recording(columns | {"time_s": PERIOD_S * np.arange(count, dtype=np.float64)}, recording.metadata)
+
+
+@contextmanager
+def _served(*words: str) -> Iterator[tuple[str, "subprocess.Popen[str]", float]]:
+    begin_s = time.monotonic()
+    command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        try:
+            yield line.partition(": ")[2].strip(), process, time.monotonic() - begin_s
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def _page(address: str) -> Iterator[Page]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.set_default_timeout(LONGEST_MS)
+        page.goto(address)
+        yield page
+        browser.close()
+
+
+def _first_visit_s(page: Page) -> float:
+    begin_s = time.monotonic()
+    page.locator(".scatterlayer .trace").first.wait_for()
+    return time.monotonic() - begin_s
+
+
+def _resident_mb(process: "subprocess.Popen[Any]") -> float:
+    for line in Path(f"/proc/{process.pid}/status").read_text().splitlines():
+        if line.startswith("VmRSS"):
+            return float(line.split()[1]) / 1024.0
+    raise LookupError(process.pid)
+
+
+def _told(milliseconds: list[float]) -> str:
+    return f"median {median(milliseconds):.0f} ms, most {max(milliseconds):.0f} ms"
+
+
+if __name__ == "__main__":
+    main()
