@@ -50,6 +50,7 @@ docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner demo --out demo-out && cp demo-out/run.png docs/img/demo.png
 	$(BIN)/positioner demo --loop flow --out demo-out && cp demo-out/flow_loop.png docs/img/
 	$(BIN)/python -m docs.operator_picture docs/img/operator-page.png
+	$(BIN)/python -m docs.page_pictures docs/img
 	$(BIN)/python -m docs.code_tables
 	$(BIN)/python -m sim.effects docs/effects.md
 	$(BIN)/python docs/notebook.py docs/tutorial/source.md docs/tutorial.md
