@@ -24,7 +24,7 @@ SEED = 7
 PERIOD_S = 0.01
 SLIDER_S, LONG_SAMPLES = 60.0, 500_000
 MOVES = 30
-LONGEST_MS = 30_000
+LONGEST_MS = 120_000
 TIME_PLOT = "position, error and pressure over time"
 WATCHED = """name => {
     const plot = document.querySelector(`[data-testid="${name}"]`);

@@ -21,9 +21,9 @@ def main(folder: Path) -> None:
     expect.set_options(timeout=LONGEST_MS)
     with tempfile.TemporaryDirectory() as case, sync_playwright() as playwright:
         seal(Path(case, "hidden"), hide(SEED, duration_s=DURATION_S))
-        words = [f"{case}/hidden/fit.csv", "--valve", f"{case}/hidden/valve.toml"]
+        words = ["hidden/fit.csv", "--valve", "hidden/valve.toml"]
         command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--port", "0"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=case) as server:
             assert server.stdout is not None
             address = server.stdout.readline().partition(": ")[2].strip()
             try:

@@ -5,6 +5,7 @@ cuts a slow slide into pieces, so pieces may share a match, and small ones, belo
 spurious. Times and ends are compared only for slips that are nearest to each other; the ends where both rest.
 """
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -74,14 +75,13 @@ def matched(
 
 
 def _nearest(time_s: Column, slip: Slip, others: Sequence[Slip], within_s: float) -> Slip | None:
-    """Return the slip of the same direction that begins nearest, of those under way within a time; None without one."""
-    near = [
-        each
-        for each in others
-        if each.direction == slip.direction
-        and time_s[each.first] <= time_s[slip.last] + within_s
-        and time_s[each.last] >= time_s[slip.first] - within_s
-    ]
+    """Return the slip of the same direction that begins nearest, of those under way within a time; None without one.
+
+    The others follow each other in time: of thousands only the few that may be under way are looked at.
+    """
+    begin = bisect_left(others, time_s[slip.first] - within_s, key=lambda each: float(time_s[each.last]))
+    end = bisect_right(others, time_s[slip.last] + within_s, key=lambda each: float(time_s[each.first]))
+    near = [each for each in others[begin:end] if each.direction == slip.direction]
     return min(near, key=lambda each: abs(each.first - slip.first), default=None)
 
 

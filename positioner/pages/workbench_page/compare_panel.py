@@ -4,7 +4,7 @@ import numpy as np
 from nicegui import events, ui
 
 from positioner.pages.parts.figure_view import Figure, FigureView
-from positioner.pages.parts.telling import errors_told, sentences
+from positioner.pages.parts.telling import aside, errors_told, sentences
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.force_figures import force_figure
@@ -33,6 +33,8 @@ class ComparePanel:
         self._desk = desk
         self._theme = theme
         self._live: LiveModel = desk.live
+        self._asked = 0
+        """How often a comparison was asked for that is not there yet."""
         self._figure = TimeFigure(self._live.record)
         self._forces = self._live.forces()
         self._begin_s = float(self._live.record.time_s[0])
@@ -82,17 +84,23 @@ class ComparePanel:
         self._time.restyle(self._figure.data(MOVED, MOVING), MOVED_LINES)
         self._error.set_text(f"{length(rms_m).text} mm")
 
-    def _settled(self) -> None:
-        """Draw the curve in full, and work out all that hangs on the parameters."""
+    async def _settled(self) -> None:
+        """Draw the curve in full, and work out all that hangs on the parameters; what was set meanwhile comes after."""
         self._time.restyle(self._figure.data(MOVED), MOVED_LINES)
-        with errors_told():
-            compared = self._desk.compare()
-            self._figure.slips = compared.slips
-            self._marked()
-            self._tell(compared)
-        self._forces = self._live.forces()
-        for each in self._clouds:
-            each.redraw()
+        self._asked += 1
+        if self._asked > 1:
+            return
+        while self._asked:
+            asked = self._asked
+            with errors_told():
+                compared = await aside(self._desk.compare)
+                self._figure.slips = compared.slips
+                self._marked()
+                self._tell(compared)
+            self._forces = await aside(self._live.forces)
+            for each in self._clouds:
+                each.redraw()
+            self._asked -= asked
 
     def _tell(self, compared: Comparison) -> None:
         self._error.set_text(f"{length(compared.rms_m).text} mm")

@@ -69,7 +69,7 @@ class OpenPanel:
         )
         upload.classes("w-full").props('flat bordered data-testid="drop"')
         if files:
-            names = {str(path): path.name for path in files}
+            names = [str(path) for path in files]
             ui.select(names, label="or one of the folder", on_change=lambda event: self._chosen(event.value)).classes(
                 "w-full"
             ).props('data-testid="files"')
@@ -152,7 +152,7 @@ class OpenPanel:
     async def _chosen(self, text: str) -> None:
         path = Path(text)
         with errors_told():
-            await self._found(await aside(opened, path, path.name))
+            await self._found(await aside(opened, path, text))
 
     async def _found(self, found: Opened | Export) -> None:
         if isinstance(found, Export):

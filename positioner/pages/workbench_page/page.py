@@ -6,7 +6,7 @@ from pathlib import Path
 from nicegui import app, ui
 
 from positioner.pages.parts.server import Listening, serve
-from positioner.pages.parts.telling import errors_told, heading
+from positioner.pages.parts.telling import aside, errors_told, heading
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.compare_panel import ComparePanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
@@ -44,7 +44,7 @@ class Workbench:
             if self._valve is not None:
                 desk.take_valve(named_valve(self._valve))
             if len(self._files) == 1:
-                found = opened(self._files[0], self._files[0].name)
+                found = opened(self._files[0], str(self._files[0]))
                 if isinstance(found, Opened):
                     desk.take_recording(found)
                 else:
@@ -68,7 +68,7 @@ class Workbench:
         tab = ui.context.client.tab_id
         assert tab is not None
         with errors_told():
-            self.desk(tab)
+            await aside(self.desk, tab)
         desk = self._desks[tab]
         desk.pages += 1
         ui.context.client.on_delete(lambda: self._left(desk))

@@ -1,6 +1,6 @@
 """A slider for each parameter, a switch for each effect, and what undoes them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from nicegui import events, ui
@@ -37,7 +37,11 @@ class Sliders:
     """
 
     def __init__(
-        self, live: LiveModel, fitted: Mapping[str, Fitted], moved: Callable[[], None], settled: Callable[[], None]
+        self,
+        live: LiveModel,
+        fitted: Mapping[str, Fitted],
+        moved: Callable[[], None],
+        settled: Callable[[], Awaitable[None]],
     ) -> None:
         self._live = live
         self._moved = moved
@@ -85,24 +89,24 @@ class Sliders:
         self._show_values()
         self._moved()
 
-    def _released(self) -> None:
+    async def _released(self) -> None:
         self._held = False
         self._follow()
-        self._settled()
+        await self._settled()
 
-    def _switched(self, name: str, event: events.ValueChangeEventArguments[bool]) -> None:
+    async def _switched(self, name: str, event: events.ValueChangeEventArguments[bool]) -> None:
         if self._following:
             return
         self._live.switch(name, bool(event.value))
         self._moved()
-        self._settled()
+        await self._settled()
 
-    def _undo(self) -> None:
+    async def _undo(self) -> None:
         if self._live.undo():
             self._held = False
             self._follow()
             self._moved()
-            self._settled()
+            await self._settled()
 
     def _follow(self) -> None:
         """Put every slider and switch to where the model is."""
