@@ -21,7 +21,7 @@ from positioner.dcs import Dcs
 from tests.pages.browser import CHROMIUM, opened, served
 from tests.pages.valve_site import valve_site
 
-TURNS = 5
+TURNS = 9
 TURN_S = 12.0
 SETTLE_S = 3.0
 MOVE_EVERY_S = 3.0
@@ -115,6 +115,9 @@ def _ratios(found: list[Turn], alone: list[Turn]) -> str:
         own = [getattr(each, name) for each in alone]
         spread = (max(own) - min(own)) / statistics.median(own)
         said.append(f"{words} x {_median(found, name) / _median(alone, name):.2f} (alone within {100 * spread:.0f} %)")
+    own = [100 * each.missed for each in alone]
+    more = 100 * (_median(found, "missed") - _median(alone, "missed"))
+    said.append(f"missed {more:+.2f} points (alone {min(own):.2f} to {max(own):.2f})")
     return ", ".join(said)
 
 

@@ -12,6 +12,8 @@ from positioner.daemon.recorder import COLUMNS, files_of
 from positioner.observer.valve_view import ValveView
 from positioner.response import ResponseFigures, respond
 
+WRITTEN_WITHIN_S = 10.0
+"""A recording that is not written any more is not of the last minutes."""
 LONGEST_TAIL_BYTES = 12_000_000
 """Some two minutes at 1 kHz."""
 
@@ -25,23 +27,21 @@ class LastMoves:
     response: ResponseFigures
 
 
-def last_moves(view: ValveView, begin_s: float, folder: Path | None, valve: str, seconds: float) -> LastMoves | None:
+def last_moves(view: ValveView, now_s: float, seconds: float, folder: Path | None, wall_s: float) -> LastMoves | None:
     """Return the last minutes of a valve, None while nothing was measured.
 
     Args:
         view: the valve as polled.
-        begin_s: where its last minutes begin, on its clock.
-        folder: where the daemon records, None where it does not, or cannot be read from here.
-        valve: the name that the daemon records it by.
-        seconds: how much of the recording.
+        now_s: on the view's clock.
+        seconds: how much.
+        folder: where the daemon records, None where it does not.
+        wall_s: now on the clock that files are stamped by.
     """
-    recording = None if folder is None else recorded_tail(folder, valve, seconds)
+    recording = None if folder is None else recorded_tail(folder, view.name, seconds, wall_s)
     source = "the daemon's recording, at its full rate"
     if recording is None:
-        recording, source = (
-            polled(view.trend(begin_s)),
-            "as polled: the daemon's recording is off, or not on this machine",
-        )
+        recording = polled(view.trend(now_s - seconds))
+        source = "as polled: the daemon's recording is off, not on this machine, or not written any more"
     return None if recording is None else LastMoves(recording, source, respond(recording))
 
 
@@ -53,10 +53,12 @@ def polled(trend: dict[str, Column]) -> Recording | None:
     return Recording({name: column[whole] for name, column in trend.items()})
 
 
-def recorded_tail(folder: Path, valve: str, seconds: float) -> Recording | None:
-    """Return the last seconds that were recorded; None where there is no recording that can be read."""
+def recorded_tail(folder: Path, valve: str, seconds: float, wall_s: float) -> Recording | None:
+    """Return the last seconds that were recorded; None where no recording is written, or none can be read."""
     try:
         newest = files_of(folder, valve)[-2:]
+        if not newest or wall_s - newest[-1].stat().st_mtime > WRITTEN_WITHIN_S:
+            return None
         lines = b"".join(_tail(file) for file in newest)
     except (OSError, ValueError):
         return None

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from threading import Event, Thread
 
-from config.errors import CommandFailed
+from config.errors import CommandFailed, InputError
 from config.registers import COMMANDS, REGISTERS, STATUS
 from positioner.dcs import Dcs
 from positioner.observer.valve_view import ValveView
@@ -53,7 +53,7 @@ class Poller:
             try:
                 with self._connect() as dcs:
                     self._poll(dcs)
-            except CommandFailed as failed:
+            except (CommandFailed, InputError) as failed:  # a certificate may be replaced meanwhile
                 self.view.lose(time.monotonic(), str(failed))
             self._stopping.wait(RETRY_S)
 

@@ -6,7 +6,7 @@ command has a connection of its own. Nothing is written on values that are not o
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from threading import Event
+from threading import Event, Lock
 
 from config.codes import Fault, Mode
 from config.errors import CommandFailed, InputError
@@ -20,6 +20,7 @@ from positioner.observer.words import CODES, code_text
 SAME = 1e-6
 """Of a value that was written and the one that is read back: a float32 has 24 bits."""
 IDENTIFY_WITHIN_S = 600.0
+END_WITHIN_S = 5.0
 EXCITATION = ("eta_1", "eta_2", "eta_3")
 
 
@@ -60,6 +61,7 @@ class ValveCommands:
         self._connect = connect
         self._picture = picture
         self._break_off = Event()
+        self._identifying = Lock()
 
     def set(self, role: Role, name: str, value: float) -> Confirmation:
         """Write a register; confirmed when it reads back so."""
@@ -111,8 +113,13 @@ class ValveCommands:
             for permissive in identify_permissives(self._picture().values):
                 if not permissive.holds:
                     return Confirmation(False, permissive.remedy)
-            self._break_off.clear()
-            problem = dcs.identify(excitation, IDENTIFY_WITHIN_S, shown)
+            if not self._identifying.acquire(blocking=False):
+                return Confirmation(False, "an identification is under way already")
+            try:
+                self._break_off.clear()
+                problem = dcs.identify(excitation, IDENTIFY_WITHIN_S, shown)
+            finally:
+                self._identifying.release()
             return Confirmation(problem is None, f"not applied: {problem}" if problem else "identified and applied")
 
         return self._within_rights(role, (*EXCITATION, *excitation), identified)
@@ -120,6 +127,12 @@ class ValveCommands:
     def break_off(self) -> None:
         """Break off the identification that is under way, if one is."""
         self._break_off.set()
+
+    def end(self) -> None:
+        """Break it off, and wait until the law has its command back."""
+        self.break_off()
+        if self._identifying.acquire(timeout=END_WITHIN_S):
+            self._identifying.release()
 
     def _within_rights(
         self, role: Role, registers: tuple[str, ...], written: Callable[[Dcs], Confirmation]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from threading import Event, Thread
 from typing import Any, cast
 
 import pytest
@@ -134,3 +135,32 @@ def test_an_identification_shows_its_progress_and_may_be_broken_off(daemon: Daem
     seen = daemon.commands.identify(Role.ENGINEER, {}, shown.append)
     assert seen == Confirmation(False, "broken off; the law has the command again")
     assert issubclass(BrokenOff, Exception)
+
+
+def test_a_second_identification_waits_for_the_first_to_end(daemon: Daemon) -> None:
+    second: list[Confirmation] = []
+
+    def ask_again(progress: float) -> None:
+        if not second:
+            second.append(daemon.commands.identify(Role.ENGINEER, {}, lambda _: None))
+
+    assert daemon.commands.identify(Role.ENGINEER, {}, ask_again).done
+    assert second == [Confirmation(False, "an identification is under way already")]
+
+
+def test_the_end_breaks_an_identification_off_and_waits_for_it(daemon: Daemon) -> None:
+    begun, ends = Event(), Event()
+    said: list[Confirmation] = []
+
+    def wait(_: float) -> None:
+        begun.set()
+        assert ends.wait(60.0)
+
+    work = Thread(target=lambda: said.append(daemon.commands.identify(Role.ENGINEER, {}, wait)))
+    work.start()
+    assert begun.wait(60.0)
+    Thread(target=ends.set).start()
+    daemon.commands.end()
+    assert daemon.commands.identify(Role.ENGINEER, {}, lambda _: None).done, "the first has ended"
+    work.join()
+    assert len(said) == 1

@@ -1,9 +1,10 @@
 """The page of one tab: all valves, or one in full; ten times a second what changes by the reading."""
 
+import asyncio
 import time
 from collections.abc import Sequence
 
-from nicegui import ui
+from nicegui import app, ui
 
 from positioner.pages.operator_page.controls import Door, SignedIn
 from positioner.pages.operator_page.marks import STYLE
@@ -13,6 +14,7 @@ from positioner.pages.operator_page.valve_panel import ValvePanel
 from positioner.pages.operator_page.watched_valves import Place, WatchedValve, watching
 from positioner.pages.parts.server import Listening, serve
 from positioner.pages.parts.sessions import SignIn
+from positioner.pages.parts.telling import aside
 from positioner.pages.parts.theme import Theme
 
 TITLE = "positioner"
@@ -32,6 +34,11 @@ def serve_valves(places: Sequence[Place], where: Listening, sign_in: SignIn | No
         async def build() -> None:
             await Tab(valves, sign_in).build()
 
+        async def end() -> None:
+            """Give the laws their command back: the process is gone right after this."""
+            await asyncio.gather(*(aside(valve.commands.end) for valve in valves))
+
+        app.on_shutdown(end)
         serve(TITLE, build, where, opens_browser=opens_browser)
 
 

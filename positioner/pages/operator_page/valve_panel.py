@@ -147,9 +147,8 @@ class ValvePanel:
             self._moves_said = ui.html("", sanitize=False).classes("scrolling full-width")
 
     async def _work_out(self) -> None:
-        place = self.valve.place
-        begin_s = time.monotonic() - MOVES_S
-        moves = await aside(last_moves, self.valve.view, begin_s, place.recordings, place.name, MOVES_S)
+        view, folder = self.valve.view, self.valve.place.recordings
+        moves = await aside(last_moves, view, time.monotonic(), MOVES_S, folder, time.time())
         self._moves_said.set_content(_told(moves))
         if moves is not None:
             self._recorded.show(moves.recording, self.valve.view.stroke_m)

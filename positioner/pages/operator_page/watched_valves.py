@@ -69,7 +69,14 @@ class WatchedValve:
 
 @contextmanager
 def watching(places: Sequence[Place]) -> Iterator[list[WatchedValve]]:
-    """Poll these valves as long as the context lasts."""
+    """Poll these valves as long as the context lasts.
+
+    Raises:
+        InputError: a file of a certificate that is not there or does not fit.
+    """
+    for place in places:
+        for role in (Role.OBSERVER, *place.tls_of):
+            place.connection(role)
     valves = [WatchedValve(place) for place in places]
     with ExitStack() as on_exit:
         for valve in valves:
