@@ -9,6 +9,7 @@ from collections.abc import Callable
 from threading import Event, Thread
 
 from config.errors import CommandFailed, InputError
+from config.modbus_map import MOST_REGISTERS
 from config.registers import COMMANDS, REGISTERS, STATUS
 from positioner.dcs import Dcs
 from positioner.observer.valve_view import ValveView
@@ -20,8 +21,9 @@ REST_EVERY = 20
 RETRY_S = 0.25
 REPLY_WITHIN_S = 0.5
 
-EACH_TIME = tuple(each.name for each in (*COMMANDS, *STATUS))
-COUNTS = ("cycles", "missed_periods", "lost_samples", "lost_replies")
+EACH_TIME = tuple(each.name for each in (*COMMANDS, *STATUS) if each.end <= MOST_REGISTERS)
+"""What one request has room for."""
+COUNTS = ("service", "cycles", "missed_periods", "lost_samples", "lost_replies")
 REST = tuple(each.name for each in REGISTERS if each.name not in {*EACH_TIME, *COUNTS})
 
 

@@ -21,7 +21,7 @@ FRICTION_KEPT = 43_200
 """A month of minutes."""
 MOST_EVENTS = 200
 
-WATCHED = ("mode", "fault", "ne107", "ne107_cause", "experiment_state", "restored")
+WATCHED = ("mode", "fault", "ne107", "ne107_cause", "experiment_state", "restored", "service")
 """Codes whose change is an event."""
 COUNTED = {"identifications": "an identification was applied", "refusals": "an identification was refused"}
 """Counts whose change is one."""

@@ -15,6 +15,7 @@ from config.codes import (
     Quality,
     Refusal,
     Restored,
+    ServiceState,
     State,
 )
 from config.quantities import DeviceStatus
@@ -27,6 +28,7 @@ CODES: dict[str, type[Code]] = {
     "quality": Quality,
     "why": InhibitReason,
     "restored": Restored,
+    "service": ServiceState,
     "refusal": Refusal,
     "ne107": Ne107Status,
     "ne107_cause": Ne107Cause,

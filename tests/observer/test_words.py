@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from config.codes import ExperimentState, Fault, Mode, State
-from config.registers import BY_NAME
+from config.codes import Code, ExperimentState, Fault, Mode, State, listed
+from config.registers import BY_NAME, REGISTERS
 from positioner.observer.permissives import IDENTIFY_READS, identify_permissives
 from positioner.observer.words import CODES, IDENTIFIED, code_text, estimates_in_words, ne107_causes
 
@@ -24,6 +24,14 @@ def test_every_code_is_said_as_the_table_says_it(register: str) -> None:
     for code in CODES[register]:
         assert code_text(register, float(code)) == code.text
     assert register in BY_NAME
+
+
+def test_every_register_that_lists_codes_is_said_in_words() -> None:
+    of = {
+        register.name: code for register in REGISTERS for code in Code.__subclasses__() if listed(code) in register.text
+    }
+    assert len(of) >= 9
+    assert of.items() <= CODES.items()
 
 
 def test_causes_are_all_named() -> None:

@@ -48,9 +48,11 @@ def status(picture: ValvePicture) -> list[Fact]:
         for label, name in (("mode", "mode"), ("state", "state"), ("fault", "fault"), ("doing as asked", "why"))
     ]
     return [
+        Fact("service", picture.text("service"), BY_NAME["service"].text),
         *said,
         Fact("measurement", picture.freshness.measurement or picture.text("quality"), BY_NAME["quality"].text),
         Fact("device", device_status(picture.value("device_status")), BY_NAME["device_status"].text),
+        Fact("CANopen's emergency", _emergency(picture.value("emergency")), BY_NAME["emergency"].text),
         Fact("knowledge from before", picture.text("restored"), BY_NAME["restored"].text),
         Fact("experiment", picture.text("experiment_state"), BY_NAME["experiment_state"].text),
     ]
@@ -115,6 +117,12 @@ def _interval(each: EstimateInWords) -> str:
     if not each.valid:
         return f"refused: {each.refusal}"
     return f"{each.value:.5g} ± {each.half_width:.2g} {'' if each.unit == '1' else each.unit}".rstrip()
+
+
+def _emergency(code: float) -> str:
+    if not math.isfinite(code):
+        return NO_NUMBER
+    return f"0x{int(code):04X}" if code else "none"
 
 
 def _count(value: float) -> str:
