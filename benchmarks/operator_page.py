@@ -2,30 +2,33 @@
 
 A slave and a daemon run as processes of their own at 500 Hz. In turn, several times over: nobody looks; the page looks,
 with no tab open; the page looks with a tab open in a browser on this same machine, which gives way (nice 19). Of each
-turn the daemon's own statistics, and the processor time of daemon and page. At last the page's memory over minutes.
+turn the daemon's own statistics, and the processor time of daemon and page. Then how soon the browser shows what dies,
+and at last the page's memory over minutes.
 """
 
 import argparse
 import os
+import signal
 import statistics
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.memory import resident_kb
 from positioner.dcs import Dcs
 from tests.pages.browser import CHROMIUM, opened, served
-from tests.pages.valve_site import valve_site
+from tests.pages.valve_site import Site, valve_site
 
 TURNS = 9
 TURN_S = 12.0
 SETTLE_S = 3.0
 MOVE_EVERY_S = 3.0
 LOOKS = 10
+DEATHS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +45,13 @@ class Turn:
 def report(minutes: float) -> list[str]:
     """Return lines: medians over the turns, ratios to nobody looking, and the page's memory."""
     turns: dict[str, list[Turn]] = {"nobody looks": [], "page, no tab": [], "page, a tab open": []}
+    lines = list(_seen())
     with tempfile.TemporaryDirectory() as name, valve_site(Path(name)) as site:
         for _ in range(TURNS):
             for who, found in turns.items():
                 with looking(who, site.config) as page_pid:
                     found.append(turn(site.port, site.daemon.pid, page_pid))
-        lines = [f"{'':18} cycle, ms   jitter 99 %, ms   missed, %   daemon's CPU, %   page's CPU, %"]
+        lines += [f"{'':18} cycle, ms   jitter 99 %, ms   missed, %   daemon's CPU, %   page's CPU, %"]
         lines += [f"{who:18} {_row(found)}" for who, found in turns.items()]
         alone = turns["nobody looks"]
         lines += [f"{who:18} {_ratios(found, alone)}" for who, found in turns.items() if found is not alone]
@@ -123,6 +127,29 @@ def _ratios(found: list[Turn], alone: list[Turn]) -> str:
 
 def _median(found: list[Turn], name: str) -> float:
     return float(statistics.median(getattr(each, name) for each in found))
+
+
+def _seen() -> Iterator[str]:
+    """Yield how soon after it happened the browser shows what is not of now."""
+    deaths: dict[str, tuple[Callable[[Site], object], str]] = {
+        "the device is killed: fault": (lambda site: site.slave.kill(), "no reply"),
+        "the daemon stands (SIGSTOP): greyed": (lambda site: site.daemon.signal(signal.SIGSTOP), "Not live"),
+        "the daemon is killed: greyed": (lambda site: site.daemon.kill(), "Not live"),
+    }
+    for what, (kill, shown) in deaths.items():
+        taken_s = []
+        for _ in range(DEATHS):
+            with tempfile.TemporaryDirectory() as name, valve_site(Path(name)) as site:
+                page = served("page", "--config", str(site.config), port="--listen-port")
+                with page as address, opened(address) as tab:
+                    tab.get_by_test_id("figure-position").get_by_text("29.").wait_for()
+                    kill(site)
+                    died_s = time.monotonic()
+                    tab.get_by_text(shown).first.wait_for()
+                    taken_s.append(time.monotonic() - died_s)
+                with suppress(ProcessLookupError):
+                    site.daemon.signal(signal.SIGCONT)
+        yield f"{what} after {min(taken_s):.2f} to {max(taken_s):.2f} s ({DEATHS} times)"
 
 
 def _memory(config: Path, port: int, minutes: float) -> Iterator[str]:

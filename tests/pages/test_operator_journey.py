@@ -1,6 +1,9 @@
 """The operator's page in a real browser, against a running daemon and a simulated slave, each a process."""
 
+import os
 import re
+import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -30,6 +33,7 @@ def test_an_operator_watches_signs_in_moves_the_valve_and_is_told_what_dies(tmp_
         words = ("page", "--config", str(site.config), "--roles", str(roles))
         with served(*words, port="--listen-port") as address, opened(address) as page:
             watched(page)
+            unheard(page, site.config)
             signed_in_as_operator(page)
             moved_by_an_engineer(page)
             site.slave.kill()
@@ -52,6 +56,19 @@ def watched(page: Page) -> None:
     expect(page.get_by_test_id("stale")).to_be_hidden()
     for name in ("set-reference", "mode-automatic", "acknowledge"):
         expect(page.get_by_test_id(name)).to_be_disabled()
+
+
+def unheard(page: Page, config: Path) -> None:
+    """A page whose server sends nothing greys by itself, and says so; it takes that back."""
+    found = subprocess.run(["pgrep", "-f", f"page --config {config}"], capture_output=True, text=True, check=True)
+    server = int(found.stdout)
+    expect(page.get_by_test_id("unheard")).to_be_hidden()
+    os.kill(server, signal.SIGSTOP)
+    try:
+        expect(page.get_by_test_id("unheard")).to_be_visible()
+    finally:
+        os.kill(server, signal.SIGCONT)
+    expect(page.get_by_test_id("unheard")).to_be_hidden()
 
 
 def signed_in_as_operator(page: Page) -> None:

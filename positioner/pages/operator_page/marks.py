@@ -14,7 +14,26 @@ NE107_COLOURS = {
 }
 """Beside the words, which say it without any colour."""
 
-STYLE = """
+UNHEARD = (
+    ".unheard { visibility: hidden; position: fixed; left: 16px; right: 16px; bottom: 16px; z-index: 9; }"
+    + "".join(
+        f"@keyframes grey-{turn} {{ to {{ opacity: 0.35; filter: grayscale(1); }} }}\n"
+        f"@keyframes tell-{turn} {{ to {{ visibility: visible; }} }}\n"
+        f".heard-{turn} > .panel {{ animation: grey-{turn} 0.1s 1.4s forwards; }}\n"
+        f".heard-{turn} > .unheard {{ animation: tell-{turn} 0.1s 1.4s forwards; width: auto; }}\n"
+        for turn in (0, 1)
+    )
+)
+"""The browser greys by itself what it hears nothing about: each sign of life begins the animation anew."""
+
+NE107_MARKS = "".join(
+    f".ne107-{NE107_LETTER[status] or 'good'}::before {{ content: ''; display: inline-block; width: .7em;"
+    f" height: .7em; margin-right: .4em; background: {colour};"
+    f" border-radius: {'50%' if status is Ne107Status.GOOD else '2px'}; }}\n"
+    for status, colour in NE107_COLOURS.items()
+)
+
+LAYOUT = """
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 8px; margin-bottom: 16px; }
 .tile { padding: 8px 12px; border-radius: 6px; background: rgba(128,136,150,0.12); min-width: 0; }
 .figure { overflow-wrap: anywhere; }
@@ -30,11 +49,26 @@ STYLE = """
 .scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
 .scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
 .scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
-""" + "".join(
-    f".ne107-{NE107_LETTER[status] or 'good'}::before {{ content: ''; display: inline-block; width: .7em; height: .7em;"
-    f" margin-right: .4em; border-radius: {'50%' if status is Ne107Status.GOOD else '2px'}; background: {colour}; }}\n"
-    for status, colour in NE107_COLOURS.items()
-)
+"""
+
+STYLE = LAYOUT + NE107_MARKS + UNHEARD
+
+
+class SignOfLife:
+    """Around what a tab shows: greys it, and says so, when the server sends nothing for 2 s."""
+
+    def __init__(self) -> None:
+        self.around = ui.element("div").classes("heard-0 full-width")
+        self._number = 0
+        with self.around:
+            ui.label("Not live: nothing has come from the page's server for 2 s").classes("alarm unheard").props(
+                'role="alert" data-testid="unheard"'
+            )
+
+    def give(self) -> None:
+        """Give one, twice a second."""
+        before, self._number = self._number, 1 - self._number
+        self.around.classes(add=f"heard-{self._number}", remove=f"heard-{before}")
 
 
 def grey(element: ui.element, stale: bool) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from nicegui import app, ui
 
 from positioner.pages.operator_page.controls import Door, SignedIn
-from positioner.pages.operator_page.marks import STYLE
+from positioner.pages.operator_page.marks import STYLE, SignOfLife
 from positioner.pages.operator_page.overview import Overview
 from positioner.pages.operator_page.units import PERCENT, POSITIONS, PRESSURES, Units
 from positioner.pages.operator_page.valve_panel import ValvePanel
@@ -69,7 +69,9 @@ class Tab:
             self._unit_choices()
             self._door = Door(self._sign_in, self._signed)
             self._theme.switch()
-        self._content = ui.element("div").classes("panel column")
+        self._life = SignOfLife()
+        with self._life.around:
+            self._content = ui.element("div").classes("panel column")
         await ui.context.client.connected()
         await self._theme.as_the_browser_prefers()
         self._show()
@@ -126,3 +128,4 @@ class Tab:
                 self._panel.refresh(picture)
         if slow:
             self._door.show()
+            self._life.give()
