@@ -197,6 +197,35 @@ def test_what_stood_in_for_a_failed_search_does_not_stay(searched: Callable[...,
     assert step.added.model.explained
 
 
+def ends_of_two(there: Effects, *, runner_up: float) -> float:
+    """One effect alone does better than either of the two that are missing, and leads nowhere."""
+    if {"ip_lag", "asymmetric_friction"} <= there:
+        return 1.0
+    if "presliding" in there:
+        return 4.95 if len(there) == 1 else 4.0
+    return runner_up if "ip_lag" in there else 20.0
+
+
+def test_the_runner_up_is_tried_where_the_added_one_leads_nowhere(
+    searched: Callable[..., tuple[EffectStep, ...]],
+) -> None:
+    first, last = searched(
+        lambda there, added: ends_of_two(there | added, runner_up=5.0), "presliding", "ip_lag", "asymmetric_friction"
+    )
+    assert first.added
+    assert last.added
+    assert [first.added.name, last.added.name] == ["ip_lag", "asymmetric_friction"]
+    assert last.before is first.added.model
+
+
+def test_what_stood_in_for_two_is_taken_out(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    """The runner-up is so much worse alone that it is not tried; beside the stand-in both are found in the end."""
+    steps = searched(
+        lambda there, added: ends_of_two(there | added, runner_up=7.0), "presliding", "ip_lag", "asymmetric_friction"
+    )
+    assert [step.added.name for step in steps if step.added] == ["ip_lag", "asymmetric_friction"]
+
+
 def test_a_rival_that_is_accepted_after_the_added_one_is_missing_too(
     searched: Callable[..., tuple[EffectStep, ...]],
 ) -> None:

@@ -10,8 +10,13 @@ from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
 from workbench.fit.fitting import Fit
-from workbench.select.block_errors import BlockErrors, indistinguishable
-from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain, no_better
+from workbench.select.block_errors import (
+    SAME_STANDARD_ERRORS,
+    BlockErrors,
+    indistinguishable,
+    relative_error_reduction,
+)
+from workbench.select.effect_acceptance import LEAST_BIC, Gain, bic, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
 from workbench.select.residual_structure import STRUCTURED
@@ -83,6 +88,43 @@ def judged_step(
     suspect = None if added or equivalent else _suspect(candidates, library)
     rivals, suspected = (_rivals(candidates, each, library) if each else () for each in (added, suspect))
     return ForwardStep(before, candidates, added, rivals, equivalent, suspected)
+
+
+def runner_up(step: EffectStep, library: Mapping[str, Effect]) -> EffectCandidate | None:
+    """Return the accepted effect that does best on what was held out, if there it is no worse than the added one.
+
+    One of the added one's class is none: no recording tells them apart.
+    """
+    if step.added is None or step.added.model is None:
+        return None
+    best, own = step.added.model.errors, algebraic_class(step.added.name, library)
+    errors = {
+        each.name: each.model.errors
+        for each in step.candidates
+        if each.accepted and each.model and each.name not in own
+    }
+    first = min(errors, key=lambda name: float(errors[name].logs.mean()), default=None)
+    if first is None or not indistinguishable(best.logs, errors[first].logs):
+        return None
+    return next(each for each in step.candidates if each.name == first)
+
+
+def with_added(step: EffectStep, candidate: EffectCandidate, library: Mapping[str, Effect]) -> EffectStep:
+    """Return a step with another of its candidates added."""
+    return replace(step, added=candidate, indistinguishable=_rivals(step.candidates, candidate, library))
+
+
+def leads_farther(one: EvaluatedModel, other: EvaluatedModel) -> bool:
+    """Whether one of two models is to be gone on from: it explains all, or does better on what was held out.
+
+    Where that does not tell them apart the evidence on the fitted part does.
+    """
+    if one.explained != other.explained:
+        return one.explained
+    _, standard_errors = relative_error_reduction(other.errors.logs, one.errors.logs)
+    if abs(standard_errors) > SAME_STANDARD_ERRORS:
+        return standard_errors > 0.0
+    return bic(other.fit) - bic(one.fit) > LEAST_BIC
 
 
 def _candidate(

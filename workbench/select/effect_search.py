@@ -6,7 +6,9 @@ search ends far behind another's is not searched further, unless the step would 
 another (`AFTER` in its file) is fitted only where that one has evidence, or is in the model already, and what the step
 would add leaves something to explain. Before they are judged, the valve without is fitted once more from the base
 parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
-model explains all, nothing more is accepted, or three effects are added.
+model explains all, nothing more is accepted, or three effects are added. Where two steps leave something to explain,
+the first is tried with its runner-up added, too, and taken back if that leads farther. Of three effects, one that is
+not needed beside the others has stood in for them, and is taken out.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +30,14 @@ from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
-from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
+from workbench.select.effect_candidates import (
+    EffectStep,
+    EvaluatedModel,
+    judged_step,
+    leads_farther,
+    runner_up,
+    with_added,
+)
 from workbench.select.equivalence import bare_imitation, classes
 from workbench.select.experiment import Experiment, experiment
 from workbench.select.forward_selection import MOST_ADDED, without_missing
@@ -93,18 +102,54 @@ class EffectSearch:
 
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""
-        steps: list[EffectStep] = []
-        here = base
+        steps = self._forward([], base)
+        return tuple(self._without_stand_in(steps))
+
+    def _forward(self, steps: list[EffectStep], here: EvaluatedModel) -> list[EffectStep]:
+        """Go on from the model that the steps so far have come to."""
         for _ in range(MOST_STEPS):
             following = self._step(len(steps) + 1, here)
             if steps:
+                steps[-1], following = self._taken_back(steps[-1], following)
                 steps[-1] = without_missing(steps[-1], following, self._library)
             steps = self._judged_anew([*steps, following])
             added = steps[-1].added
             if added is None or added.model is None or added.model.explained or len(steps) == MOST_ADDED:
                 break
             here = added.model
-        return tuple(steps)
+        return steps
+
+    def _without_stand_in(self, steps: list[EffectStep]) -> list[EffectStep]:
+        """Search anew without an effect that is not needed beside those that were added after it.
+
+        Of two effects, the second alone has been fitted already (`_judged_anew`).
+        """
+        last, added = _best(steps[-1]), [step.added.name for step in steps if step.added]
+        for i, name in enumerate(added[:-1] if len(added) > 2 else ()):
+            valve = last.fit.valve
+            others = tuple(each for each in valve.effect if each.name != name)
+            without = self.base(ValveFile(valve=valve.valve, effect=others))
+            following = next(each for each in steps[i].candidates if each.name == added[i + 1])
+            if following.model and not leads_farther(last, without):
+                turned = [*steps[:i], with_added(steps[i], following, self._library)]
+                return turned if following.model.explained else self._forward(turned, following.model)
+        return steps
+
+    def _taken_back(self, step: EffectStep, following: EffectStep) -> tuple[EffectStep, EffectStep]:
+        """Return a step and the one after it, with the runner-up added in the first where that leads farther.
+
+        Of two effects that are missing together the first is chosen before the second is known: another may stand in
+        for both, and have more evidence than either.
+        """
+        if _best(following).explained:
+            return step, following
+        other = runner_up(step, self._library)
+        if other is None or other.model is None:
+            return step, following
+        turned = self._step(other.step + 1, other.model)
+        if leads_farther(_best(turned), _best(following)):
+            return with_added(step, other, self._library), turned
+        return step, following
 
     def with_intervals(self, model: EvaluatedModel) -> EvaluatedModel:
         """Return a model with the profile intervals of its parameters."""
