@@ -55,10 +55,10 @@ class Accuracy:
     tolerance: float
 
 
-FINE = Accuracy(1.0, 1e-3)
-"""Within 1 um rms of steps and a tolerance a hundredth of it: a fiftieth of a transmitter's noise."""
-ROUGH = Accuracy(2.0, 1e-2)
-"""Within 50 um, in three quarters of the time."""
+FINE = Accuracy(1.0, 3e-4)
+"""Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
+ROUGH = Accuracy(2.0, 1e-3)
+"""Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
 LOOKS = (0.25, 0.5)
 """Parts of a stretch without a gap after which somebody looks whether it is worth while to go on."""
 MOST_CORRECTIONS = 3
