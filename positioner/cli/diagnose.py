@@ -1,6 +1,8 @@
 """`positioner diagnose`: which effect is missing."""
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,6 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o", "--out", type=Path, metavar="BETTER.toml", help="write the valve with what is missing, if that is sure"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    parser.add_argument(
+        "--budget-s", type=float, metavar="S", help="end after so many seconds, as Ctrl-C does, with what is known then"
+    )
     add_noise_argument(parser)
     add_export_arguments(parser)
 
@@ -49,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose and print; 0 if nothing is missing, else 1."""
     import time
+    from math import inf
 
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
@@ -67,13 +73,13 @@ def run(arguments: argparse.Namespace) -> int:
         return run_forces(arguments)
     if arguments.report is not None:
         require_plotly(arguments.report)
-    began_s = time.monotonic()
+    began_s, budget_s = time.monotonic(), inf if arguments.budget_s is None else arguments.budget_s
     valve = load_valve(find_valve(arguments.valve))
     stroke_m = valve.valve.stroke_m
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
     named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
-    with naming(named):
+    with naming(named), _known_at_all():
         diagnosis = diagnose(
             recordings,
             valve,
@@ -82,6 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             on_preview=_tell_preview,
             progress=Progress(),
+            over=(lambda: time.monotonic() - began_s > budget_s),
         )
     commands = extend_commands(diagnosis, arguments)
     print(diagnosis.summary())
@@ -99,6 +106,22 @@ def run(arguments: argparse.Namespace) -> int:
         subject = Subject(valve, files, recordings[0].metadata)
         report_diagnosis(diagnosis, arguments.report, subject, commands)
     return 0 if diagnosis.verdict == "adequate" else 1
+
+
+@contextmanager
+def _known_at_all() -> Iterator[None]:
+    """Say so where the budget is over before anything is known.
+
+    Raises:
+        CommandFailed: it is.
+    """
+    from config.errors import CommandFailed
+    from workbench.fit.breaking_off import BrokenOff
+
+    try:
+        yield
+    except BrokenOff:
+        raise CommandFailed("--budget-s was over before the valve as it is was fitted: nothing is known") from None
 
 
 def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:

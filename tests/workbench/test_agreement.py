@@ -1,5 +1,6 @@
 """Agreement of searches, on a made-up error of three coordinates with a least that is known."""
 
+from collections.abc import Iterable
 from typing import Any, cast
 
 import numpy as np
@@ -41,6 +42,9 @@ class MadeUp:
 
     def cost(self, z: Vector, scale: float = FINAL) -> float:
         return soft(self.residuals(z), scale)
+
+    def least(self, places: Iterable[Vector], scale: float = FINAL) -> Vector:
+        return min(places, key=lambda z: self.cost(z, scale))
 
     def keep(self, z: Vector, residuals: Vector, scale: float) -> None:
         """Keep nothing: a residual costs next to nothing."""

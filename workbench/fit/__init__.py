@@ -11,6 +11,7 @@ Its files:
     strewing           what is left where a sensor rounds: places about the end
     agreement          which of them came to the same
     threads            searches side by side
+    breaking_off       how all of them end early
     fitted_parameter   a parameter with its interval, and how it is shown
     uncertainty        what the record determines
 """

@@ -9,6 +9,7 @@ on the number of workers, which are threads.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import TYPE_CHECKING, TypeVar
@@ -561,7 +562,8 @@ def _search(error: SimulationError, z: Vector) -> Search:
 def _each(function: Callable[[T], S], arguments: Sequence[T], workers: int | None, tell: Progress) -> list[S]:
     """Apply a function to each argument on the workers; results in the order of the arguments."""
     results = []
-    for result in on_threads(function, arguments, workers):
-        results.append(result)
-        tell(len(results) / len(arguments))
+    with closing(on_threads(function, arguments, workers)) as found:
+        for result in found:
+            results.append(result)
+            tell(len(results) / len(arguments))
     return results

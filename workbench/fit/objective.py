@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sim.composition import Composition
 from sim.karnopp import Vector
+from workbench.fit.breaking_off import go_on
 from workbench.model.free_run import ROUGH, FreeRun
 from workbench.model.parameters import Parameter
 
@@ -74,6 +75,7 @@ class SimulationError:
 
     def residuals(self, z: Vector) -> Vector:
         """Return r, one a valid sample."""
+        go_on()
         apart_m = self.run.position_m(self.simulated(z))[self._rows] - self._measured_m[self._rows]
         return self.weighed(self._bounded_m(apart_m))
 
@@ -104,6 +106,7 @@ class SimulationError:
         """
         key = (z.tobytes(), scale)
         if key not in self._costs:
+            go_on()
             cost = 0.0
             for rows, position_m in self.run.stretches(self.simulated(z)):
                 apart_m = position_m - self._measured_m[rows]

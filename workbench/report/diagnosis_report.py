@@ -315,6 +315,8 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
         advice.append(
             "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
         )
+    if diagnosis.verdict == "unfinished":
+        advice.append("let the diagnosis run through, or name fewer effects, --effects")
     if diagnosis.split.train.record.pressure_pa is None and diagnosis.verdict != "adequate":
         advice.append(
             "record the actuator pressure too: it parts what happens before the actuator from what happens at the stem"

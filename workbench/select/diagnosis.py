@@ -16,10 +16,11 @@ from config.valve_file import ValveFile
 from sim.effect import find_effect, tried_effects
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
+from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
-from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
+from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
@@ -120,8 +121,11 @@ def diagnose(
     on_preview: Callable[[tuple[TangentScore, ...]], None] | None = None,
     progress: Progress | None = None,
     race: Race | None = None,
+    over: Callable[[], bool] | None = None,
 ) -> Diagnosis:
     """Find the effects that a valve file lacks to explain a recording.
+
+    Broken off by Ctrl-C or by `over`, it says what is known so far: the verdict is then "unfinished".
 
     Args:
         recording: one or several.
@@ -133,8 +137,11 @@ def diagnose(
         on_preview: given the tangent preview as soon as it is there.
         progress: called with what is being done, and the fraction of it done.
         race: called with each candidate's error as its search goes on.
+        over: asked before each simulation; true breaks the diagnosis off.
 
     Raises:
+        BrokenOff: it is over before the valve as it is was fitted, so that nothing is known.
+        KeyboardInterrupt: the same by Ctrl-C.
         InputError: the recording holds too little or other units than SI, an unknown effect.
     """
     parts = split([recording] if isinstance(recording, Recording) else recording, test)
@@ -147,30 +154,40 @@ def diagnose(
     tell = progress or (lambda _what, _done: None)
     search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell, race=race)
 
-    base = search.base(valve)
-    first = {name: each for name, each in library.items() if each.after not in library}
-    held = None
-    if parts.train.record.by_setpoint:
-        tell("positioner or packing", 0.0)
-        held = positioner_or_packing(parts, base, seed=seed, workers=threads)
-    scores = preview(base.fit, parts, first, threads)
-    if on_preview:
-        on_preview(scores)
-    steps = search.steps(base)
-    # A base fitted again, and better, takes the place of the first.
-    last = steps[-1]
-    best = last.added.model if last.added and last.added.model else last.before
-    base, best = search.with_intervals(steps[0].before), search.with_intervals(best)
-    found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
+    with ending(over or (lambda: False)):
+        base = search.base(valve)
+        scores: tuple[TangentScore, ...] = ()
+        held = None
+        try:
+            if parts.train.record.by_setpoint:
+                tell("positioner or packing", 0.0)
+                held = positioner_or_packing(parts, base, seed=seed, workers=threads)
+            first = {name: each for name, each in library.items() if each.after not in library}
+            scores = preview(base.fit, parts, first, threads)
+            if on_preview:
+                on_preview(scores)
+            steps = search.steps(base)
+            base, best = search.with_intervals(steps[0].before), search.with_intervals(_last(steps))
+            found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
+            chosen = search.experiment(steps) if found == "one_of" else None
+        except (BrokenOff, KeyboardInterrupt):
+            steps, found, chosen = search.so_far(base), "unfinished", None
+            base, best = steps[0].before, _last(steps)
     return Diagnosis(
         steps=steps,
         verdict=found,
         base=base,
         best=best,
         preview=scores,
-        experiment=search.experiment(steps) if found == "one_of" else None,
+        experiment=chosen,
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts),
         unseen=unseen,
         positioner=held,
     )
+
+
+def _last(steps: Sequence[EffectStep]) -> EvaluatedModel:
+    """Return what the steps have come to; a base fitted again, and better, takes the place of the first."""
+    added = steps[-1].added
+    return added.model if added and added.model else steps[-1].before

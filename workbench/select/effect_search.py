@@ -12,7 +12,8 @@ not needed beside the others has stood in for them, and is taken out.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from typing import TypeVar
@@ -58,6 +59,15 @@ S = TypeVar("S")
 T = TypeVar("T", bound="BegunFit | EvaluatedModel | str")
 
 
+@dataclass(slots=True)
+class _Known:
+    """What a search knows so far: the steps made, and in the one being made what is there before it and beside that."""
+
+    steps: tuple[EffectStep, ...] = ()
+    before: EvaluatedModel | None = None
+    models: dict[str, EvaluatedModel | str] = field(default_factory=dict)
+
+
 class EffectSearch:
     """The forward search over one split recording, and what it holds on to.
 
@@ -77,11 +87,12 @@ class EffectSearch:
     ) -> None:
         self._split = split
         self._library = library
-        self._known = known
+        self._drawn = known
         self._seed = seed
         self._workers = workers
         self._progress = progress
         self._race = race or (lambda _step, _name, _rms_m: None)
+        self._known = _Known()
 
     def base(self, valve: ValveFile) -> EvaluatedModel:
         """Fit a valve as it is, without intervals.
@@ -105,9 +116,17 @@ class EffectSearch:
         steps = self._forward([], base)
         return tuple(self._without_stand_in(steps))
 
+    def so_far(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
+        """Return the steps made so far, and the one being made as far as it has come; for a search broken off."""
+        known = self._known
+        before = known.before or base
+        models = {name: each for name, each in known.models.items() if name not in before.effects}
+        return (*known.steps, judged_step(before, models, len(known.steps) + 1, self._library))
+
     def _forward(self, steps: list[EffectStep], here: EvaluatedModel) -> list[EffectStep]:
         """Go on from the model that the steps so far have come to."""
         for _ in range(MOST_STEPS):
+            self._known = _Known(tuple(steps), here)
             following = self._step(len(steps) + 1, here)
             if steps:
                 steps[-1], following = self._taken_back(steps[-1], following)
@@ -167,6 +186,7 @@ class EffectSearch:
         return None
 
     def _step(self, number: int, before: EvaluatedModel) -> EffectStep:
+        self._known = _Known(self._known.steps, before)
         missing = [name for name in self._library if name not in before.effects]
         names = [name for name in missing if self._library[name].after not in missing]
         models, waiting = self._raced(number, self._begun(number, before, names))
@@ -275,7 +295,7 @@ class EffectSearch:
     ) -> dict[str, BegunFit | str]:
         """Begin to refit the named effects, as far as through the wide scale."""
         train, here = self._split.train.recording, before.fit
-        known = ValveFile(valve=self._known, effect=here.valve.effect)
+        known = ValveFile(valve=self._drawn, effect=here.valve.effect)
 
         def begun(name: str) -> BegunFit | str:
             try:
@@ -315,7 +335,7 @@ class EffectSearch:
             lost = racing and each.cost > OUT_OF_RACE * least
             return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
 
-        return self._each(number, "refitting", finished, fits, 0.8, 1.0)
+        return self._each(number, "refitting", finished, fits, 0.8, 1.0, self._known.models)
 
     def _each(
         self,
@@ -325,17 +345,19 @@ class EffectSearch:
         by_name: Mapping[str, S],
         begin: float,
         end: float,
+        known: dict[str, T] | None = None,
     ) -> dict[str, T]:
         """Apply a function to what is there of each effect, on the workers; tell how far the step is by then."""
         found: dict[str, T] = {}
-        for name, each in zip(by_name, on_threads(function, tuple(by_name.values()), self._workers), strict=True):
-            found[name] = each
-            rms_m = _rms_so_far_m(each)
-            if rms_m is not None:
-                self._race(number, name, rms_m)
-            self._progress(
-                f"step {number}: {what} {len(by_name)} effects", begin + (end - begin) * len(found) / len(by_name)
-            )
+        known = {} if known is None else known
+        with closing(on_threads(function, tuple(by_name.values()), self._workers)) as results:
+            for name, each in zip(by_name, results, strict=True):
+                found[name] = known[name] = each
+                rms_m = _rms_so_far_m(each)
+                if rms_m is not None:
+                    self._race(number, name, rms_m)
+                done = begin + (end - begin) * len(found) / len(by_name)
+                self._progress(f"step {number}: {what} {len(by_name)} effects", done)
         return found
 
     def _evaluated(self, found: Fit) -> EvaluatedModel:

@@ -6,6 +6,7 @@ one_of        as missing, but a set of effects does equally well: the experiment
 unexplained   something is missing that the library does not have; what lowered the error so far is still named.
               Or the valve scatters so much that a tenth of the motion is left, which no model could explain
 unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named
+unfinished    broken off before the search was through; what was known by then is named
 untrusted     the searches disagree, and the best of them explains nothing
 """
 
@@ -14,11 +15,11 @@ from typing import Literal
 
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel
 
-Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "untrusted"]
+Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "unfinished", "untrusted"]
 
 
 def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float, floor_m: float | None) -> Verdict:
-    """Return the verdict.
+    """Return the verdict of a search that is through.
 
     Args:
         best: the last model accepted, or the valve as it is.

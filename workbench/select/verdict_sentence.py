@@ -45,12 +45,22 @@ def verdict_sentence(
         return f"Missing: {names}, or another that does as well; {fell}." + "".join(
             [*(rivals_sentence(each, library) for each in rivals), knife_edges_sentence(best.errors)]
         )
-    part = "lowers it" if verdict == "unjudged" else "explains a part"
+    part = "lowers it" if verdict in ("unjudged", "unfinished") else "explains a part"
     begun = f" {names} {part}: {fell}." if names else f" The held-out error is {after:.3g} mm."
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
-    untrusted = "Not to be trusted: searches from independent starts do not come to the same."
-    return (f"Not judged: {UNKNOWN}." if verdict == "unjudged" else untrusted) + begun
+    return _unproved(verdict, steps, library) + begun
+
+
+def _unproved(verdict: Verdict, steps: Sequence[EffectStep], library: Mapping[str, Effect]) -> str:
+    """Say why nothing is judged."""
+    if verdict == "unjudged":
+        return f"Not judged: {UNKNOWN}."
+    if verdict == "untrusted":
+        return "Not to be trusted: searches from independent starts do not come to the same."
+    tried = sum(each.model is not None for each in steps[-1].candidates)
+    missing = sum(name not in steps[-1].before.effects for name in library)
+    return f"Broken off in step {len(steps)}, with {tried} of {missing} effects refitted; nothing is judged."
 
 
 def reduction_sentence(before: BlockErrors, after: BlockErrors) -> str:
