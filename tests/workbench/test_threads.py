@@ -29,8 +29,8 @@ def test_linear_algebra_keeps_to_one_thread_meanwhile() -> None:
 
 
 def test_what_is_left_early_breaks_off_the_searches_on_all_threads() -> None:
-    """As Ctrl-C leaves it: without, the pool would wait for a search that never ends."""
-    begun, ended = Event(), Event()
+    """As Ctrl-C leaves it: without, the pool would wait for a search of seconds."""
+    begun, ended, never = Event(), Event(), Event()
 
     def searched(number: int) -> int:
         if number == 0:
@@ -38,10 +38,13 @@ def test_what_is_left_early_breaks_off_the_searches_on_all_threads() -> None:
             return 0
         begun.set()
         try:
-            while True:
+            for _ in range(3000):
                 go_on()
-        finally:
+                never.wait(1e-3)
+        except BrokenOff:
             ended.set()
+            raise
+        return 1
 
     with closing(on_threads(searched, [0, 1], 2)) as results:
         assert next(results) == 0
