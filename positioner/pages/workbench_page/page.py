@@ -100,6 +100,7 @@ class TabPage:
         """Show what goes with the recording and the valve on the desk."""
         self._open.refresh()
         self._rest.clear()
+        self._theme.forget()
         if self._desk.live is None:
             with self._rest:
                 ui.label("Begin with a recording and a valve, or with a blind case.").classes("quiet")

@@ -48,6 +48,8 @@ class Sliders:
         self._settled = settled
         self._held = False
         self._following = False
+        self._let_go = ("", 0.0)
+        """Which slider was let go last, and where."""
         heading("Parameters")
         self._rows = [self._row(each, fitted.get(each.name)) for each in live.parameters.values()]
         self._switches: dict[str, ui.switch] = {}
@@ -76,11 +78,14 @@ class Sliders:
                 told += f"; fitted {factor * fitted.value:.4g} ({interval})"
             ui.label(told).classes("quiet")
         slider.on_value_change(lambda event: self._dragged(parameter, event.value))
-        slider.on("change", self._released, args=[])
+        slider.on("change", lambda event: self._released(parameter, event.args))
         return Row(parameter, slider, value, factor, unit)
 
     def _dragged(self, parameter: Parameter, share: float) -> None:
         if self._following:
+            return
+        if not self._held and (parameter.name, share) == self._let_go:
+            self._follow()  # a last move that comes after the release: it is there, or undone, already
             return
         if not self._held:
             self._live.keep()
@@ -89,8 +94,10 @@ class Sliders:
         self._show_values()
         self._moved()
 
-    async def _released(self) -> None:
-        self._held = False
+    async def _released(self, parameter: Parameter, share: float) -> None:
+        """Take where the slider was let go: the last move may still be on its way."""
+        self._dragged(parameter, share)
+        self._held, self._let_go = False, (parameter.name, share)
         self._follow()
         await self._settled()
 
