@@ -30,10 +30,10 @@ WATCHED = """name => {
     const plot = document.querySelector(`[data-testid="${name}"]`);
     window.tookMs = undefined;
     let begin = performance.now();
-    addEventListener("keydown", () => { begin = performance.now(); }, {capture: true, once: true});
+    addEventListener("mousemove", () => { begin = performance.now(); }, {capture: true, once: true});
     plot.once("plotly_afterplot", () => { window.tookMs = performance.now() - begin; });
 }"""
-"""Milliseconds from a key, or from now, until the lines that come from the server are drawn."""
+"""Milliseconds from a move of the mouse, or from now, until the lines that come from the server are drawn."""
 TOOK = "() => window.tookMs"
 PANNED = """([name, begin, end]) => document.querySelector(`[data-testid="${name}"]`).emit(
     "plotly_relayout", {"xaxis.range[0]": begin, "xaxis.range[1]": end})"""
@@ -50,9 +50,7 @@ def main() -> None:
             print(f"server alone: {_resident_mb(process):.0f} MB")
             with _page(address) as page:
                 print(f"first visit: {_first_visit_s(page):.1f} s until the curves stand")
-                slider = page.get_by_role("slider", name="spring stiffness").locator("[tabindex='0']")
-                slider.focus()
-                moves = [_moved_ms(page) for _ in range(MOVES)]
+                moves = list(_moved_ms(page))
                 print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}")
                 print(f"server with one tab: {_resident_mb(process):.0f} MB")
         long = Path(folder, "long.csv")
@@ -66,10 +64,20 @@ def main() -> None:
             print(f"server: {_resident_mb(process):.0f} MB")
 
 
-def _moved_ms(page: Page) -> float:
-    page.evaluate(WATCHED, TIME_PLOT)
-    page.keyboard.press("ArrowRight")
-    return float(page.wait_for_function(TOOK).json_value())
+def _moved_ms(page: Page) -> Iterator[float]:
+    """Drag a slider, step by step."""
+    slider = page.get_by_role("slider", name="spring stiffness")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    assert box is not None
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(*middle)
+    page.mouse.down()
+    for i in range(MOVES):
+        page.evaluate(WATCHED, TIME_PLOT)
+        page.mouse.move(middle[0] + 2 * i + 2, middle[1])
+        yield float(page.wait_for_function(TOOK).json_value())
+    page.mouse.up()
 
 
 def _panned_ms(page: Page, begin_s: float, end_s: float) -> float:

@@ -1,5 +1,7 @@
 """Measured and simulated over time, forces over velocity and position, the sentences of `compare`, and the sliders."""
 
+import asyncio
+
 import numpy as np
 from nicegui import events, ui
 
@@ -21,6 +23,8 @@ MOVED = ("model", "error", "model's pressure")
 """Lines that a slider moves,"""
 MOVED_LINES = [LINES.index(name) for name in MOVED]
 """and which they are."""
+QUIET_S = 0.25
+"""Without a move or another window: then what takes longer is drawn too."""
 TIME_PX, FORCE_PX = 520, 300
 
 
@@ -34,7 +38,7 @@ class ComparePanel:
         self._theme = theme
         self._live: LiveModel = desk.live
         self._asked = 0
-        """How often a comparison was asked for that is not there yet."""
+        """How often something was asked for that takes longer than a curve."""
         self._figure = TimeFigure(self._live.record)
         self._forces = self._live.forces()
         self._begin_s = float(self._live.record.time_s[0])
@@ -85,22 +89,30 @@ class ComparePanel:
         self._error.set_text(f"{length(rms_m).text} mm")
 
     async def _settled(self) -> None:
-        """Draw the curve in full, and work out all that hangs on the parameters; what was set meanwhile comes after."""
+        """Draw the curve in full; when the hand has come to rest, work out all that hangs on the parameters."""
         self._time.restyle(self._figure.data(MOVED), MOVED_LINES)
-        self._asked += 1
-        if self._asked > 1:
+        if not await self._is_quiet():
             return
-        while self._asked:
-            asked = self._asked
-            with errors_told():
-                compared = await aside(self._desk.compare)
+        mine = self._asked
+        with errors_told():
+            compared = await aside(self._desk.compare)
+            self._forces = await aside(self._live.forces)
+            if mine == self._asked:
                 self._figure.slips = compared.slips
                 self._marked()
                 self._tell(compared)
-            self._forces = await aside(self._live.forces)
-            for each in self._clouds:
-                each.redraw()
-            self._asked -= asked
+                self._redraw_clouds()
+
+    async def _is_quiet(self) -> bool:
+        """Wait a moment; whether nothing else was asked in it."""
+        self._asked += 1
+        mine = self._asked
+        await asyncio.sleep(QUIET_S)
+        return mine == self._asked
+
+    def _redraw_clouds(self) -> None:
+        for each in self._clouds:
+            each.redraw()
 
     def _tell(self, compared: Comparison) -> None:
         self._error.set_text(f"{length(compared.rms_m).text} mm")
@@ -142,14 +154,14 @@ class ComparePanel:
     def _look(self, window: Window) -> None:
         self._time.relayout({"xaxis.range": [window.begin_s, window.end_s]})
 
-    def _looked_at(self, event: events.GenericEventArguments) -> None:
+    async def _looked_at(self, event: events.GenericEventArguments) -> None:
         window = window_of(event.args, self._figure.whole)
         if window is None:
             return
         self._figure.window = window
         self._time.restyle(self._figure.data(), list(range(len(LINES))))
-        for each in self._clouds:
-            each.redraw()
+        if await self._is_quiet():
+            self._redraw_clouds()
 
     def _clicked(self, event: events.GenericEventArguments) -> None:
         """Go closer to a slip that is clicked."""

@@ -15,7 +15,7 @@ from workbench.compare.friction_balance import Forces
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import rounded
 
-MOST = 1500
+MOST = 700
 """Points of a cloud."""
 OVER = {"velocity": ("velocity, mm/s (opening +)", "velocity_m_per_s"), "position": ("position, mm", "position_m")}
 
