@@ -82,6 +82,11 @@ class Work:
         said.close()
         self.is_over = False
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether its process is there."""
+        return self._process.is_alive()
+
     def news(self) -> list[News]:
         """Return what it has told since it was asked last; the last of all is Finished or Failed."""
         told: list[News] = []
@@ -99,7 +104,7 @@ class Work:
     def cancel(self) -> None:
         """Stop it, if it is not over."""
         self.is_over = True
-        if self._process.is_alive():
+        if self.is_alive:
             self._process.kill()
             self._process.join(END_WITHIN_S)
         self._heard.close()

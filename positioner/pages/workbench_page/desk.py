@@ -27,6 +27,9 @@ from workbench.fit.fitting import Fit
 from workbench.select.extension import Extension
 from workbench.select.extension_journal import Journal, write_extended
 
+BLIND = "blind"
+"""The folder of a blind case on a command line."""
+
 
 @dataclass(frozen=True, slots=True)
 class NamedValve:
@@ -69,7 +72,9 @@ class Desk:
     found: Search | None = None
     """The last diagnosis that has come to its end."""
     sealed: Path | None = None
-    """The folder of a blind case."""
+    """The folder of a blind case,"""
+    seed: int = 0
+    """and what it was drawn from."""
     _written: int = 0
 
     def take_recording(self, opened: Opened) -> None:
@@ -98,9 +103,9 @@ class Desk:
         folder = self.folder / f"blind-{seed}"
         if not folder.exists():
             seal(folder, hide(seed))
-        opened = Opened(f"blind case {seed}", folder / "fit.csv", Recording.read(folder / "fit.csv"))
-        self._held(opened, named_valve(str(folder / "valve.toml"), "valve.toml"))
-        self.export, self.sealed = None, folder
+        opened = Opened(f"{BLIND}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"))
+        self._held(opened, named_valve(str(folder / "valve.toml"), f"{BLIND}/valve.toml"))
+        self.export, self.sealed, self.seed = None, folder, seed
 
     def compare(self) -> Comparison:
         """Compare the valve as it is set.
@@ -182,7 +187,8 @@ class Desk:
             return ()
         first = self.journal[0].before if self.journal else self.valve
         recording, words = self.opened.name, self.opened.words
-        lines = [("compare", recording, "--valve", first.name, *words)]
+        lines: list[tuple[str, ...]] = [("hide", "--seed", str(self.seed), "-o", BLIND)] if self.sealed else []
+        lines.append(("compare", recording, "--valve", first.name, *words))
         lines.append(("diagnose", recording, "--valve", first.name, *words))
         given = first.name
         for i, step in enumerate(self.journal, start=1):

@@ -60,7 +60,7 @@ class JournalPanel:
     def _save(self) -> None:
         with errors_told():
             assert self._desk.valve is not None
-            ui.download.content(self._desk.toml, self._desk.valve.name.removesuffix(".toml") + ".toml")
+            ui.download.content(self._desk.toml, self._desk.valve.path.name)
 
     async def _report(self) -> None:
         with errors_told():

@@ -30,10 +30,10 @@ class OpenPanel:
         with ui.element("section").classes("together"):
             with ui.column().classes("wide"):
                 self._recording(files)
+                self._mapping = ui.column().classes("w-full")
+                self._remarks = ui.column().classes("w-full")
             with ui.column().classes("side"):
                 self._valve()
-        self._mapping = ui.column().classes("w-full")
-        self._remarks = ui.column().classes("w-full")
         self.refresh()
 
     def refresh(self) -> None:
@@ -110,6 +110,8 @@ class OpenPanel:
                     sentences([*given, *(f"assumed: {each}" for each in assumed)], "assumed")
                 await self._take_valve(str(path), path.name)
 
+        for each in (area, low, high, stroke, friction, ratio):
+            each.classes("w-full").props("dense")
         ui.button("Make the valve", on_click=made).props("outline no-caps")
 
     def _columns(self, export: Export) -> None:
