@@ -32,10 +32,10 @@ from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
 from workbench.fit.fitting import Fit, fit
-from workbench.select.discrimination import BUDGET, Discrimination, Played, Player, discriminate
+from workbench.select.discrimination import BUDGET, FEW_MOVES, Discrimination, Played, Player, discriminate
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment
-from workbench.select.experiment_design import Bounds, DesignedExperiment, courses, designed
+from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, courses, designed
 
 PERIOD_S = 0.01
 RATE_PA_PER_S = 400e3
@@ -53,10 +53,12 @@ def menu(
     bounds: Bounds,
     *,
     seed: int,
-    most_moves: int,  # noqa: ARG001 - its inputs are whole
+    most_moves: int,
     workers: int | None,
 ) -> DesignedExperiment | None:
-    """Choose the whole input of the menu as a diagnosis does."""
+    """Choose the whole input of the menu as a diagnosis does; there are no shorter ones."""
+    if most_moves in (FEW_MOVES, MOST_MOVES):
+        return None
     chosen = experiment(fits, record, seed=seed, workers=workers)
     course = next(each for each in courses(record, bounds, WHOLE) if each.name == chosen.name)
     return DesignedExperiment(course.within(bounds), np.inf)

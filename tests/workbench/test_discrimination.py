@@ -21,7 +21,7 @@ from workbench.data.record import Record
 from workbench.fit.fitting import Fit, fit
 from workbench.select.discrimination import Played, Race, Weighed, discriminate, log_odds
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import Bounds, Course, DesignedExperiment, Leg
+from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))
@@ -112,17 +112,18 @@ def answering(chosen: DesignedExperiment) -> Played:
 
 
 class Design:
-    """A designer that always says the same, and notes what it was allowed."""
+    """A designer that says the same whatever it is allowed, or by what it is allowed; it notes that."""
 
-    def __init__(self, separation: float) -> None:
+    def __init__(self, separation: float, course: Course = COURSE, otherwise: Course | None = None) -> None:
         self.separation = separation
+        self.course, self.otherwise = course, otherwise or course
         self.asked: list[int] = []
 
     def __call__(
         self, fits: Sequence[Fit], record: Record, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
     ) -> DesignedExperiment | None:
         self.asked.append(most_moves)
-        return DesignedExperiment(COURSE, self.separation)
+        return DesignedExperiment(self.course if most_moves <= MOST_MOVES else self.otherwise, self.separation)
 
 
 def silent(_: DesignedExperiment) -> Played:
@@ -141,6 +142,30 @@ def test_what_a_refit_imitates_is_not_played(fits: dict[str, Fit], recording: Re
     found = discriminate(fits, [recording], silent, BOUNDS, LIBRARY, design=Design(1.0))
     assert (found.outcome, found.named, found.rounds) == ("not_separable", (), ())
     assert "cannot be told apart by this valve within these permissives" in found.sentence
+
+
+def test_little_promised_is_played_while_moves_are_left(fits: dict[str, Fit], recording: Recording) -> None:
+    """A valve that scatters: no experiment promises the odds however often it is repeated; they are played."""
+    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
+    found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=Design(1.002), budget=4)
+    assert (found.outcome, found.moves) == ("budget_spent", 4)
+
+
+def test_whole_inputs_are_weighed_against_short_ones(fits: dict[str, Fit], recording: Recording) -> None:
+    """Twice as long for as many moves promises twice as much; as long for three times the moves, less."""
+    played: list[str] = []
+
+    def noted(chosen: DesignedExperiment) -> Played:
+        played.append(chosen.course.name)
+        return silent(chosen)
+
+    longer = Course("longer", COURSE.first_pa, tuple(replace(leg, hold_s=5.0) for leg in COURSE.legs))
+    busier = Course("busier", COURSE.first_pa, tuple(replace(leg, hold_s=0.3) for leg in 3 * COURSE.legs))
+    for whole in (longer, busier):
+        design = Design(1.002, otherwise=whole)
+        discriminate(fits, [recording], noted, BOUNDS, LIBRARY, design=design, budget=30)
+        assert design.asked == [3, 8, 30]
+    assert played == ["longer", "by hand"]
 
 
 def test_what_the_valve_does_not_play_stops_it(fits: dict[str, Fit], recording: Recording) -> None:

@@ -15,8 +15,7 @@ is named, and the best must explain the experiments as well as a model can. Memb
 
     resolved       the best one's odds have reached 100 : 1
     one_class      all rivals are one by algebra: no record of pressure and position tells them apart
-    not_separable  what the best experiment inside the bounds promises, n/2 log(separation) for n independent samples,
-                   would not reach these odds however often the budget allowed it
+    not_separable  a refit imitates every experiment inside the bounds: separation 1
     budget_spent   the moves allowed are used up
     unexplained    the best one does not explain the experiments: the effect is none of the rivals
     stopped        the valve did not play an experiment: a permissive, a veto, a fault
@@ -65,8 +64,8 @@ BUDGET = 60
 """Moves."""
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
-DOUBT = 2.0
-"""Factor on what an experiment promises before it is given up: it is worked out under few draws of the noise."""
+IMITATED = 1.001
+"""A separation below it is none."""
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
 
@@ -253,7 +252,7 @@ def discriminate(
     while outcome is None:
         left = budget - used
         chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
-        if chosen is None or not race.worthwhile(chosen, left):
+        if chosen is None or chosen.separation < IMITATED:
             outcome = "not_separable"
             break
         played = player(chosen)
@@ -274,13 +273,21 @@ def discriminate(
 def _chosen(
     race: "Race", bounds: Bounds, design: Designer, left: int, seed: int, workers: int | None
 ) -> DesignedExperiment | None:
-    """Return the experiment of few moves if it promises the odds by itself, else one of more."""
-    chosen = None
-    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES)}):
+    """Return the shortest experiment that promises the odds by itself, or the one that promises most if repeated.
+
+    Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
+    promise say much, worked out under few draws of that noise. So experiments go on as long as there are moves left.
+    """
+    best = None
+    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):
         chosen = design(race.alive, race.record, bounds, seed=seed, most_moves=most, workers=workers)
-        if chosen is not None and race.promised(chosen) >= SURE * log(ODDS):
-            break
-    return chosen
+        if chosen is None:
+            continue
+        if race.promised(chosen) >= SURE * log(ODDS):
+            return chosen
+        if best is None or race.promised_by(chosen, left) > race.promised_by(best, left):
+            best = chosen
+    return best
 
 
 def rivals_of(diagnosis: Diagnosis) -> dict[str, Fit]:
@@ -352,9 +359,9 @@ class Race:
         samples = (chosen.course.duration_s - REST_S) / self.record.period_s
         return 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
 
-    def worthwhile(self, chosen: DesignedExperiment, left: int) -> bool:
-        """Whether an experiment, repeated while so many moves are left, promises odds enough."""
-        return DOUBT * self.promised(chosen) * max(1.0, left / max(1, chosen.course.moves)) >= log(ODDS)
+    def promised_by(self, chosen: DesignedExperiment, moves: int) -> float:
+        """Return by how much an experiment is to raise the log odds, repeated for so many moves."""
+        return self.promised(chosen) * max(1.0, moves / max(1, chosen.course.moves))
 
     @property
     def explained(self) -> bool:
