@@ -72,7 +72,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         InputError: the file is not there, cannot be read, or is not TOML (names the line).
     """
-    text = read_plain(path)
+    text = read_plain(path, "valid TOML")
     try:
         return tomllib.loads(text)
     except RecursionError:

@@ -12,8 +12,12 @@ MOST_VALUES = 250_000_000
 """Of a table that declares how large it is, as Parquet does in a few bytes: 2 GB of numbers."""
 
 
-def read_plain(path: Path, most_bytes: int = MOST_BYTES) -> str:
+def read_plain(path: Path, what: str = "text") -> str:
     """Return a file's text.
+
+    Args:
+        path: where it is.
+        what: should be in it, as messages say it.
 
     Raises:
         InputError: it is not there, cannot be read, is no regular file, too large, or not UTF-8 text.
@@ -25,11 +29,11 @@ def read_plain(path: Path, most_bytes: int = MOST_BYTES) -> str:
             raise InputError(source, "cannot be read: Is a directory")
         if not stat.S_ISREG(found.st_mode):
             raise InputError(source, "is not a regular file")
-        if found.st_size > most_bytes:
-            raise InputError(source, f"has {found.st_size} bytes, allowed are {most_bytes}")
+        if found.st_size > MOST_BYTES:
+            raise InputError(source, f"has {found.st_size} bytes, allowed are {MOST_BYTES}")
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
-        raise InputError(source, "it is not UTF-8 text") from None
+        raise InputError(source, f"is not {what}: it is not UTF-8 text") from None
     except OSError as error:
         raise InputError(source, f"cannot be read: {error.strerror}") from None
     except ValueError as error:  # of a path that no file can have

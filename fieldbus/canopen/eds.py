@@ -206,7 +206,7 @@ def read_eds(path: Path, node: int) -> "ObjectDictionary":
 
     import canopen
 
-    text = read_plain(path)
+    text = read_plain(path, "an electronic data sheet")
     try:
         if "[DeviceInfo]" not in text:
             raise ValueError("section [DeviceInfo] is missing")

@@ -25,6 +25,12 @@ def job() -> RefinementJob:
     )
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may take long to start a process."""
+    monkeypatch.setattr(room, "LONGEST_WAIT_S", 100.0)
+
+
 @pytest.fixture(scope="module")
 def process() -> Iterator[RefinementProcess]:
     made = RefinementProcess()
