@@ -68,6 +68,11 @@ class Device(Schema):
         """The least difference of two commands that the device is told; 0 where it is told any."""
         return 0.0
 
+    @property
+    def pressure_step_pa(self) -> float:
+        """The least difference of two pressures that the device shows; 0 where it shows any, or none at all."""
+        return 0.0
+
     def delivered_pa(self, command_pa: float) -> float:
         """Return the command nearest to one that the device can be told, Pa."""
         return command_pa
@@ -104,6 +109,12 @@ class ModbusDevice(Device):
         """The scale of its register, if that holds whole numbers."""
         place = self.map.command_pa
         return 0.0 if place.is_float else abs(place.scale)
+
+    @property
+    def pressure_step_pa(self) -> float:
+        """The scale of its register, if that holds whole numbers."""
+        place = self.map.pressure_pa
+        return 0.0 if place is None or place.is_float else abs(place.scale)
 
     def delivered_pa(self, command_pa: float) -> float:
         """Return what its register can say."""

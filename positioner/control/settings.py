@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import sqrt
 
 from config.daemon_file import DaemonFile, LawTable
 from config.extended_valve import ExtendedValve
@@ -86,7 +87,10 @@ class Settings:
                 stroke_m=file.valve.stroke_m,
                 pressure_pa=file.pressure.maximum_pa - file.pressure.minimum_pa,
                 noise_std_m=identification.noise_std_m,
-                pressure_noise_std_pa=identification.pressure_noise_std_pa,
+                # A register of whole numbers rounds: an error spread evenly over a digit.
+                pressure_noise_std_pa=max(
+                    identification.pressure_noise_std_pa, file.device.pressure_step_pa / sqrt(12.0)
+                ),
                 pressure_held=identification.pressure_held,
                 window_s=identification.window_s,
                 minimum_window_s=identification.minimum_window_s,

@@ -103,6 +103,22 @@ def test_a_set_point_of_coarse_digits_is_no_restart(device: PlainDevice) -> None
     assert Settings.of(file).limits.restart_tolerance_pa == 1000.0
 
 
+def test_a_coarse_pressure_register_is_known_to_round() -> None:
+    places = {"position_m": {"address": 0}, "command_pa": {"address": 4}}
+    for pressure, said_pa, noise_pa in (
+        ({"address": 8, "type": "uint16", "scale": 100.0}, 0.0, 100.0 / 12**0.5),
+        ({"address": 8, "type": "uint16", "scale": 100.0}, 50.0, 50.0),
+        ({"address": 8}, 0.0, 0.0),
+    ):
+        described = {
+            "valve": {"stroke_m": 0.03},
+            "device": {"map": {**places, "pressure_pa": pressure}},
+            "identification": {"pressure_noise_std_pa": said_pa},
+        }
+        settings = Settings.of(DaemonFile.model_validate(described))
+        assert settings.identification.pressure_noise_std_pa == pytest.approx(noise_pa)
+
+
 IN_INPUT, BEHIND_HOLE, STATUS, ACTION = 3, 40, 41, 61
 HEALTHY, SENSOR_BAD = 0b1, 0b101
 

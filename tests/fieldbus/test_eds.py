@@ -91,7 +91,7 @@ def test_the_checker_would_find_one(tmp_path: Path) -> None:
 def test_what_is_no_data_sheet_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.eds"
     path.write_bytes(text.encode("latin-1"))
-    with pytest.raises(InputError, match=r"is not an electronic data sheet|it is not UTF-8 text") as caught:
+    with pytest.raises(InputError, match="is not an electronic data sheet") as caught:
         read_eds(path, NODE)
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="cannot be read: No such file"):
