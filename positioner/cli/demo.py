@@ -43,6 +43,10 @@ SETTLED_S = 0.2
 LARGEST_ERROR_PU = 0.01
 LARGEST_RATIO_ERROR = 0.01
 RATIOS = ("b_over_c", "k_over_c")
+IN_A_BROWSER = """in a browser:
+  positioner workbench {recording} --valve seed
+  positioner sim config/profiles/slave.toml & positioner run config/profiles/daemon.toml &
+  positioner page --config config/profiles/daemon.toml"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +141,7 @@ def _run_steps(arguments: argparse.Namespace) -> int:
         picture = _picture(folder, outcome)
         if arguments.out:
             _print_line(f"picture {picture}, recording {_recording(folder)}")
+            print(IN_A_BROWSER.format(recording=_recording(folder)))
         if arguments.json:
             write_json(arguments.json, _jsonable(outcome, time.monotonic() - started_s), indent=1)
         for problem in outcome.problems:
