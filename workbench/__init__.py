@@ -14,6 +14,7 @@ Its rooms, each on those before it:
     compare    where it fails
     fit        the parameters that explain it
     select     which effect is missing, and how it is added
+    discover   the form of an effect that the library lacks
     forces     the same where a rig imposes the position, and there is nothing to simulate
     blind      recordings with an effect that nobody knows
     report     all of it for a browser

@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.next_step import extend_commands
+    from positioner.cli.parts.next_step import discover_command, extend_commands
     from positioner.cli.parts.progress import Progress
     from workbench.data.imposed_motion import is_imposed
     from workbench.report import Subject, report_diagnosis, require_plotly
@@ -95,6 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
     _tell_experiment(diagnosis, arguments.experiment)
     for command in commands:
         print(f"to add it: {command}" if len(commands) == 1 else f"one of: {command}")
+    if diagnosis.verdict == "unexplained":
+        print(f"to look for a form of what the library lacks: {discover_command(arguments)}")
     if arguments.out is not None:
         _write_valve(diagnosis, valve, arguments)
     if arguments.json is not None:

@@ -30,6 +30,7 @@ COMMANDS = (
     "response",
     "compare",
     "diagnose",
+    "discover",
     "extend",
     "workbench",
     "page",

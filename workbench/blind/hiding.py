@@ -22,7 +22,7 @@ from config.results.result import Brief
 from config.slave_file import Sensor
 from config.valve_file import EffectTable, ValveFile, ValveParameters, find_valve, load_valve
 from sim.composition import Composition
-from sim.effect import Effect, first_effects, shipped_effect
+from sim.effect import Effect, find_effect, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import LEVELS, NOISE_M, Trial, refitted_rmse_m
 
@@ -46,13 +46,18 @@ class Hidden(Brief):
 
 
 def hide(
-    seed: int, *, effects: int = 1, dirty: bool = False, duration_s: float = 30.0, period_s: float = 0.01
+    seed: int,
+    *,
+    effects: int | Sequence[str] = 1,
+    dirty: bool = False,
+    duration_s: float = 30.0,
+    period_s: float = 0.01,
 ) -> Hidden:
     """Draw a valve, its effects and two recordings.
 
     Args:
         seed: of all that is drawn.
-        effects: how many are hidden.
+        effects: how many are drawn and hidden, or which: names, or paths of own effects' files.
         dirty: see `workbench.blind.trial`.
         duration_s: of each recording.
         period_s: of its samples.
@@ -61,7 +66,7 @@ def hide(
     for_valve, for_effects, for_fit, for_test, for_salt = map(np.random.default_rng, streams)
     valve = drawn_valve(for_valve)
     known = known_valve(valve, for_valve)
-    drawn = drawn_effects(for_effects, effects)
+    drawn = drawn_effects(for_effects, effects) if isinstance(effects, int) else _named(effects)
     count = round(duration_s / period_s) + 1
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
     truth, answers = _moving(trials, drawn, valve, known, for_effects)
@@ -147,6 +152,10 @@ def drawn_effects(generator: Draw, count: int) -> list[Effect]:
     return chosen
 
 
+def _named(names: Sequence[str]) -> list[Effect]:
+    return [find_effect(name, "effects") for name in names]
+
+
 def _distinguishable(one: Effect, other: Effect) -> bool:
     return one.confounded.get(other.name) != "" and other.confounded.get(one.name) != ""
 
@@ -157,7 +166,7 @@ def strength(effect: Effect, valve: ValveParameters, base: ValveParameters, gene
         key: each.starts_for(base)[0] if each.given else _strength(each.starts_for(valve), each.off, generator)
         for key, each in effect.parameters.items()
     }
-    return EffectTable.model_validate({"name": effect.name, **values})
+    return EffectTable.model_validate({"name": effect.written, **values})
 
 
 def _strength(starts: Sequence[float], off: float | None, generator: Draw) -> float:

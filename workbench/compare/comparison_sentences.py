@@ -171,7 +171,8 @@ def _trends(found: Findings) -> Iterator[tuple[float, str]]:
 
 def _slips(found: Findings) -> Iterator[str]:
     missed, spurious = len(found.events.missed_s), len(found.events.spurious_s)
-    said = [f"misses {missed} of {len(found.measured_slips)} slips"] if missed else []
+    judged = len(found.events.matched) + missed  # the others are pieces of a slide, or too small to count
+    said = [f"misses {missed} of {judged} slips"] if missed else []
     if spurious:
         said.append(f"makes {_count(spurious, 'spurious ')}")
     if said:

@@ -210,17 +210,24 @@ def fit(
 
 @linear_algebra_alone()
 def begun_fit(
-    recording: Recording, valve: ValveFile, effects: Sequence[str], base: Fit, *, landed: bool = True
+    recording: Recording,
+    valve: ValveFile,
+    effects: Sequence[str],
+    base: Fit,
+    *,
+    landed: bool = True,
+    points: Sequence[tuple[float, ...]] = (),
 ) -> "BegunFit":
     """Fit a valve with effects added to a base fit, on one thread, as far as through the wide scale.
 
     Searches that begin at landings are begun by `BegunFit.landed`. Without `landed` there are none: those of an earlier
-    base fit were the same.
+    base fit were the same. With `points`, values of what is fitted of the effects, searches begin at these in place of
+    where the effects declare it.
 
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect.
     """
-    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None, landed=landed)
+    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None, landed=landed, points=points)
 
 
 @linear_algebra_alone()
@@ -328,6 +335,7 @@ def _begun(
     progress: Progress | None,
     *,
     landed: bool = True,
+    points: Sequence[tuple[float, ...]] = (),
 ) -> "BegunFit":
     """Search with effects added to a base fit, as far as through the wide scale."""
     composition = _extended(base.valve, effects, valve.valve)
@@ -337,7 +345,9 @@ def _begun(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    starts, at_landings = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint)
+    starts, at_landings = effect_starts(
+        error, added, seeds, landed=landed and not record.by_setpoint, points=points
+    )
     tell = progress or (lambda _: None)
     weakest = weakest_start(error, added, seeds[0])
     begun = BegunFit(composition, error, (), effort, workers, tell, weakest=weakest, waiting=at_landings, added=added)

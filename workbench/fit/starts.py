@@ -81,7 +81,12 @@ def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, co
 
 
 def effect_starts(
-    error: SimulationError, added: Sequence[Parameter], seeds: Sequence[Vector], *, landed: bool = True
+    error: SimulationError,
+    added: Sequence[Parameter],
+    seeds: Sequence[Vector],
+    *,
+    landed: bool = True,
+    points: Sequence[tuple[float, ...]] = (),
 ) -> tuple[list[Place], list[Place]]:
     """Return where searches with effects begin: at each base fit the best strengths by screening, and at landings.
 
@@ -93,9 +98,10 @@ def effect_starts(
         seeds: theta of base fits, the best first, with the effects switched off; the last two are the valve file's and
             the regression's.
         landed: begin at landings too; they are the same whatever the base fits.
+        points: values of the added parameters; by default those that their effects declare, and the record suggests.
     """
     guesses = guessed_values(added, error.run.record)
-    points = [*strengths(added), *guesses]
+    points = list(points) or [*strengths(added), *guesses]
     if error.run.by.slow:
         points += [tuple(_slower(each, value) for each, value in zip(added, values, strict=True)) for values in points]
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.

@@ -14,4 +14,5 @@ A command imports from here what it needs when it runs.
     output_files                                what `--out` and `--json` ask for
     sampling                                    when a device samples, for `doctor --nudge-pa`
     authority, progress                         a test certificate authority; progress on a terminal
+    breaking_off                                Ctrl-C during long work: what is known is said
 """

@@ -1,4 +1,4 @@
-"""What to type after a diagnosis: the command that adds what is missing, for each rival where there are some."""
+"""What to type after a diagnosis: the command that adds what is missing, one a rival, or that looks for its form."""
 
 import argparse
 import shlex
@@ -11,7 +11,7 @@ from positioner.cli.parts.export_arguments import export_words
 if TYPE_CHECKING:
     from workbench.select.diagnosis import Diagnosis
 
-OUT = "better.toml"
+OUT, FORM = "better.toml", "found.py"
 
 
 def extend_commands(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> list[str]:
@@ -29,15 +29,27 @@ def extend_commands(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> li
         choices += [
             (*added[:i], each.name, *added[i + 1 :]) for each in step.indistinguishable if each.name != added[i]
         ]
-    return [_extend(effects, arguments) for effects in choices]
+    return [extend_command(effects, arguments) for effects in choices]
 
 
-def _extend(effects: Sequence[str], arguments: argparse.Namespace) -> str:
-    fitted = [str(each) for each in arguments.recordings]
+def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str:
+    """Return the `positioner extend` command that adds effects to the valve of a diagnosis or a discovery."""
+    fitted = ["--fit", *map(str, arguments.recordings)]
+    return shlex.join(
+        ["positioner", "extend", arguments.valve, "--effect", *effects, *fitted, *_besides(arguments), "-o", OUT]
+    )
+
+
+def discover_command(arguments: argparse.Namespace) -> str:
+    """Return the `positioner discover` command that looks for the form of what a diagnosis leaves unexplained."""
+    recordings = [*map(str, arguments.recordings), "--valve", arguments.valve]
+    return shlex.join(["positioner", "discover", *recordings, *_besides(arguments), "-o", FORM])
+
+
+def _besides(arguments: argparse.Namespace) -> list[str]:
     held_out = ["--test", str(arguments.test)] if arguments.test else []
-    words = ["positioner", "extend", arguments.valve, "--effect", *effects, "--fit", *fitted, *held_out]
     noise = [] if arguments.noise_m is None else ["--noise-m", str(arguments.noise_m)]
-    return shlex.join([*words, *noise, *export_words(arguments), "-o", OUT])
+    return [*held_out, *noise, *export_words(arguments)]
 
 
 def not_written(path: Path, diagnosis: "Diagnosis") -> str:

@@ -21,9 +21,16 @@ class Progress:
         self._stream = stream or sys.stderr
         self._clock = clock
         self._told_s = clock()
+        self._last = ""
+
+    @property
+    def known(self) -> str:
+        """How far the work has come, in words."""
+        return f"so far {self._last}; nothing was written" if self._last else "nothing was found or written yet"
 
     def __call__(self, what: str, done: float) -> None:
         """Tell what is being done and the fraction done."""
+        self._last = f"{what}: {done:.0%}"
         if self._stream.isatty():
             bar = "#" * round(20 * done)
             end = "\n" if done >= 1.0 else ""

@@ -1,0 +1,105 @@
+"""`positioner discover`: the form of an effect that nobody has written down."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
+from positioner.cli.parts.output_files import writable, write_json
+
+if TYPE_CHECKING:
+    from workbench.discover.discovery import Discovery
+
+HELP = "find the form of what the library does not explain, as an effect's file; exit status 1 if no form does"
+EXAMPLE = "positioner discover rec.csv --valve valve.toml --test other.csv -o found.py --picture found.png"
+
+SHOWN = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("recordings", type=Path, nargs="+", metavar="REC", help="recordings, CSV or Parquet")
+    parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
+    parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
+    parser.add_argument(
+        "-o", "--out", type=Path, metavar="FORM.py", help="write the form as an effect's file, which `extend` takes"
+    )
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what the form adds over its variable")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
+    parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    add_noise_argument(parser)
+    add_export_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Discover and print; 0 if a form explains the recordings, or nothing is left to explain, else 1."""
+    from config.extras import needed
+    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.breaking_off import told_when_broken_off
+    from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.progress import Progress
+    from workbench.discover.discovery import discover
+    from workbench.discover.discovery_json import as_json
+
+    _require_new(arguments.out)
+    for option in ("picture", "json"):
+        writable(getattr(arguments, option), f"--{option}")
+    if arguments.picture is not None:
+        needed("matplotlib.pyplot", "--picture")
+    valve = load_valve(find_valve(arguments.valve))
+    stroke_m = valve.valve.stroke_m
+    recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
+    test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
+    named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
+    progress = Progress()
+    with naming(named), told_when_broken_off("discover", lambda: progress.known):
+        found = discover(
+            recordings, valve, test=test, seed=arguments.seed, on_proposal=_tell_proposal, progress=progress
+        )
+    print(found.summary())
+    if arguments.out is not None:
+        _write_form(found, arguments)
+    if arguments.picture is not None and found.outcome not in {"explained", "unjudged"}:
+        found.plot().savefig(arguments.picture, dpi=120)
+        print(f"{arguments.picture}: what it adds, and what the landings miss")
+    if arguments.json is not None:
+        write_json(arguments.json, as_json(found))
+    return 1 if found.outcome in {"none", "unjudged"} else 0
+
+
+def _require_new(path: Path | None) -> None:
+    """Check that a form can be written where `-o` says, and that nobody's file is there.
+
+    Raises:
+        InputError: it cannot, the file is there already, or its name is none that an effect can have.
+    """
+    from config.errors import InputError
+
+    writable(path, "-o")
+    if path is None:
+        return
+    if path.exists():
+        raise InputError(f"-o {path}", "is there already; an effect's file is not written over: choose another name")
+    if path.suffix != ".py" or not path.stem.isidentifier():
+        raise InputError(
+            f"-o {path}", "must end in .py and be letters, digits and _ before that: the file's name is the effect's"
+        )
+
+
+def _tell_proposal(names: tuple[str, ...]) -> None:
+    print(f"forms by projection, not a verdict: {', '.join(names[:SHOWN])}", flush=True)
+
+
+def _write_form(found: "Discovery", arguments: argparse.Namespace) -> None:
+    """Write the best form, and say how it is added; say so where there is none."""
+    from positioner.cli.parts.next_step import extend_command
+
+    if not found.found:
+        print(f"{arguments.out}: not written: {found.sentence}")
+        return
+    source = ", ".join(path.name for path in arguments.recordings)
+    arguments.out.write_text(found.found[0].text(source), encoding="utf-8")
+    name = str(arguments.out) if arguments.out.is_absolute() else f"./{arguments.out}"
+    print(f"{arguments.out}: {found.found[0].form.words}: a form, not a cause")
+    print(f"to add it: {extend_command([name], arguments)}")

@@ -1,0 +1,152 @@
+"""Forms: each is an effect's file and adds what its equation says; one that is hidden is found, written and added."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+from config.recording import write_recording
+from config.valve_file import load_valve
+from config.writing import valve_toml
+from positioner.cli.main import main
+from sim.composition import Composition
+from sim.effect import Effect, read_effect
+from sim.interpreted import interpreted
+from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
+from workbench.discover import discovery
+from workbench.discover.discovery import discover
+from workbench.discover.form_file import form_text, write_forms
+from workbench.discover.grammar import FORMS, Form
+
+DETENT = Path(__file__).parents[2] / "benchmarks" / "outside" / "detent.py"
+BARE = drawn_valve(np.random.default_rng(11))
+GUESSED = {name: 1.2 * getattr(BARE.valve, name) for name in ("coulomb_n", "static_n")}
+KNOWN = BARE.model_copy(update={"valve": BARE.valve.model_copy(update=GUESSED)})
+FEW = ("force_over_position_power", "force_over_position_wave", "added_over_pressure_power")
+
+
+def named(name: str) -> Form:
+    return next(each for each in FORMS if each.name == name)
+
+
+def force_n(name: str, x: float, **values: float) -> tuple[float, float]:
+    """Return what a form adds to force and to opening Coulomb friction of 100 N at a place, moving at 2 m/s."""
+    effect = effect_of(named(name))
+    laws = interpreted((effect,))
+    known = {each.key: each.starts[0] for each in named(name).quantities} | {"travel_m": 0.1} | values
+    q = laws.parameters([0.0] * 8 + [known[key] for key in effect.parameters])
+    stem = laws.Stem(3.0, x, 2.0, 5e4)
+    z = laws.memories(np.zeros(7 + effect.memory))
+    return laws.force(stem, q, z), laws.friction(100.0, 120.0, 1.0, stem, q, z)[0] - 100.0
+
+
+def effect_of(form: Form) -> Effect:
+    with TemporaryDirectory() as folder:
+        (path,) = write_forms([form], Path(folder))
+        return read_effect(Path(path))
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
+def test_every_form_is_an_effect_that_vanishes_where_its_strength_is_nothing(form: Form, tmp_path: Path) -> None:
+    (path,) = write_forms([form], tmp_path)
+    effect = read_effect(Path(path))
+    assert effect.name == form.name
+    assert "a form, not a cause" in effect.text
+    assert effect.equation
+    strengths = effect.strengths(SEED.valve)
+    assert 1 <= len(strengths) <= 48
+    laws = interpreted((effect,))
+    q, z = laws.parameters([0.0] * 8 + list(effect.off(SEED.valve))), laws.memories(np.zeros(7 + effect.memory))
+    stem = laws.Stem(1.0, 0.05, 0.3, 4e4)
+    assert laws.force(stem, q, z) == 0.0
+    assert laws.friction(100.0, 120.0, 1.0, stem, q, z) == (100.0, 120.0)
+    if "sensor" in effect.functions:
+        assert laws.sensor(0.05, 0.01, stem, q, z) == stem.x
+
+
+def test_names_are_not_given_twice() -> None:
+    assert len({each.name for each in FORMS}) == len(FORMS)
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "values", "force", "friction"),
+    [
+        ("force_constant", 0.05, {"force_n": 30.0}, -30.0, 0.0),
+        ("force_over_position_power", 0.05, {"force_n": 40.0, "exponent": 2.0}, -10.0, 0.0),
+        ("force_over_position_kink", 0.05, {"force_n": 40.0, "place": 0.25}, -10.0, 0.0),
+        ("force_over_position_bump", 0.05, {"force_n": 40.0, "place": 0.4, "width": 0.1}, -40.0 * np.exp(-1.0), 0.0),
+        ("force_over_position_wave", 0.05, {"force_n": 40.0, "place": 0.0, "width": 2.0}, -40.0, 0.0),
+        ("force_over_position_and_pressure_power", 0.05, {"force_n": 40.0, "exponent": 1.0}, -10.0, 0.0),
+        ("drag_over_speed_power", 0.05, {"force_n": 3.0, "exponent": 2.0}, -12.0, 0.0),
+        ("one_way_drag_over_speed_power", 0.05, {"force_n": -3.0, "exponent": 2.0}, 0.0, 0.0),
+        ("added_over_pressure_power", 0.05, {"growth_n": 40.0, "exponent": 1.0}, 0.0, 20.0),
+        ("scaled_over_position_power", 0.05, {"growth": 0.4, "exponent": 1.0}, 0.0, 20.0),
+        ("scaled_over_direction_sign", 0.05, {"growth": 0.4}, 0.0, 40.0),
+        ("scaled_over_time_rise", 0.05, {"growth": 0.4, "time_constant_s": 3.0}, 0.0, 40.0 * (1.0 - np.exp(-1.0))),
+    ],
+)
+def test_a_form_adds_what_its_equation_says(
+    name: str, x: float, values: dict[str, float], force: float, friction: float
+) -> None:
+    assert force_n(name, x, **values) == pytest.approx((force, friction))
+
+
+def test_a_found_form_begins_where_it_was_found(tmp_path: Path) -> None:
+    form = named("force_over_position_wave")
+    values = {"force_n": -123.456, "place": 0.125, "width": 0.31, "travel_m": 0.1016}
+    (tmp_path / "mine.py").write_text(form_text(form, values, ["Found in a test."]), encoding="utf-8")
+    effect = read_effect(tmp_path / "mine.py")
+    assert effect.strengths(SEED.valve) == [tuple(values.values())]
+    assert effect.off(SEED.valve)[0] == 0.0
+    assert "Found in a test." in effect.source
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Recordings of a valve with a detent, and what is known of it."""
+    folder = tmp_path_factory.mktemp("discover")
+    hidden = with_effect(BARE, str(DETENT), force_n=0.5 * BARE.valve.coulomb_n, pitch_m=0.03)
+    for name, seed in (("rec.csv", 5), ("test.csv", 6)):
+        write_recording(folder / name, record_of(hidden, seed, 1200))
+    write_recording(folder / "bare.csv", record_of(BARE, 7, 1200))
+    (folder / "known.toml").write_text(valve_toml(KNOWN), encoding="utf-8")
+    return folder
+
+
+def test_a_hidden_detent_is_found_written_and_added(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(discovery, "FORMS", tuple(map(named, FEW)))
+    words = ["discover", "rec.csv", "--valve", "known.toml", "--test", "test.csv"]
+    assert main([*words, "-o", "teeth.py", "--picture", "teeth.png", "--json", "said.json"]) == 0
+    said = capsys.readouterr().out
+    assert "a form, not a cause: a force that is wavy over the position" in said
+    assert "--effect ./teeth.py --fit rec.csv --test test.csv" in said
+    assert (folder / "teeth.png").stat().st_size > 10_000
+    effect = read_effect(folder / "teeth.py")
+    ((_, _, wave, _),) = effect.strengths(BARE.valve)
+    assert wave * BARE.valve.stroke_m == pytest.approx(0.03, rel=0.01)
+    assert main(["discover", "rec.csv", "--valve", "known.toml", "-o", "teeth.py"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    words = ["extend", "known.toml", "--effect", "./teeth.py", "--fit", "rec.csv", "--test", "test.csv"]
+    assert main([*words, "-o", "better.toml"]) == 0
+    better = load_valve(folder / "better.toml")
+    assert abs(better.effect[0].parameters["force_n"]) == pytest.approx(0.5 * BARE.valve.coulomb_n, rel=0.05)
+    assert Composition.from_file(better).effects[0].equation.startswith("F = -F_1 g")
+
+
+def test_where_nothing_is_left_no_form_is_sought(folder: Path) -> None:
+    found = discover(record_of(BARE, 7, 1200), KNOWN, test=record_of(BARE, 8, 1200))
+    assert (found.outcome, found.found) == ("explained", ())
+    assert "nothing is left to explain" in found.sentence
+
+
+@pytest.mark.parametrize("name", ["found.txt", "my-form.py", "a.b.py"])
+def test_a_name_that_no_effect_can_have_is_refused_before_the_work(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    assert main(["discover", "rec.csv", "--valve", "known.toml", "-o", name]) == 2
+    assert "the file's name is the effect's" in capsys.readouterr().err

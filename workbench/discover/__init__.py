@@ -1,0 +1,10 @@
+"""The form of an effect that nobody has written down: a form, not a cause.
+
+Its files:
+
+    discovery, discovery_json    puts it together; the same as JSON
+    grammar                      which forms there are: a place, a variable, a shape
+    form_file                    a form as an effect's file
+    proposal                     which forms are tried first
+    added_force                  the force that a form adds, over its variable; what the landings miss
+"""
