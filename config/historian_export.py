@@ -9,7 +9,7 @@ it leaves something open, or contradicts the mapping, one line says what to type
 import re
 from array import array
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -36,6 +36,11 @@ from config.exports.time_stamps import has_date, seconds_of
 from config.recording import REQUIRED, Column, Recording
 
 PLAIN = ExportOptions()
+Progress = Callable[[str, float], None]
+MOST_ROWS = 3_000_000
+"""Of an export: a minute of reading, and some hundred bytes of memory a cell."""
+TOLD_EVERY = 50_000
+"""Rows."""
 FOOTER = 20
 """Rows without a time that may end a file: averages, signatures."""
 _WITH_UNIT = re.compile(r"([+\u2212-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^\d\s].*)")
@@ -47,6 +52,7 @@ def read_export(
     stroke_m: float | None,
     range_pa: tuple[float, float] = RANGE_PA,
     options: ExportOptions = PLAIN,
+    progress: Progress | None = None,
 ) -> Recording:
     """Read an export.
 
@@ -56,15 +62,17 @@ def read_export(
         stroke_m: 100 % of a position; None where no column needs it.
         range_pa: 0 % and 100 % of a pressure.
         options: how it is read beyond that.
+        progress: called with what is being done, and the fraction of it done.
 
     Raises:
-        InputError: the file cannot be read, lacks a column, holds no sample or no readable time, contradicts the
-            mapping or leaves open how it is to be read; says what to type.
+        InputError: the file cannot be read, holds more than `MOST_ROWS` rows, lacks a column, holds no sample or no
+            readable time, contradicts the mapping or leaves open how it is to be read; says what to type.
         ModuleNotFoundError: a workbook, MATLAB or Parquet file without the package that reads it; names the extra.
     """
     wanted = [*(each.theirs for each in sources), *(each.theirs for each in options.status)]
     header = find_header(path, raw_tables(path, options.sheet), list(dict.fromkeys(wanted)))
-    export = _collected(path, header)
+    tell = progress or (lambda _what, _done: None)
+    export = _collected(path, header, tell)
     decimal = options.decimal or decimal_sign(str(path), _numerals(export, sources), header.table.separator)
     metadata = dict(header.table.notes)
     units = {each.name: _unit(path, each, export) for each in sources}
@@ -73,7 +81,8 @@ def read_export(
     time_s, stamped, local = _time(path, export, clock, units["time_s"], decimal, options)
     good = _good(path, export, options, metadata)
     values: dict[str, Column] = {}
-    for source in (each for each in sources if each.name != "time_s"):
+    for count, source in enumerate(each for each in sources if each.name != "time_s"):
+        tell(f"understanding {len(export.lines)} rows", (count + 1) / (len(sources) + 1))
         raw = _numbers(path, export, source, decimal, metadata)
         si = _in_si(raw, source, units[source.name], stroke_m, range_pa)
         values[source.name] = np.where(good, si, np.nan)
@@ -101,8 +110,9 @@ class _Export:
     notes: dict[str, str]
 
 
-def _collected(path: Path, header: Header) -> _Export:
+def _collected(path: Path, header: Header, tell: Progress) -> _Export:
     """Return the cells of the samples: no blank rows, no header again, no footer, no torn last row."""
+    _require_few(path, header.table.length)
     cells: dict[str, list[Cell]] = {name: [] for name in header.at}
     lines = array("q")
     notes: Counter[str] = Counter()
@@ -115,6 +125,9 @@ def _collected(path: Path, header: Header) -> _Export:
         for name, places in header.at.items():
             cells[name].append(_joined(row, places))
         lines.append(line)
+        if not len(lines) % TOLD_EVERY:
+            _require_few(path, len(lines))
+            tell(f"reading {path.name}: {len(lines)} rows", len(lines) / max(header.table.length, len(lines)))
     if short and not header.table.ended and short[-1] == lines[-1]:
         _drop_last(cells, lines)
         short.pop()
@@ -124,6 +137,15 @@ def _collected(path: Path, header: Header) -> _Export:
     if not lines:
         raise InputError(str(path), f"holds no samples under the names of {header.table.place} {header.line}")
     return _Export(header, cells, lines, {key: str(count) for key, count in notes.items()})
+
+
+def _require_few(path: Path, rows: int) -> None:
+    if rows > MOST_ROWS:
+        raise InputError(
+            str(path),
+            f"has {rows / 1e6:.3g} million rows, and an export is read up to {MOST_ROWS / 1e6:g} million: export a "
+            "shorter stretch, or split the file",
+        )
 
 
 def _samples(path: Path, header: Header, notes: Counter[str]) -> Iterator[tuple[int, list[Cell]]]:

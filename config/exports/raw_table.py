@@ -25,6 +25,7 @@ class RawTable:
         sheet: name of a workbook's sheet.
         ended: whether the last line of a text has its end.
         notes: what is to be told about it, by key.
+        length: about how many rows there are; 0: not known before they are read.
     """
 
     what: str
@@ -34,6 +35,7 @@ class RawTable:
     sheet: str = ""
     ended: bool = True
     notes: tuple[tuple[str, str], ...] = ()
+    length: int = 0
 
 
 def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:

@@ -36,6 +36,7 @@ def text_tables(path: Path) -> list[RawTable]:
         raise InputError(str(path), "holds no samples: it is empty")
     notes = () if encoding.startswith("utf-8") else (("encoding", encoding),)
     ended = text.endswith(("\n", "\r"))
+    length = text.count("\n") or text.count("\r")
     found = [each for each in SEPARATORS if each in text] or [","]
     return [
         RawTable(
@@ -45,6 +46,7 @@ def text_tables(path: Path) -> list[RawTable]:
             separator=each,
             ended=ended,
             notes=notes,
+            length=length,
         )
         for each in found
     ]

@@ -36,6 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     import time
 
     from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import Progress
     from workbench.report import report_journal, require_plotly
@@ -54,8 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [noise_said(read_any(each, arguments, valve.valve.stroke_m), arguments) for each in arguments.fit]
     test = noise_said(read_any(arguments.test, arguments, valve.valve.stroke_m), arguments) if arguments.test else None
     Journal.beside(path)  # what is none is refused before the work begins
-    with naming({"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}):
-        extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=Progress())
+    named = {"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}
+    progress = Progress()
+    with naming(named), told_when_broken_off("extend", lambda: progress.known):
+        extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=progress)
     journal = write_extended(extension, path, arguments.out)
     print(extension.summary())
     worth = "" if extension.falls else "written, though the effect is not worth it: "

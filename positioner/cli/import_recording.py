@@ -24,12 +24,16 @@ def run(arguments: argparse.Namespace) -> int:
     from config.exports.own_format import own_recording
     from config.exports.plausibility import oddities
     from config.recording import Recording
+    from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.progress import Progress
 
     if arguments.out is not None:
         writable(arguments.out, "-o")
     if arguments.column:
-        recording = read_mapped(arguments.file, arguments, None)
+        progress = Progress()
+        with told_when_broken_off("import", lambda: progress.known):
+            recording = read_mapped(arguments.file, arguments, None, progress)
     else:
         recording = own_recording(arguments.file) or Recording({})
         if not recording.columns:

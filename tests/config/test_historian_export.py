@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from config import historian_export
 from config.errors import InputError
 from config.exports.column_mapping import read_mapping
 from config.historian_export import read_export
@@ -76,3 +77,21 @@ def test_a_clock_set_back_once_is_read_and_a_disorder_is_not(tmp_path: Path) -> 
     path.write_text("time_s,command_pa,position_m\n2,1,2\n1,1,2\n")
     with pytest.raises(InputError, match="time_s must increase strictly"):
         Recording.read(path)
+
+
+def test_a_long_export_is_told_while_it_is_read_and_one_too_long_is_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "export.csv"
+    path.write_text("Zeit,PV,OUT\n" + "".join(f"{i},{i % 7}.5,1.5\n" for i in range(200)))
+    monkeypatch.setattr(historian_export, "TOLD_EVERY", 50)
+    told: list[tuple[str, float]] = []
+    read_export(path, read_mapping(MAPPING), 0.1, progress=lambda what, done: told.append((what, done)))
+    assert told[1][0] == "reading export.csv: 100 rows"
+    assert told[1][1] == pytest.approx(0.5, abs=0.01)
+    assert told[-1][0] == "understanding 200 rows"
+    monkeypatch.setattr(historian_export, "MOST_ROWS", 150)
+    told.clear()
+    with pytest.raises(InputError, match=r"million rows, and an export is read up to .* split the file"):
+        read_export(path, read_mapping(MAPPING), 0.1, progress=lambda what, done: told.append((what, done)))
+    assert not told

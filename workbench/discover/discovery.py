@@ -20,6 +20,7 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
+from sim.composition import Composition
 from sim.effect import Effect, find_effect
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 
 FIRST, MOST = 5, 15
 """Forms fitted in the first turn, and in both: the second where none of the first explains all."""
+ROUNDS, NEAREST = 2, 2
+"""Rounds in which so many forms that came nearest are taken further."""
 LAGS = 5.0
 """Time constants over which a picture shows what fades."""
 Outcome = Literal["found", "one_of", "none", "explained", "unjudged"]
@@ -246,6 +249,11 @@ class _FormSearch:
         for turn in turns:
             models |= self._fitted(step.before, turn)
             step = self._judged(step.before, models)
+            for _ in range(ROUNDS):
+                if _explains(step):
+                    break
+                models |= self._taken_further(step.before, models)
+                step = self._judged(step.before, models)
             if _explains(step):
                 break
         return self._discovery(step, [each.name for each in order if each.name not in models])
@@ -280,6 +288,27 @@ class _FormSearch:
             models[one.name] = model
             self.tell(what, 0.7 + 0.3 * len(models) / len(turn))
         return models
+
+    def _taken_further(
+        self, base: EvaluatedModel, models: Mapping[str, EvaluatedModel | str]
+    ) -> dict[str, EvaluatedModel | str]:
+        """Search again for the forms that came nearest, from where they came to: a stair may have held them up."""
+        fitted = {name: each for name, each in models.items() if isinstance(each, EvaluatedModel)}
+        nearest = sorted(fitted, key=lambda name: fitted[name].fit.cost)[:NEAREST]
+
+        def again(name: str) -> EvaluatedModel:
+            here = fitted[name].fit
+            theta = Composition.from_file(here.valve).theta
+            bare = theta[: base.fit.seeds[0].size]
+            declared = self.effects[name].parameters.values()
+            point = tuple(v for v, each in zip(theta[bare.size :].tolist(), declared, strict=True) if not each.given)
+            ground = replace(base.fit, seeds=(bare, *base.fit.seeds[-2:]))
+            begun = begun_fit(self.split.train.recording, self.valve, (name,), ground, points=[point])
+            found = begun.settled(1).judged(profile=False)
+            return evaluated(found, self.split) if found.cost < here.cost else fitted[name]
+
+        self.tell(f"taking {len(nearest)} forms further", 0.0)
+        return dict(zip(nearest, on_threads(again, nearest, self.workers), strict=True))
 
     def _judged(self, base: EvaluatedModel, models: Mapping[str, EvaluatedModel | str]) -> EffectStep:
         """Judge the forms, against the bare valve fitted again from the best one's own spring and friction.

@@ -6,11 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from config.exports.column_mapping import ExportOptions
     from config.recording import Recording
 
 BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet")
 """Options that say how mapped columns are read."""
+LARGE = 50_000_000
+"""Bytes of a file whose reading takes seconds."""
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,9 +75,12 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     """
     from config.errors import InputError
     from config.recording import Recording
+    from positioner.cli.parts.progress import Progress
 
+    if path.is_file() and path.stat().st_size > LARGE:
+        print(f"reading {path}, {path.stat().st_size / 1e6:.0f} MB", file=sys.stderr, flush=True)
     if arguments.column:
-        recording = read_mapped(path, arguments, stroke_m)
+        recording = read_mapped(path, arguments, stroke_m, Progress())
         tell(f"positioner {arguments.command}: {path}", recording, arguments.stroke_m or stroke_m)
         return _stretch(recording, arguments)
     for name in BESIDES:
@@ -102,8 +109,13 @@ def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recordin
     return replace(recording, columns={name: column[kept] for name, column in recording.columns.items()})
 
 
-def read_mapped(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":
-    """Read an export by the mapping of a command line.
+def read_mapped(
+    path: Path,
+    arguments: argparse.Namespace,
+    stroke_m: float | None,
+    progress: "Callable[[str, float], None] | None" = None,
+) -> "Recording":
+    """Read an export by the mapping of a command line; `progress` is called with what is done, and how much of it.
 
     Raises:
         InputError: as `read_export`; a stroke that is not positive.
@@ -116,7 +128,7 @@ def read_mapped(path: Path, arguments: argparse.Namespace, stroke_m: float | Non
         raise InputError("--stroke-m", f"must be positive, it is {arguments.stroke_m:g}")
     sources = read_mapping(arguments.column)
     range_pa = RANGE_PA if arguments.range_pa is None else (arguments.range_pa[0], arguments.range_pa[1])
-    return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa, export_options(arguments))
+    return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa, export_options(arguments), progress)
 
 
 def export_options(arguments: argparse.Namespace) -> "ExportOptions":
