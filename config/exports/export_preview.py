@@ -21,11 +21,12 @@ LOOKED_AT = 200
 FIRST = 3
 WIDEST = 24
 COMMON = {
-    "time_s": r"time|zeit|stamp|date|datum|^t$|uhr",
+    "time_s": r"time|zeit|stamp|date|datum|^ts?$|uhr",
     "position_m": r"position|^pos|travel|stroke|hub|lift|stem|\bpv\b|ist|zt|feedback|^x$|_pv$|\.pv$|rückm",
     "command_pa": r"command|^cmd|\bout\b|\bop\b|\bmv\b|output|stell|signal|demand|^u$|drive|pressure|druck|soll|\bsp\b",
 }
 """What columns are called, by ours."""
+STAMP = r"\d{4}-\d\d-\d\d"
 _STATUS = re.compile(r"status|quality|qualität|güte", re.IGNORECASE)
 
 
@@ -117,6 +118,8 @@ def _proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[s
     left = list(columns)
     for ours in COMMON:
         chosen = next((each for each in left if _looks_like(ours, each)), None)
+        if chosen is None and ours == "time_s":
+            chosen = next((each for each in left if _most_are(each.cells, STAMP)), None)
         if chosen is None:
             open_.append(f"{ours} is open: no column is called like it")
             continue
@@ -178,14 +181,24 @@ def _unit_of(ours: str, column: ColumnPreview) -> tuple[str, list[str]]:
     behind = [str(cell).lstrip("+-0123456789.,eE ") for cell in column.cells if isinstance(cell, str) and cell]
     if behind and (unit := unit_named(behind[0])):
         return f":{unit}", []
+    if unit := _at_the_end(ours, column.name):
+        return f":{unit}", [f"the unit of {column.name!r} is taken from its name: {unit}"]
     if ours == "time_s":
         return "", [f"the unit of {column.name!r} is open: s is taken; :ms, :min, :d are others"]
     return ":%", [f"the unit of {column.name!r} is open: % is a guess"]
 
 
+def _at_the_end(ours: str, name: str) -> str | None:
+    """Return the unit in which a name ends after an underscore, as in stem_mm; None if it does not."""
+    ending = name.rpartition("_")[2] if "_" in name else ""
+    unit = unit_named(ending)
+    # `p_in` is an input, and no inch.
+    return unit if unit in allowed_units(ending_of(ours)) and unit != "in" else None
+
+
 def _time_words(column: ColumnPreview, open_: list[str]) -> list[str]:
     texts = [str(cell) for cell in column.cells if cell != "" and begins_number(cell)]
-    if not texts or all(re.match(r"\d{4}-\d\d-\d\d", text) for text in texts):
+    if not texts or all(re.match(STAMP, text) for text in texts):
         return []
     formats = proposed_formats(texts)
     if not formats:

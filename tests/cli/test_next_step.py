@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from positioner.cli import extend
+from positioner.cli import discover, extend
 from positioner.cli.diagnose import add_arguments
-from positioner.cli.parts.next_step import extend_commands, not_written
+from positioner.cli.parts.next_step import discover_command, extend_commands, not_written
 
 EXPORT = ["--column", "position_m=PV 1:%", "--column", "command_pa=OUT:bar", "--range-pa", "20000", "100000"]
 MORE = ["--stroke-m", "0.04", "--decimal", ",", "--status", "Quality=Good", "--sheet", "Sheet 2"]
@@ -78,3 +78,16 @@ def test_the_noise_and_the_stretch_that_were_said_are_said_again() -> None:
     (command,) = extend_commands(diagnosed("missing", ("backlash",)), arguments)
     read = read_by_extend(command)
     assert (read.noise_m, read.from_s, read.to_s) == (5e-5, 100.25, 1e5)
+
+
+def test_what_is_unexplained_is_given_to_discover_as_it_was_to_diagnose() -> None:
+    arguments = asked("my rec.csv", "b.csv", "--valve", "v.toml", "--test", "t.csv", *EXPORT, *MORE)
+    program, name, *words = shlex.split(discover_command(arguments))
+    assert (program, name) == ("positioner", "discover")
+    parser = argparse.ArgumentParser()
+    discover.add_arguments(parser)
+    read = parser.parse_args(words)
+    assert (read.valve, read.recordings, read.test) == ("v.toml", arguments.recordings, Path("t.csv"))
+    for given in ("column", "stroke_m", "range_pa", "noise_m", "from_s"):
+        assert getattr(read, given) == getattr(arguments, given)
+    assert read.out == Path("found.py")

@@ -14,16 +14,18 @@ from sim.composition import Composition
 from sim.effect import Effect, read_effect
 from sim.interpreted import interpreted
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
+from workbench.blind.input_signal import excitation
 from workbench.discover import discovery
 from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
 from workbench.discover.grammar import FORMS, Form
 
-DETENT = Path(__file__).parents[2] / "benchmarks" / "outside" / "detent.py"
+SPRING = Path(__file__).parents[2] / "benchmarks" / "outside" / "second_spring.py"
 BARE = drawn_valve(np.random.default_rng(11))
+RATE_N_PER_M = 2e4
 GUESSED = {name: 1.2 * getattr(BARE.valve, name) for name in ("coulomb_n", "static_n")}
 KNOWN = BARE.model_copy(update={"valve": BARE.valve.model_copy(update=GUESSED)})
-FEW = ("force_over_position_power", "force_over_position_wave", "added_over_pressure_power")
+FEW = ("force_over_position_kink", "added_over_pressure_power")
 
 
 def named(name: str) -> Form:
@@ -104,41 +106,41 @@ def test_a_found_form_begins_where_it_was_found(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recordings of a valve with a detent, and what is known of it."""
+    """Recordings of a valve with a second spring on its way, and what is known of it."""
     folder = tmp_path_factory.mktemp("discover")
-    hidden = with_effect(BARE, str(DETENT), force_n=0.5 * BARE.valve.coulomb_n, pitch_m=0.03)
+    hidden = with_effect(BARE, str(SPRING), rate_n_per_m=RATE_N_PER_M, position_m=0.04)
     for name, seed in (("rec.csv", 5), ("test.csv", 6)):
-        write_recording(folder / name, record_of(hidden, seed, 1200))
-    write_recording(folder / "bare.csv", record_of(BARE, 7, 1200))
+        command_pa = excitation(KNOWN.valve, np.random.default_rng(seed), 1200)
+        write_recording(folder / name, record_of(hidden, seed, command_pa=command_pa))
     (folder / "known.toml").write_text(valve_toml(KNOWN), encoding="utf-8")
     return folder
 
 
-def test_a_hidden_detent_is_found_written_and_added(
+def test_a_hidden_spring_is_found_written_and_added(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setattr(discovery, "FORMS", tuple(map(named, FEW)))
     words = ["discover", "rec.csv", "--valve", "known.toml", "--test", "test.csv"]
-    assert main([*words, "-o", "teeth.py", "--picture", "teeth.png", "--json", "said.json"]) == 0
+    assert main([*words, "-o", "met.py", "--picture", "met.png", "--json", "said.json"]) == 0
     said = capsys.readouterr().out
-    assert "a form, not a cause: a force that is wavy over the position" in said
-    assert "--effect ./teeth.py --fit rec.csv --test test.csv" in said
-    assert (folder / "teeth.png").stat().st_size > 10_000
-    effect = read_effect(folder / "teeth.py")
-    ((_, _, wave, _),) = effect.strengths(BARE.valve)
-    assert wave * BARE.valve.stroke_m == pytest.approx(0.03, rel=0.01)
-    assert main(["discover", "rec.csv", "--valve", "known.toml", "-o", "teeth.py"]) == 2
+    assert "a form, not a cause: a force that sets in at a place of the position" in said
+    assert "--effect ./met.py --fit rec.csv --test test.csv" in said
+    assert (folder / "met.png").stat().st_size > 10_000
+    effect = read_effect(folder / "met.py")
+    ((_, place, stroke_m),) = effect.strengths(BARE.valve)
+    assert place * stroke_m == pytest.approx(0.04, abs=1e-3)
+    assert main(["discover", "rec.csv", "--valve", "known.toml", "-o", "met.py"]) == 2
     assert "is there already" in capsys.readouterr().err
-    words = ["extend", "known.toml", "--effect", "./teeth.py", "--fit", "rec.csv", "--test", "test.csv"]
+    words = ["extend", "known.toml", "--effect", "./met.py", "--fit", "rec.csv", "--test", "test.csv"]
     assert main([*words, "-o", "better.toml"]) == 0
     better = load_valve(folder / "better.toml")
-    assert abs(better.effect[0].parameters["force_n"]) == pytest.approx(0.5 * BARE.valve.coulomb_n, rel=0.05)
+    assert better.effect[0].parameters["force_n"] == pytest.approx(RATE_N_PER_M * BARE.valve.stroke_m, rel=0.05)
     assert Composition.from_file(better).effects[0].equation.startswith("F = -F_1 g")
 
 
 def test_where_nothing_is_left_no_form_is_sought(folder: Path) -> None:
-    found = discover(record_of(BARE, 7, 1200), KNOWN, test=record_of(BARE, 8, 1200))
+    found = discover(record_of(BARE, 7, 1000), KNOWN, test=record_of(BARE, 8, 1000))
     assert (found.outcome, found.found) == ("explained", ())
     assert "nothing is left to explain" in found.sentence
 

@@ -3,6 +3,7 @@
 Its files:
 
     discovery, discovery_json    puts it together; the same as JSON
+    form_search, found_form      forms fitted and judged; one that was found
     grammar                      which forms there are: a place, a variable, a shape
     form_file                    a form as an effect's file
     proposal                     which forms are tried first

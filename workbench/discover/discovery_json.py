@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from workbench.discover.added_force import UNITS
-from workbench.discover.discovery import Discovery, FoundForm
+from workbench.discover.discovery import Discovery
+from workbench.discover.found_form import FoundForm
 from workbench.select.diagnosis_json import parameters_json
 
 
@@ -45,7 +45,7 @@ def _form(each: FoundForm) -> dict[str, Any]:
         "equation": list(each.form.equations),
         "values": dict(each.values),
         "variable": each.form.variable.words,
-        "unit": UNITS.get(each.form.variable.name, "of the stroke"),
+        "unit": each.added.unit,
         "from": each.span[0],
         "to": each.span[1],
         "train_rmse_m": errors.train_rmse_m,
