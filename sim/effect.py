@@ -47,7 +47,8 @@ import inspect
 import logging
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from itertools import product, zip_longest
@@ -277,11 +278,27 @@ def find_effect(text: str, source: str) -> Effect:
     path = Path(text)
     if not path.is_file():
         raise InputError(source, f"no effect's file {text}")
+    if path.resolve().parent in _WRITTEN_HERE:
+        return read_effect(path)
     if not any(path.resolve().is_relative_to(folder) for folder in allowed_folders()):
         said = f"names {text}, a program, which lies in no folder allowed: put it beside your work, or allow its folder"
         raise InputError(source, f"{said}, {FOLDERS_ALLOWED}={path.resolve().parent}")
     _say_aloud(path.resolve(), source)
     return read_effect(path)
+
+
+_WRITTEN_HERE: set[Path] = set()
+
+
+@contextmanager
+def written_here(folder: Path) -> Iterator[None]:
+    """Let effects be run from a folder whose files this process writes itself, as long as it does."""
+    own = folder.resolve()
+    _WRITTEN_HERE.add(own)
+    try:
+        yield
+    finally:
+        _WRITTEN_HERE.discard(own)
 
 
 def allowed_folders() -> list[Path]:

@@ -183,12 +183,12 @@ def test_a_data_sheet_that_cannot_be_is_one_line(
 
 def test_units_at_the_end_of_names_and_a_clock_of_another_name_are_proposed(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("logged,stem_mm,p_bar\n" + "".join(f"2026-01-31T12:00:0{i},{i}.5,0.{i}\n" for i in range(8)))
+    path.write_text("logged,stem_mm,drive_bar\n" + "".join(f"2026-01-31T12:00:0{i},{i}.5,0.{i}\n" for i in range(8)))
     assert main(["import", str(path)]) == 0
     said = capsys.readouterr().out
-    assert "--column time_s=logged --column position_m=stem_mm:mm --column command_pa=p_bar:bar" in said
-    assert "the unit of 'p_bar' is taken from its name: bar" in said
-    path.write_text("t_ms,x_pct,p_in\n" + "".join(f"{i}0,{i}.5,0.{i}\n" for i in range(8)))
+    assert "--column time_s=logged --column position_m=stem_mm:mm --column command_pa=drive_bar:bar" in said
+    assert "the unit of 'drive_bar' is taken from its name: bar" in said
+    path.write_text("t_ms,x_pct,drive_in\n" + "".join(f"{i}0,{i}.5,0.{i}\n" for i in range(8)))
     assert main(["import", str(path)]) == 0
     said = capsys.readouterr().out
-    assert "p_in:in" not in said
+    assert "command_pa=drive_in:%" in said  # an input, and no inch

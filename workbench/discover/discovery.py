@@ -19,7 +19,7 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import find_effect
+from sim.effect import find_effect, written_here
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told_mm
 from workbench.discover.added_force import Landing, landings
@@ -169,7 +169,7 @@ def discover(
     base = EffectSearch(parts, {}, valve.valve, seed=seed, workers=threads, progress=tell).base(valve)
     if base.explained or parts.floor_m is None:
         return Discovery("explained" if base.explained else "unjudged", base, (), (), (), parts, ())
-    with tempfile.TemporaryDirectory(prefix="forms-") as folder:
+    with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
         written = write_forms(FORMS, Path(folder))
         effects = {path: find_effect(path, "forms") for path in written}
         effects = {path: each for path, each in effects.items() if not by.left_out(each)}

@@ -87,7 +87,8 @@ class FormSearch:
 
         def begun(each: Proposal) -> BegunFit | str:
             try:
-                return begun_fit(train, self.valve, (each.name,), base.fit, points=each.points)
+                begun = begun_fit(train, self.valve, (each.name,), base.fit, points=each.points)
+                return begun.landed().carried().settled(1)
             except InputError as error:
                 return error.problem
 
@@ -124,7 +125,7 @@ class FormSearch:
             point = tuple(v for v, each in zip(theta[bare.size :].tolist(), declared, strict=True) if not each.given)
             ground = replace(base.fit, seeds=(bare, *base.fit.seeds[-2:]))
             begun = begun_fit(self.split.train.recording, self.valve, (name,), ground, points=[point])
-            found = begun.settled(1).judged(profile=False)
+            found = begun.landed().carried().settled(2).judged(profile=False)
             return evaluated(found, self.split) if found.cost < here.cost else fitted[name]
 
         self.tell(f"taking {len(nearest)} forms further", 0.0)

@@ -345,9 +345,7 @@ def _begun(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    starts, at_landings = effect_starts(
-        error, added, seeds, landed=landed and not record.by_setpoint, points=points
-    )
+    starts, at_landings = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint, points=points)
     tell = progress or (lambda _: None)
     weakest = weakest_start(error, added, seeds[0])
     begun = BegunFit(composition, error, (), effort, workers, tell, weakest=weakest, waiting=at_landings, added=added)
