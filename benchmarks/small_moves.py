@@ -1,6 +1,6 @@
 """Small moves: the three laws on the same random steps of the seed's valve, in one run.
 
-    python -m benchmarks.small_moves [--steps 400] [--rest-s 600] [--seed 0]
+    python -m benchmarks.small_moves [--steps 400] [--rest-s 600] [--seed 0] [--following]
 
 Each row is a valve of its own: first the daemon's S3 identifies it under the row's noise, and nothing else is told to
 the controller; then come the steps, their sizes from 0.1 to 10 % of stroke, evenly in the logarithm (evenly in size
@@ -9,6 +9,10 @@ and only slides run from 20 ms on, where a sine identifies nothing. All figures 
 what the error is at the end of the step, and how far the stem was beyond the reference on the way. The last table
 leaves each loop alone at a fixed reference. Takes some minutes. The last column of the first is the processor time of
 one step of the control core, on average.
+
+`--following` prints another table alone: a DCS that writes every 0.5 s, first a ramp of 1 % of stroke a second up and
+down for a minute, then for another the noise of a controller's output, steps of 0.2 % (standard deviation) about 60 %.
+All three laws have the valve's true numbers there, typed in, for a sine identifies nothing in a slow loop.
 """
 
 import argparse
@@ -45,6 +49,16 @@ SMALLEST, LARGEST = 1e-3, 0.1
 
 
 Law = Literal["seed", "breakaway", "slides"]
+WRITTEN_S, FOLLOWED_S = 0.5, 60.0
+RAMP_PER_S, WANDER = 0.01, 2e-3
+"""Of the stroke."""
+PERIODS_S = (1e-3, 0.01, 0.02, 0.05, 0.1)
+VISIBLE = 1e-4
+"""Of the stroke: a stem that moves no farther between two writes has not."""
+KNOWN = {
+    "b_over_c_pa_per_m": -SEED.spring_n_per_m / SEED.diaphragm_area_m2,
+    "k_over_c_pa": -SEED.coulomb_n / SEED.diaphragm_area_m2,
+}
 LAWS: tuple[Law, ...] = ("seed", "breakaway", "slides")
 SLIDES: tuple[Law, ...] = ("slides",)
 
@@ -60,6 +74,8 @@ class Case:
     even_in_size: bool = False
     step_s: float = STEP_S
     laws: tuple[Law, ...] = LAWS
+    known: bool = False
+    """Whether the valve's numbers are typed in."""
 
 
 CASES = (
@@ -143,6 +159,7 @@ class Loop:
             "cycle": {"pace": "device", "period_s": case.period_s},
             "safety": {"stale_after_s": max(0.1, 3 * case.period_s)},
             "control": {"law": law},
+            **({"law": KNOWN} if case.known else {}),
         }
         slave = {
             "clock": {"mode": "lockstep", "period_s": case.period_s},
@@ -158,6 +175,12 @@ class Loop:
         held_pa, _ = link.open()
         self.controller = Timed(Settings.of(DaemonFile.model_validate(daemon)), held_pa)
         self.cycle = Cycle(link, self.controller, pace, first, recorder=None)
+        if not case.known:
+            self._identify(law)
+        self.path(case.period_s)
+        self.controller.steps = self.controller.busy_ns = 0
+
+    def _identify(self, law: Law) -> None:
         self._ask(eta=(0, 0, 0))
         if law == "slides":
             while self.cycle.snapshot.decision.estimates.progress < 1:
@@ -165,8 +188,6 @@ class Loop:
         else:
             self.path(S3_S)
         self._ask(eta=QUIET)
-        self.path(case.period_s)
-        self.controller.steps = self.controller.busy_ns = 0
 
     def _ask(self, **values: object) -> None:
         self.cycle.requests = replace(self.cycle.requests, **values)  # type: ignore[arg-type]
@@ -241,6 +262,47 @@ def rested(loop: Loop, rest_s: float) -> str:
     return f"{int(np.count_nonzero(np.diff(command_pa))):10}{100 * np.ptp(position_m) / STROKE_M:12.4f}{error:12.4f}"
 
 
+def written(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a DCS writes every `WRITTEN_S`, of the stroke: a ramp up and down, and a controller's noise."""
+    count = round(FOLLOWED_S / WRITTEN_S)
+    ramp = 0.5 + RAMP_PER_S * WRITTEN_S * np.minimum(np.arange(count), np.arange(count)[::-1])
+    return ramp, 0.6 + WANDER * np.random.default_rng(seed).standard_normal(count)
+
+
+def followed(loop: Loop, references: np.ndarray) -> str:
+    """Say how a loop follows: error, % of stroke; strokes of the stem a minute; its reversals from write to write."""
+    loop.step_to(references[0] * STROKE_M)
+    loop.path(20.0)
+    parts = []
+    for reference in references:
+        loop.step_to(reference * STROKE_M)
+        parts.append(loop.path(WRITTEN_S)[0] / STROKE_M)
+    error = np.concatenate([part - reference for part, reference in zip(parts, references, strict=True)])
+    strokes = float(np.abs(np.diff(np.concatenate(parts))).sum()) * 60.0 / FOLLOWED_S
+    moved = np.diff([part[-1] for part in parts])
+    ways = np.sign(moved[np.abs(moved) > VISIBLE])
+    ends = np.array([part[-1] for part in parts]) - references
+    return (
+        f"{100 * np.sqrt(np.mean(error**2)):10.3f}{100 * np.sqrt(np.mean(ends**2)):9.3f}{strokes:9.2f}"
+        f"{int(np.count_nonzero(np.diff(ways))) / FOLLOWED_S * 60:9.0f}"
+    )
+
+
+def following(seed: int) -> Iterator[str]:
+    """Yield the table of references that come every 0.5 s."""
+    ramp, noise = written(seed)
+    own = " and ".join(f"{np.abs(np.diff(each)).sum() * 60.0 / FOLLOWED_S:.2f}" for each in (ramp, noise))
+    yield f"a reference every {WRITTEN_S:g} s, strokes a minute of its own: {own}"
+    columns = f"{'rms %':>10}{'at end':>9}{'strokes':>9}{'turns':>9}"
+    yield f"{'':18}{'under a ramp':>37}{'under noise':>37}"
+    yield f"{'':18}{columns}{columns}"
+    for period_s in PERIODS_S:
+        for law in LAWS:
+            case = Case("", period_s=period_s, known=True)
+            said = "".join(followed(Loop(law, case, seed), each) for each in (ramp, noise))
+            yield f"{1e3 * period_s:4g} ms {law:>10}{said}"
+
+
 def shortest_lines() -> Iterator[str]:
     """Yield what the shortest pulse does, by the true parameters: no law with this loop can make a smaller move."""
     omega = (SEED.spring_n_per_m / SEED.mass_kg) ** 0.5
@@ -280,9 +342,11 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=400)
     parser.add_argument("--rest-s", type=float, default=600.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--following", action="store_true", help="references every 0.5 s, alone")
     arguments = parser.parse_args()
     started_s = time.monotonic()
-    for line in report(arguments.steps, arguments.rest_s, arguments.seed):
+    lines = report(arguments.steps, arguments.rest_s, arguments.seed)
+    for line in following(arguments.seed) if arguments.following else lines:
         print(line, flush=True)
     print(f"{time.monotonic() - started_s:.0f} s")
 
