@@ -63,15 +63,15 @@ def test_a_stem_that_answers_late_is_waited_for() -> None:
     assert [(each.landing, each.command_pa) for each in then] == [(True, 60e3), (True, 70e3), (True, 80e3)]
 
 
-@pytest.mark.parametrize(("answer_s", "waited_s"), [(0.1, 0.3), (1.5, 2.4)], ids=["at once", "at a limited rate"])
+@pytest.mark.parametrize(("answer_s", "waited_s"), [(0.1, 0.6), (1.5, 2.5)], ids=["at once", "at a limited rate"])
 def test_a_large_step_says_how_long_large_steps_take(answer_s: float, waited_s: float) -> None:
-    """Small steps took 0.15 s each. By their rate a step ten times as large would take 1.5 s; it may, or it may not."""
+    """Small steps took 0.3 s each. By their rate a step ten times as large would take 3 s; it may, or it may not."""
 
     def after(elapsed_s: float, before_m: float, to_m: float) -> float:
-        took_s = answer_s if abs(to_m - before_m) > 0.02 else 0.15
-        return to_m if elapsed_s > took_s else before_m
+        took_s = answer_s if abs(to_m - before_m) > 0.02 else 0.3
+        return before_m + (to_m - before_m) * min(1.0, elapsed_s / took_s)
 
-    *_, held = outcomes((40e3, 0.04), (41e3, 0.041), (42e3, 0.042), (52e3, 0.07), (42e3, 0.07), path=after, hold_s=4.0)
+    *_, held = outcomes((40e3, 0.04), (41e3, 0.043), (42e3, 0.046), (52e3, 0.07), (42e3, 0.07), path=after, hold_s=4.0)
     assert not held.moved
     assert held.time_s - 4 * 4.0 < waited_s
 
