@@ -5,22 +5,10 @@
 
 from pathlib import Path
 
-from config.codes import (
-    Code,
-    ExperimentState,
-    Fault,
-    InhibitReason,
-    Mode,
-    Ne107Cause,
-    Ne107Status,
-    Quality,
-    Refusal,
-    Restored,
-    ServiceState,
-    State,
-)
+from config.codes import Code, Ne107Cause, Ne107Status, Refusal
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
+from positioner.observer.words import CODES
 
 HERE = Path(__file__).parent
 BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"
@@ -32,17 +20,8 @@ HEAD = """# What the numbers say
 Written by `python -m docs.code_tables` from `config/codes.py`, from which `positioner map` has its texts, too. A number
 never gets a new meaning.
 """
-SERVED: dict[type[Code], str] = {
-    Mode: "mode",
-    State: "state",
-    ServiceState: "service",
-    Fault: "fault",
-    Quality: "quality",
-    InhibitReason: "why",
-    Restored: "restored",
+SERVED: dict[type[Code], str] = {code: register for register, code in CODES.items()} | {
     Refusal: "*_reason, refusal",
-    ExperimentState: "experiment_state",
-    Ne107Status: "ne107",
     Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes",
 }
 """The register that serves each."""

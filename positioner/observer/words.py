@@ -24,15 +24,15 @@ from config.registers import BY_NAME, ESTIMATED
 CODES: dict[str, type[Code]] = {
     "mode": Mode,
     "state": State,
+    "service": ServiceState,
     "fault": Fault,
     "quality": Quality,
     "why": InhibitReason,
     "restored": Restored,
-    "service": ServiceState,
     "refusal": Refusal,
+    "experiment_state": ExperimentState,
     "ne107": Ne107Status,
     "ne107_cause": Ne107Cause,
-    "experiment_state": ExperimentState,
 }
 """The code that each register of one serves."""
 

@@ -29,7 +29,7 @@ from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.model.sampling import sampling
-from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table
+from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
 
@@ -90,14 +90,14 @@ class Discovery(Result):
             said.append(parameter_table(each.model.fit.parameters))
         said += [f"does as well: {each.form.words}: {each.form.equations[1]}" for each in self.found[1:]]
         if self.candidates:
-            said.append(candidate_table([_tried(each) for each in self.candidates], MILLIMETRES, title))
+            said.append(candidate_table([each.tried for each in self.candidates], MILLIMETRES, title))
         if self.untried:
             said.append(f"not fitted in full, behind or not needed: {', '.join(self.untried)}")
         return said
 
     def frame_columns(self) -> dict[str, list[object]]:
         """Return a row a form: errors, m, evidence, accepted or why not."""
-        return candidate_columns([_tried(each) for each in self.candidates], MILLIMETRES)
+        return candidate_columns([each.tried for each in self.candidates], MILLIMETRES)
 
     def plot(self) -> "Figure":
         """Draw what the best form adds over its variable, and what the landings miss where it is a force at rest."""
@@ -126,14 +126,6 @@ class Discovery(Result):
             there = [each for each in self.landings if each.direction == way]
             x, y = [each.position_m / stroke_m for each in there], [each.missing_n for each in there]
             axes.scatter(x, y, s=14, color=colours[way], label=words, alpha=0.7)  # type: ignore[attr-defined]
-
-
-def _tried(each: EffectCandidate) -> Tried:
-    if each.model is None:
-        return Tried(each.step, each.name, None, None, None, each.gain, each.rejection_reason)
-    errors = each.model.errors
-    rms_m = (errors.train_rmse_m, errors.test_rmse_m, errors.test_block_m)
-    return Tried(each.step, each.name, *rms_m, each.gain, each.rejection_reason)
 
 
 def discover(

@@ -19,7 +19,7 @@ from workbench.data.noise_floor import told_mm
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
-from workbench.select.candidate_table import MILLIMETRES, Tried, candidate_columns, candidate_table, draw_race
+from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable
@@ -74,7 +74,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
                 f"step {number}: error {1e3 * errors.train_rmse_m:.4f} mm rms fitted, {1e3 * errors.test_rmse_m:.4f} "
                 f"held out, floor {told_mm(self.split.floor_m)}"
             )
-            said.append(candidate_table([_tried(each) for each in step.candidates], MILLIMETRES, title))
+            said.append(candidate_table([each.tried for each in step.candidates], MILLIMETRES, title))
         if self.experiment:
             said.append(
                 f"experiment: {self.experiment.name}; after a refit the rivals differ by "
@@ -84,13 +84,13 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
 
     def frame_columns(self) -> dict[str, list[object]]:
         """Return a row a candidate of each step: errors, m, evidence, accepted or why not."""
-        return candidate_columns([_tried(each) for each in self.candidates], MILLIMETRES)
+        return candidate_columns([each.tried for each in self.candidates], MILLIMETRES)
 
     def plot(self) -> "Figure":
         """Draw the held-out error with each effect in the first step; those added and their rivals in colour."""
         step = self.steps[0]
         chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
-        tried = [_tried(each) for each in step.candidates]
+        tried = [each.tried for each in step.candidates]
         return draw_race(tried, chosen, step.before.errors.test_rmse_m, self.split.floor_m, MILLIMETRES)
 
 
@@ -99,14 +99,6 @@ def _by_reason(unseen: Mapping[str, str]) -> dict[str, list[str]]:
     for name, why in unseen.items():
         reasons.setdefault(why, []).append(name)
     return reasons
-
-
-def _tried(each: EffectCandidate) -> Tried:
-    if each.model is None:
-        return Tried(each.step, each.name, None, None, None, each.gain, each.rejection_reason)
-    errors = each.model.errors
-    rms_m = (errors.train_rmse_m, errors.test_rmse_m, errors.test_block_m)
-    return Tried(each.step, each.name, *rms_m, each.gain, each.rejection_reason)
 
 
 @linear_algebra_alone()

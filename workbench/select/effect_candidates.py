@@ -16,6 +16,7 @@ from workbench.select.block_errors import (
     indistinguishable,
     relative_error_reduction,
 )
+from workbench.select.candidate_table import Tried
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, bic, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
@@ -65,6 +66,15 @@ class EffectCandidate(Candidate):
     def evidence(self) -> float:
         """BIC of the model before less that with the effect; minus infinity if it could not be fitted."""
         return self.gain.bic if self.gain else -float("inf")
+
+    @property
+    def tried(self) -> Tried:
+        """Its row of the table; without errors where it could not be fitted."""
+        if self.model is None:
+            return Tried(self.step, self.name, None, None, None, self.gain, self.rejection_reason)
+        errors = self.model.errors
+        rms_m = (errors.train_rmse_m, errors.test_rmse_m, errors.test_block_m)
+        return Tried(self.step, self.name, *rms_m, self.gain, self.rejection_reason)
 
 
 EffectStep = ForwardStep[EvaluatedModel, EffectCandidate]
