@@ -40,7 +40,8 @@ from config.slave_file import SlaveFile
 from config.valve_file import ValveFile
 from drivers.boundary import NoReply, Reading
 from drivers.in_memory import MemoryDriver, Plant
-from positioner.control.controller import Controller, Decision
+from positioner.control.controller import Controller
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle

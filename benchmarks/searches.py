@@ -33,7 +33,7 @@ import numpy as np
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
-from sim.effect import shipped_effects
+from sim.effect import first_effects
 from workbench.blind.hiding import drawn_effects, hide
 from workbench.data.motion import slips
 from workbench.data.record import ready
@@ -157,7 +157,7 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
             continue
         yield f"{kind}: {len(chosen)} searches of {len(_by_case(chosen))} cases"
         yield HEAD
-        for effect in shipped_effects():
+        for effect in first_effects():
             own = [each for each in chosen if each["effect"] == effect]
             if own:
                 yield _row(effect, own)
@@ -195,7 +195,7 @@ def kept(file: Path) -> list[Line]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--effects", nargs="*", choices=shipped_effects(), default=shipped_effects(), metavar="NAME")
+    parser.add_argument("--effects", nargs="*", choices=first_effects(), default=first_effects(), metavar="NAME")
     parser.add_argument("--kind", nargs="*", choices=get_args(Kind), default=["full"])
     parser.add_argument("--cases", type=int, default=1, help="of each effect (1)")
     parser.add_argument("--searches", type=int, default=10, help="of each case (10)")

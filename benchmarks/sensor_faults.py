@@ -28,7 +28,7 @@ from config.codes import Mode
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.simulated_device import Device

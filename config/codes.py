@@ -34,6 +34,10 @@ class Mode(Code):
     AUTOMATIC = 2, "automatic"
 
 
+HOLD, MANUAL, AUTOMATIC = Mode
+"""By these names for the control core: in Python 3.11 `Mode.HOLD` costs a call, and a cycle asks for dozens."""
+
+
 class ServiceState(Code):
     """What the service does for a valve, beside the law's own states."""
 
@@ -53,6 +57,10 @@ class State(Code):
     S1_UP = 1, "S1 up"
     S2_DOWN = 2, "S2 down"
     S3_IDENTIFY = 3, "S3 identify"
+
+
+S0, S1, S2, S3 = State
+"""As the seed calls them."""
 
 
 class Fault(Code):

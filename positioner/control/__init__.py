@@ -4,7 +4,9 @@
 never reads a clock, sleeps, writes a file or touches a socket, so the same code runs in virtual time, lockstep and
 real time.
 
-    controller, settings, requests, sample      one step, what it is given and what it is given once
+    controller, controller_memory               one step, what it remembers and decides
+    settings, requests, sample                  what it is given, once and in each cycle
+    identifying                                 when the estimators run, and when what they found is applied
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
     monitors                                    conditions of stem, command and cycle that must not last
     balance_law                                 the seed's law: the pressure that balances spring and friction

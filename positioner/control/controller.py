@@ -4,16 +4,17 @@
 the running integrals of the identification. It reads no clock.
 """
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
-from config.codes import Fault, InhibitReason, Mode, Refusal, Restored, State
-from config.extended_valve import ExtendedValve
+from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, Fault, InhibitReason, Mode, Refusal, Restored, State
+from config.extended_valve import ExtendedValve, Inverse
 from positioner.control import pressure_path
+from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
 from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
+from positioner.control.identifying import estimates_tested, identify
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
 from positioner.control.law_memory import held_pa as held_by_law_pa
-from positioner.control.monitors import MonitorMemory, Watched, after_cycle
+from positioner.control.monitors import MonitorMemory, after_cycle
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
@@ -21,72 +22,18 @@ from positioner.control.requests import Requests
 from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
-from positioner.control.staircase_excitation import Staircase
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import SupervisionMemory, supervise, usable
 from positioner.control.valve_knowledge import ValveKnowledge, known, with_learnt
-from positioner.estimation.acceptance import Applied, accept
-from positioner.estimation.estimates import Estimates
+from positioner.estimation.acceptance import Applied
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
-from positioner.estimation.landings.static_law import StaticLaw
 from positioner.estimation.online import Identification
 from positioner.estimation.refiner import Refiner
 
-
-@dataclass(frozen=True, slots=True)
-class ConsumedRequests:
-    """Counts of the writes whose mode was left since: a reference or a manual pressure does not come back by itself."""
-
-    reference_writes: int = 0
-    manual_writes: int = 0
-
-
-class ControllerMemory(NamedTuple):
-    """What the controller remembers from one step to the next; a tuple, for it is made anew in each."""
-
-    command_pa: float
-    """The last command given, ..."""
-    wanted_pa: float
-    """... and the pressure that it shall bring about: another, where it leads against a lag."""
-    held_pa: float
-    """What S0 holds, and what it gets back after S3."""
-    supervision: SupervisionMemory
-    monitoring: MonitorMemory
-    reference: Reference
-    applied: Applied
-    consumed: ConsumedRequests
-    state: State
-    excitation: ActiveExcitation | None
-    experiment: PlayedExperiment
-    identifying: bool
-    law: LawMemory | None
-    """None: a law without a memory."""
-    path: PathMemory | None
-    """None: nothing is known of a pressure that arrives late."""
-    restoration: Restoration
-
-
-class Decision(NamedTuple):
-    """What one step decided, for the wire, the registers and the recorder."""
-
-    command_pa: float
-    state: State
-    mode: Mode
-    fault: Fault
-    inhibit_reason: InhibitReason
-    reference_m: float
-    delta_r_m: float
-    sample_age_s: float
-    estimates: Estimates
-    applied: Applied
-    static_law: StaticLaw
-    restoration: Restoration
-    experiment: PlayedExperiment
-    alarms: tuple[Fault, ...] = ()
-    """Monitors whose condition holds for their delay, be they alarms or faults."""
-    measured: bool = True
-    """Whether there was a good measurement since the start."""
+NO_FAULT, NOTHING = Fault.NONE, InhibitReason.NOTHING
+FOLLOWING = (S1, S2)
+"""The states in which the law commands."""
 
 
 class Controller:
@@ -120,7 +67,7 @@ class Controller:
             reference=Reference(0.0),
             applied=settings.applied if restored is None else Applied(restored.ratios),
             consumed=ConsumedRequests(),
-            state=State.S0_START,
+            state=S0,
             excitation=None,
             experiment=PlayedExperiment(),
             identifying=False,
@@ -174,15 +121,22 @@ def step(
     """Return what is remembered and what is decided after one sample."""
     fresh = usable(sample, settings.limits)
     acknowledged = requests.acknowledgements != memory.supervision.acknowledgements
-    before = MonitorMemory() if acknowledged else memory.monitoring
-    monitoring = after_cycle(before, _watched(memory, sample, fresh=fresh), settings.monitoring)
+    monitoring = after_cycle(
+        MonitorMemory() if acknowledged else memory.monitoring,
+        settings.monitoring,
+        sample.now_s,
+        sample.position_m if fresh else None,
+        memory.command_pa,
+        _sent_to_m(memory),
+    )
     supervision = supervise(
         memory.supervision,
         sample,
         memory.command_pa,
         requests,
         settings.limits,
-        monitoring.fault_among(settings.monitoring) if monitoring.holding else Fault.NONE,
+        good=fresh,
+        monitored=monitoring.fault_among(settings.monitoring) if monitoring.holding else NO_FAULT,
     )
     consumed = _consumed(memory, supervision.mode, requests)
     waits = _waits(memory, supervision.mode, requests, settings, statics)
@@ -201,18 +155,11 @@ def step(
         statics.restart()
     experiment = _experiment(memory, supervision, sample, requests, settings, fresh=fresh)
     playing = experiment.commands
-    outcome = None
-    if fresh:
-        arrived = (
-            memory.path is None
-            or settings.valve is None
-            or memory.path.has_arrived(sample.now_s, settings.valve.inverse)
-        )
-        outcome = statics.update(sample.now_s, sample.position_m, memory.wanted_pa, sample.pressure_pa, arrived=arrived)
+    outcome = _outcome(memory, sample, settings, statics) if fresh else None
     if excitation is not None and fresh:
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
-    identifying, applied = _identify(memory, excitation, sample, fresh, requests, identification, statics)
+    identifying, applied = identify(memory, excitation, sample, fresh, requests, identification, statics)
     ordinary = excitation is None and not playing
     restoration = _restoration(memory, applied, outcome if ordinary else None, settings)
     dropped = restoration.trust is Restored.DROPPED
@@ -221,11 +168,11 @@ def step(
     elif outcome is not None and outcome.landing and not playing:
         applied = statics.corrected(applied)
     situation = Situation(
-        automatic=supervision.mode is Mode.AUTOMATIC,
-        exciting=playing or (excitation is not None and not excitation.ended),
-        law_ready=applied.ratios is not None,
-        delta_r_m=reference.delta_m,
-        dropped=dropped,
+        supervision.mode is AUTOMATIC,
+        playing or (excitation is not None and not excitation.ended),
+        applied.ratios is not None,
+        reference.delta_m,
+        dropped,
     )
     state = state_in(situation)
     held_pa = _held_pa(memory, state, supervision, sample)
@@ -236,7 +183,7 @@ def step(
             usable=fresh,
             command_pa=memory.wanted_pa,
             reference_m=reference.value_m,
-            ratios=applied.ratios if state in (State.S1_UP, State.S2_DOWN) else None,
+            ratios=applied.ratios if state in FOLLOWING else None,
             estimates=identification.estimates,
             outcome=outcome,
             statics=statics,
@@ -245,9 +192,9 @@ def step(
         )
         law_memory = after_step(memory.law, settings.law_with_memory, seen)
 
-    if supervision.fault is not Fault.NONE:
+    if supervision.fault:
         asked_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
-    elif supervision.mode is Mode.MANUAL and requests.manual_writes != consumed.manual_writes:
+    elif supervision.mode is MANUAL and requests.manual_writes != consumed.manual_writes:
         asked_pa = requests.manual_pa
     else:
         exciting = experiment if playing else excitation
@@ -256,33 +203,34 @@ def step(
         )
     limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
     wanted_pa = settings.delivered_pa(limited_pa)
-    follows = supervision.fault is Fault.NONE and state in (State.S1_UP, State.S2_DOWN)
-    path = _path(memory.path, sample.now_s, wanted_pa, settings, lead=follows)
-    command_pa = wanted_pa if path is None else path.command_pa
+    path, command_pa = None, wanted_pa
+    if memory.path is not None and settings.valve is not None:
+        follows = not supervision.fault and state in FOLLOWING
+        path = _path(memory.path, sample.now_s, wanted_pa, settings, settings.valve.inverse, lead=follows)
+        command_pa = path.command_pa
 
+    by_law = NOTHING if law_memory is None else law_memory.inhibit_reason
     inhibit_reason = (
         excitation_inhibit
-        or (InhibitReason.RESTORED_WAITS if waits else InhibitReason.NOTHING)
-        or law_inhibit_reason(situation)
-        or (InhibitReason.LAW_BEYOND_LIMITS if limited_pa != asked_pa else InhibitReason.NOTHING)
-        or (law_memory.inhibit_reason if law_memory is not None else InhibitReason.NOTHING)
+        or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
+        or (by_law if limited_pa == asked_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
     decision = Decision(
-        command_pa=command_pa,
-        state=state,
-        mode=supervision.mode,
-        fault=supervision.fault,
-        inhibit_reason=inhibit_reason,
-        reference_m=reference.value_m,
-        delta_r_m=reference.delta_m,
-        sample_age_s=sample.now_s - supervision.good_s,
-        estimates=_estimates(excitation, identification, statics),
-        applied=applied,
-        static_law=statics.law,
-        restoration=restoration,
-        experiment=experiment,
-        alarms=monitoring.holding,
-        measured=supervision.measured,
+        command_pa,
+        state,
+        supervision.mode,
+        supervision.fault,
+        inhibit_reason,
+        reference.value_m,
+        reference.delta_m,
+        sample.now_s - supervision.good_s,
+        estimates_tested(excitation, identification, statics),
+        applied,
+        statics.law,
+        restoration,
+        experiment,
+        monitoring.holding,
+        supervision.measured,
     )
     return ControllerMemory(
         command_pa,
@@ -303,16 +251,12 @@ def step(
     ), decision
 
 
-def _watched(memory: ControllerMemory, sample: Sample, *, fresh: bool) -> Watched:
-    """Return what the monitors look at: the stem, and where the law last sent it."""
-    followed = memory.supervision.mode is Mode.AUTOMATIC and memory.state is not State.S3_IDENTIFY
-    asked = followed and memory.reference.delta_m != 0.0
-    return Watched(
-        sample.now_s,
-        sample.position_m if fresh else None,
-        memory.command_pa,
-        memory.reference.value_m if asked else None,
-    )
+def _sent_to_m(memory: ControllerMemory) -> float | None:
+    """Return where the law last sent the stem, m; None where it commands nothing."""
+    reference = memory.reference
+    if reference.delta_m == 0.0 or memory.state is S3 or memory.supervision.mode is not AUTOMATIC:
+        return None
+    return reference.value_m
 
 
 def _experiment(
@@ -340,14 +284,21 @@ def _experiment(
     return experiment_after(before, requests.experiment, around, settings.experiment)
 
 
+def _outcome(
+    memory: ControllerMemory, sample: Sample, settings: Settings, statics: StaticIdentification
+) -> SlideOutcome | None:
+    """Return what a change of the command did, in the step in which it is known."""
+    path, valve = memory.path, settings.valve
+    arrived = path is None or valve is None or path.has_arrived(sample.now_s, valve.inverse)
+    return statics.update(sample.now_s, sample.position_m, memory.wanted_pa, sample.pressure_pa, arrived=arrived)
+
+
 def _path(
-    memory: PathMemory | None, now_s: float, wanted_pa: float, settings: Settings, *, lead: bool
-) -> PathMemory | None:
-    """Return what is remembered of the pressure on its way, and with it the command; None where nothing is known."""
-    if memory is None or settings.valve is None:
-        return None
+    memory: PathMemory, now_s: float, wanted_pa: float, settings: Settings, inverse: Inverse, *, lead: bool
+) -> PathMemory:
+    """Return what is remembered of the pressure on its way, and with it the command."""
     limits_pa = (settings.minimum_pa, settings.maximum_pa)
-    path = pressure_path.after_step(memory, now_s, wanted_pa, settings.valve.inverse, limits_pa, lead=lead)
+    path = pressure_path.after_step(memory, now_s, wanted_pa, inverse, limits_pa, lead=lead)
     return path._replace(command_pa=settings.delivered_pa(path.command_pa))
 
 
@@ -367,7 +318,7 @@ def _waits(
 
     A law that commands all the while has no such moves.
     """
-    if not memory.restoration.provisional or mode is not Mode.AUTOMATIC or not settings.moves_by_single_steps:
+    if not memory.restoration.provisional or mode is not AUTOMATIC or not settings.moves_by_single_steps:
         return False
     asked = requests.reference_writes != memory.consumed.reference_writes
     return asked and requests.reference_m != memory.reference.value_m and statics.detector.rest is None
@@ -388,8 +339,8 @@ def _consumed(memory: ControllerMemory, mode: Mode, requests: Requests) -> Consu
     if mode is before:
         return consumed
     return ConsumedRequests(
-        requests.reference_writes if before is Mode.AUTOMATIC else consumed.reference_writes,
-        requests.manual_writes if before is Mode.MANUAL else consumed.manual_writes,
+        requests.reference_writes if before is AUTOMATIC else consumed.reference_writes,
+        requests.manual_writes if before is MANUAL else consumed.manual_writes,
     )
 
 
@@ -404,55 +355,10 @@ def _reference(
     """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
-    if mode is not Mode.AUTOMATIC or memory.supervision.mode is not mode:
+    if mode is not AUTOMATIC or memory.supervision.mode is not mode:
         start = Reference(start.value_m if stem_m is None else stem_m)
-    follows = mode is Mode.AUTOMATIC and written and not waits
+    follows = mode is AUTOMATIC and written and not waits
     return start.follow(requests.reference_m) if follows else start
-
-
-def _identify(
-    memory: ControllerMemory,
-    excitation: ActiveExcitation | None,
-    sample: Sample,
-    fresh: bool,
-    requests: Requests,
-    identification: Identification,
-    statics: StaticIdentification,
-) -> tuple[bool, Applied]:
-    """Run the estimators while eta_2 or eta_3 asks for it; what they find is applied when they are switched off."""
-    parameters, friction = requests.eta[1] == 0, requests.eta[2] == 0
-    wanted = (parameters or friction) and not (excitation is not None and excitation.ended)
-    if not wanted:
-        if not memory.identifying:
-            return False, memory.applied
-        if memory.excitation is not None and memory.excitation.by_slides:
-            return False, statics.accepted(memory.applied)
-        return False, accept(memory.applied, statics.tested(identification.estimates))
-    if not memory.identifying or (excitation is not None and memory.excitation is None):
-        identification.restart()
-    moves_before = identification.moves
-    if fresh:
-        identification.update(
-            sample.time_s,
-            sample.position_m,
-            sample.pressure_pa,
-            parameters=parameters,
-            friction=friction,
-            passive=requests.eta[0] == 1,
-        )
-    # No excitation ends, so the estimates of ordinary moves are applied move by move.
-    move_identified = identification.moves != moves_before
-    return True, accept(memory.applied, statics.tested(identification.estimates)) if move_identified else memory.applied
-
-
-def _estimates(
-    excitation: ActiveExcitation | None, identification: Identification, statics: StaticIdentification
-) -> Estimates:
-    """Return the estimates as tested on the landings; the progress of a staircase is its own."""
-    estimates = statics.tested(identification.estimates)
-    if excitation is None or not isinstance(excitation.signal, Staircase):
-        return estimates
-    return replace(estimates, progress=excitation.signal.progress)
 
 
 def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMemory, sample: Sample) -> float:
@@ -460,9 +366,9 @@ def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMem
 
     After a fault what a device came back with.
     """
-    if sample.held_pa is not None and supervision.fault is not Fault.NONE:
+    if sample.held_pa is not None and supervision.fault:
         return sample.held_pa
-    if State.S3_IDENTIFY in (memory.state, state):
+    if state is S3 or memory.state is S3:
         return memory.held_pa
     return held_by_law_pa(memory.law, memory.wanted_pa)
 
@@ -479,12 +385,12 @@ def _pressure_pa(
     extended: ExtendedValve | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
-    if state is State.S3_IDENTIFY and exciting is not None:
+    if state is S3 and exciting is not None:
         return exciting.pressure_pa(now_s)
-    if state in (State.S1_UP, State.S2_DOWN) and applied.ratios is not None:
+    if state in FOLLOWING and applied.ratios is not None:
         if law_memory is not None:
             return law_memory.level_pa
-        s = 1 if state is State.S1_UP else -1
+        s = 1 if state is S1 else -1
         if extended is not None:
             return extended.landing_pa(reference.value_m, s)
         return settings.law(reference.value_m, s, applied.ratios)

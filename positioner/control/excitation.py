@@ -6,7 +6,7 @@ ended: S3 is left, and only eta_1 = 1 makes room for another.
 
 from dataclasses import dataclass, replace
 
-from config.codes import InhibitReason, Mode
+from config.codes import AUTOMATIC, InhibitReason, Mode
 from positioner.control.balance_law import balance_pa
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
@@ -18,6 +18,8 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 
+NOTHING = InhibitReason.NOTHING
+
 
 @dataclass(frozen=True, slots=True)
 class ActiveExcitation:
@@ -25,12 +27,12 @@ class ActiveExcitation:
 
     signal: SineExcitation | Staircase
     start_s: float
-    inhibit_reason: InhibitReason = InhibitReason.NOTHING
+    inhibit_reason: InhibitReason = NOTHING
 
     @property
     def ended(self) -> bool:
         """Whether S3 is over."""
-        return self.inhibit_reason is not InhibitReason.NOTHING
+        return self.inhibit_reason is not NOTHING
 
     @property
     def by_slides(self) -> bool:
@@ -66,21 +68,21 @@ def excitation_after(
         reference: about whose balance a sine swings where nobody says alpha (seed, 4.1) ...
         ratios: ... by these; about what is held where there are none.
     """
-    if mode is not Mode.AUTOMATIC or requests.eta[0] != 0:
-        return None, InhibitReason.NOTHING
+    if mode is not AUTOMATIC or requests.eta[0] != 0:
+        return None, NOTHING
     if excitation is not None:
         if not excitation.ended and sample.now_s - excitation.start_s > settings.excitation_limit_s:
             excitation = replace(excitation, inhibit_reason=InhibitReason.EXCITATION_TOO_LONG)
         return excitation, excitation.inhibit_reason
     if settings.staircase is not None:
-        return ActiveExcitation(Staircase(held_pa), sample.now_s), InhibitReason.NOTHING
+        return ActiveExcitation(Staircase(held_pa), sample.now_s), NOTHING
     alpha_pa = requests.alpha_pa
     if alpha_pa <= 0:
         direction = -1 if reference.delta_m < 0 else 1
         alpha_pa = held_pa if ratios is None else balance_pa(reference.value_m, direction, ratios)
     sine = SineExcitation(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
     inhibit_reason = sine.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
-    if inhibit_reason is not InhibitReason.NOTHING:
+    if inhibit_reason is not NOTHING:
         return None, inhibit_reason
     return ActiveExcitation(sine, sample.now_s), inhibit_reason
 

@@ -10,9 +10,8 @@ t on the clock of the cycle. Nothing here knows the law. An alarm ends with its 
 `supervision`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from typing import NamedTuple
 
 from config.codes import Fault
@@ -25,68 +24,76 @@ ENDS = 0.02
 
 @dataclass(frozen=True, slots=True)
 class MonitorLimits:
-    """Of one monitor: in SI units what its threshold means, the delay, and what is done; None: it is told."""
+    """Of one monitor: what its condition means, for how long it must hold, and what is done; None: it is told."""
 
     fault: Fault
-    threshold: float
     delay_s: float
     action: SafeActionName | None
 
 
 @dataclass(frozen=True, slots=True)
 class MonitorSettings:
-    """The monitors that watch, in the order of their faults, and what they hold the valve against."""
+    """The monitors in the order of their faults, and the bounds of their conditions; infinite where one is off.
 
-    monitors: tuple[MonitorLimits, ...] = ()
-    stroke_m: float = 1.0
-    minimum_pa: float = 0.0
-    maximum_pa: float = 0.0
+    Attributes:
+        deviation_m, frozen_pa, rate_m_per_s, overrun_s: beyond which a condition holds.
+        low_pa, high_pa: outside which the command is saturated.
+        low_m, high_m: away from both ends of the travel a stem is between these.
+    """
+
+    monitors: tuple[MonitorLimits, ...]
+    deviation_m: float
+    frozen_pa: float
+    rate_m_per_s: float
+    overrun_s: float
+    low_pa: float
+    high_pa: float
+    low_m: float
+    high_m: float
 
     @classmethod
     def of(cls, file: DaemonFile) -> "MonitorSettings":
-        """Return the monitors that a daemon's file switches on."""
-        table, stroke_m = file.supervision, file.valve.stroke_m
-        span_pa = file.pressure.maximum_pa - file.pressure.minimum_pa
+        """Return what a daemon's file asks for; a threshold of 0 switches a monitor off."""
+        table, stroke_m, pressure = file.supervision, file.valve.stroke_m, file.pressure
+        span_pa = pressure.maximum_pa - pressure.minimum_pa
         period_s = file.cycle.period_s if file.cycle.pace == "real_time" else 0.0
-        units = (
-            (Fault.TRAVEL_DEVIATION, table.travel_deviation, stroke_m),
-            (Fault.FROZEN_SENSOR, table.frozen_sensor, span_pa),
-            (Fault.POSITION_RATE, table.position_rate, stroke_m),
-            (Fault.SATURATED, table.saturation, span_pa),
-            (Fault.OVERRUN, table.overrun, period_s),
-        )
         monitors = (
-            MonitorLimits(fault, each.threshold * unit, each.delay_s, None if each.action == "alarm" else each.action)
-            for fault, each, unit in units
+            (Fault.TRAVEL_DEVIATION, table.travel_deviation),
+            (Fault.FROZEN_SENSOR, table.frozen_sensor),
+            (Fault.POSITION_RATE, table.position_rate),
+            (Fault.SATURATED, table.saturation),
+            (Fault.OVERRUN, table.overrun),
         )
-        watching = tuple(each for each in monitors if each.threshold > 0)
-        return cls(watching, stroke_m, file.pressure.minimum_pa, file.pressure.maximum_pa)
+        near_pa = table.saturation.threshold * span_pa or -inf
+        return cls(
+            monitors=tuple(
+                MonitorLimits(fault, each.delay_s, None if each.action == "alarm" else each.action)
+                for fault, each in monitors
+            ),
+            deviation_m=table.travel_deviation.threshold * stroke_m or inf,
+            frozen_pa=table.frozen_sensor.threshold * span_pa or inf,
+            rate_m_per_s=table.position_rate.threshold * stroke_m or inf,
+            overrun_s=table.overrun.threshold * period_s or inf,
+            low_pa=pressure.minimum_pa + near_pa,
+            high_pa=pressure.maximum_pa - near_pa,
+            low_m=ENDS * stroke_m,
+            high_m=(1.0 - ENDS) * stroke_m,
+        )
 
-    def inside(self, position_m: float) -> bool:
-        """Return whether a stem is away from both ends of its travel."""
-        return ENDS * self.stroke_m < position_m < (1.0 - ENDS) * self.stroke_m
 
-
-class Watched(NamedTuple):
-    """What the monitors look at in a cycle; of a cycle without a good measurement there is no position."""
-
-    now_s: float
-    position_m: float | None
-    command_pa: float
-    """The last given."""
-    reference_m: float | None
-    """Where the stem is asked to be; None where nobody asks."""
+NEVER = (inf, inf, inf, inf, inf)
+"""No condition holds."""
 
 
 class MonitorMemory(NamedTuple):
     """What they remember; a tuple, for it is made anew in each cycle."""
 
-    since_s: tuple[float, ...] = ()
+    since_s: tuple[float, ...] = NEVER
     """Since when each condition holds; infinite where it does not."""
-    seen_s: float = -inf
-    good_s: float = -inf
+    seen_s: float = inf
+    good_s: float = inf
     position_m: float = inf
-    """The last good one, and when."""
+    """The last good one, and when; infinite before there was one."""
     unmoved_pa: float = inf
     """The command when it last changed."""
     holding: tuple[Fault, ...] = ()
@@ -98,51 +105,48 @@ class MonitorMemory(NamedTuple):
         return next(acting, Fault.NONE)
 
 
-def after_cycle(memory: MonitorMemory, watched: Watched, settings: MonitorSettings) -> MonitorMemory:
-    """Return what is known after a cycle."""
-    if not settings.monitors:
-        return memory
-    moved = watched.position_m is not None and watched.position_m != memory.position_m
-    unmoved_pa = watched.command_pa if moved else memory.unmoved_pa
-    before_s = memory.since_s or (inf,) * len(settings.monitors)
-    since_s = tuple(
-        (min(since_s, watched.now_s) if _holds(each, memory, watched, unmoved_pa, settings) else inf)
-        for each, since_s in zip(settings.monitors, before_s, strict=True)
-    )
-    return MonitorMemory(
-        since_s=since_s,
-        seen_s=watched.now_s,
-        good_s=memory.good_s if watched.position_m is None else watched.now_s,
-        position_m=memory.position_m if watched.position_m is None else watched.position_m,
-        unmoved_pa=unmoved_pa,
-        holding=_held_long(since_s, watched.now_s, settings.monitors),
-    )
+def after_cycle(
+    memory: MonitorMemory,
+    settings: MonitorSettings,
+    now_s: float,
+    position_m: float | None,
+    command_pa: float,
+    reference_m: float | None,
+) -> MonitorMemory:
+    """Return what is known after a cycle.
 
-
-def _held_long(since_s: Sequence[float], now_s: float, monitors: Sequence[MonitorLimits]) -> tuple[Fault, ...]:
-    if all(each == inf for each in since_s):
-        return ()
-    held = zip(monitors, since_s, strict=True)
-    return tuple(each.fault for each, since in held if since < inf and now_s - since >= each.delay_s)
-
-
-def _holds(
-    each: MonitorLimits, memory: MonitorMemory, watched: Watched, unmoved_pa: float, settings: MonitorSettings
-) -> bool:
-    """Return whether a condition holds now."""
-    position_m, threshold = watched.position_m, each.threshold
-    if each.fault is Fault.OVERRUN:
-        return isfinite(memory.seen_s) and watched.now_s - memory.seen_s > threshold
+    Args:
+        memory, settings: of the monitors.
+        now_s: on the clock of the cycle.
+        position_m: None in a cycle without a good measurement.
+        command_pa: the last given.
+        reference_m: where the stem is asked to be; None where nobody asks.
+    """
+    overrun = now_s - memory.seen_s > settings.overrun_s
     if position_m is None:
-        return False
-    match each.fault:
-        case Fault.TRAVEL_DEVIATION:
-            return watched.reference_m is not None and abs(watched.reference_m - position_m) > threshold
-        case Fault.FROZEN_SENSOR:
-            return settings.inside(position_m) and threshold < abs(watched.command_pa - unmoved_pa) < inf
-        case Fault.POSITION_RATE:
-            passed_s = watched.now_s - memory.good_s
-            return 0.0 < passed_s < inf and abs(position_m - memory.position_m) > threshold * passed_s
-        case _:
-            room_pa = min(watched.command_pa - settings.minimum_pa, settings.maximum_pa - watched.command_pa)
-            return settings.inside(position_m) and room_pa < threshold
+        since_s, holding = _held(memory, settings, now_s, (False, False, False, False, overrun))
+        return memory._replace(since_s=since_s, seen_s=now_s, holding=holding)
+    way_m, passed_s = abs(position_m - memory.position_m), now_s - memory.good_s
+    unmoved_pa = memory.unmoved_pa if way_m == 0.0 else command_pa
+    inside = settings.low_m < position_m < settings.high_m
+    conditions = (
+        reference_m is not None and abs(reference_m - position_m) > settings.deviation_m,
+        inside and abs(command_pa - unmoved_pa) > settings.frozen_pa,
+        way_m > settings.rate_m_per_s * passed_s > 0.0,
+        inside and not settings.low_pa <= command_pa <= settings.high_pa,
+        overrun,
+    )
+    since_s, holding = _held(memory, settings, now_s, conditions)
+    return MonitorMemory(since_s, now_s, now_s, position_m, unmoved_pa, holding)
+
+
+def _held(
+    memory: MonitorMemory, settings: MonitorSettings, now_s: float, conditions: tuple[bool, ...]
+) -> tuple[tuple[float, ...], tuple[Fault, ...]]:
+    """Return since when conditions hold, and those that have held for their delay."""
+    if True not in conditions:
+        return NEVER, ()
+    pairs = zip(conditions, memory.since_s, strict=True)
+    since_s = tuple(min(since_s, now_s) if holds else inf for holds, since_s in pairs)
+    long = (each.fault for each, since in zip(settings.monitors, since_s, strict=True) if now_s - since >= each.delay_s)
+    return since_s, tuple(long)

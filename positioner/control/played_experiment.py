@@ -17,6 +17,7 @@ from itertools import pairwise
 from config.codes import ExperimentState, Fault, Mode
 from positioner.control.requests import ExperimentRequest
 
+COMMANDING = (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
 ROUNDING = 1e-3
 """Of the rate and the length: times and pressures come as float32."""
 
@@ -66,7 +67,7 @@ class PlayedExperiment:
     @property
     def commands(self) -> bool:
         """Whether it commands the pressure."""
-        return self.state in (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
+        return self.state in COMMANDING
 
     def is_idle(self, request: ExperimentRequest) -> bool:
         """Whether nothing is under way, and nothing is asked for that was not yet taken note of."""

@@ -11,7 +11,7 @@ the law it interrupted by itself.
 
 from typing import NamedTuple
 
-from config.codes import InhibitReason, State
+from config.codes import S0, S1, S2, S3, InhibitReason, State
 
 
 class Situation(NamedTuple):
@@ -27,13 +27,14 @@ class Situation(NamedTuple):
 
 def state_in(situation: Situation) -> State:
     """Return the state that a situation calls for."""
-    if not situation.automatic:
-        return State.S0_START
-    if situation.exciting:
-        return State.S3_IDENTIFY
-    if not situation.law_ready or situation.delta_r_m == 0.0:
-        return State.S0_START
-    return State.S1_UP if situation.delta_r_m > 0.0 else State.S2_DOWN
+    automatic, exciting, law_ready, delta_r_m, _ = situation
+    if not automatic:
+        return S0
+    if exciting:
+        return S3
+    if not law_ready or delta_r_m == 0.0:
+        return S0
+    return S1 if delta_r_m > 0.0 else S2
 
 
 def law_inhibit_reason(situation: Situation) -> InhibitReason:

@@ -9,11 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from config.codes import Fault, Mode, Quality
+from config.codes import HOLD, Fault, Mode, Quality
 from config.quantities import DeviceStatus
 from config.supervision_table import SafeActionName
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
+
+GOOD, NO_FAULT = Quality.GOOD, Fault.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +47,8 @@ class Limits:
 class SupervisionMemory(NamedTuple):
     """What supervision remembers from cycle to cycle; a tuple, for it is made anew in each."""
 
-    mode: Mode = Mode.HOLD
-    fault: Fault = Fault.NONE
+    mode: Mode = HOLD
+    fault: Fault = NO_FAULT
     bad_in_a_row: int = 0
     good_s: float = -math.inf
     heartbeat_s: float = -math.inf
@@ -64,7 +66,7 @@ UNFIT_STATUS = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceSt
 
 def usable(sample: Sample, limits: Limits) -> bool:
     """Return whether a sample is new and could be true."""
-    return sample.quality is Quality.GOOD and limits.plausible(sample.position_m)
+    return sample.quality is GOOD and limits.plausible(sample.position_m)
 
 
 def supervise(
@@ -73,39 +75,49 @@ def supervise(
     command_pa: float,
     requests: Requests,
     limits: Limits,
-    monitored: Fault = Fault.NONE,
+    *,
+    good: bool,
+    monitored: Fault = NO_FAULT,
 ) -> SupervisionMemory:
-    """Return what is known after this sample; `command_pa` was given last, `monitored` is what monitors found."""
-    good = usable(sample, limits)
-    bad = not good and sample.quality is not Quality.REPEATED
-    first = math.isinf(memory.good_s)
+    """Return what is known after this sample.
+
+    Args:
+        memory: after the sample before.
+        sample: the latest; `good` says whether it is `usable`.
+        command_pa: given last.
+        requests: of the DCS.
+        limits: of the valve.
+        good: as said.
+        monitored: what monitors found.
+    """
+    now_s, quality = sample.now_s, sample.quality
+    first = memory.good_s == -math.inf
     alive = first or requests.heartbeats != memory.heartbeats
-    bad_in_a_row = memory.bad_in_a_row + 1 if bad else 0
-    good_s = sample.now_s if good or first else memory.good_s
-    heartbeat_s = sample.now_s if alive else memory.heartbeat_s
+    bad_in_a_row = 0 if good or quality is Quality.REPEATED else memory.bad_in_a_row + 1
+    good_s = now_s if good or first else memory.good_s
+    heartbeat_s = now_s if alive else memory.heartbeat_s
 
     # After a reply or two that were lost the device may hold what was given before them; after more it was away.
     short = memory.bad_in_a_row < limits.lost_after_cycles
     given_pa = (*memory.unanswered_pa, command_pa) if short else (command_pa,)
 
-    cause = _cause(sample, given_pa, bad_in_a_row, sample.now_s - good_s, limits) or monitored
-    silent = memory.mode is not Mode.HOLD and 0 < limits.heartbeat_timeout_s < sample.now_s - heartbeat_s
-    if cause is Fault.NONE and silent:
+    cause = _cause(sample, given_pa, bad_in_a_row, now_s - good_s, limits) or monitored
+    silent = 0 < limits.heartbeat_timeout_s < now_s - heartbeat_s and memory.mode is not HOLD
+    if silent and not cause:
         cause = Fault.DCS_SILENT
     acknowledged = requests.acknowledgements != memory.acknowledgements
-    latched = Fault.NONE if acknowledged else memory.fault
-    fault = cause if cause is not Fault.NONE else latched
+    fault = cause or (NO_FAULT if acknowledged else memory.fault)
     return SupervisionMemory(
-        mode=_mode(memory, requests, fault),
-        fault=fault,
-        bad_in_a_row=bad_in_a_row,
-        good_s=good_s,
-        heartbeat_s=heartbeat_s,
-        mode_writes=requests.mode_writes,
-        acknowledgements=requests.acknowledgements,
-        heartbeats=requests.heartbeats,
-        measured=memory.measured or good,
-        unanswered_pa=(command_pa,) if good else given_pa,
+        _mode(memory, requests, fault),
+        fault,
+        bad_in_a_row,
+        good_s,
+        heartbeat_s,
+        requests.mode_writes,
+        requests.acknowledgements,
+        requests.heartbeats,
+        memory.measured or good,
+        (command_pa,) if good else given_pa,
     )
 
 
@@ -117,15 +129,15 @@ def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
         return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE
-    if sample.quality is not Quality.LOST and sample.status & UNFIT_STATUS:
+    if sample.status & UNFIT_STATUS and sample.quality is not Quality.LOST:
         return Fault.DEVICE
     if age_s > limits.stale_after_s:  # on a slow line sooner than so many cycles
         by_quality = {Quality.LOST: Fault.NO_REPLY, Quality.NO_NUMBER: Fault.IMPLAUSIBLE}
         return by_quality.get(sample.quality, Fault.STALE)
-    return Fault.NONE
+    return NO_FAULT
 
 
 def _mode(memory: SupervisionMemory, requests: Requests, fault: Fault) -> Mode:
-    if fault is not Fault.NONE:
-        return Mode.HOLD
+    if fault:
+        return HOLD
     return requests.mode if requests.mode_writes != memory.mode_writes else memory.mode

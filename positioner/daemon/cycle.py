@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from threading import Event
 
 from config.codes import Quality
-from positioner.control.controller import Controller, Decision
+from positioner.control.controller import Controller
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.daemon.cycle_statistics import CycleStatistics

@@ -7,7 +7,7 @@ against each other on the controller, every cell. `docs/reliability.md` shows th
 from enum import StrEnum
 
 from config.codes import Fault, Mode, ServiceState
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.supervision import Limits
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
 
 

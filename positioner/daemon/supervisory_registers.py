@@ -34,7 +34,7 @@ from config.registers import (
     Register,
 )
 from fieldbus.modbus.register_answers import RegisterError, Table
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.cycle import Cycle

@@ -91,6 +91,7 @@ class Derivatives:
 
     def __init__(self) -> None:
         self._count, self._step = 0, 0.0
+        self._last_s, self._alike = 0.0, 0
         self.weights = np.zeros((3, 0))
         self.slope_gain = 0.0
 
@@ -100,6 +101,25 @@ class Derivatives:
         Afterwards `weights` are those used, and `slope_gain` is the standard deviation of the slope for white noise
         of one metre, in 1/s.
         """
+        if not self._goes_on(time_s):
+            self._look_at(time_s)
+        velocity_m_per_s, acceleration_m_per_s2, slope_m_per_s = self.weights.dot(position_m).tolist()
+        return velocity_m_per_s, acceleration_m_per_s2, slope_m_per_s
+
+    def _goes_on(self, time_s: Array) -> bool:
+        """Return whether the window moved on by a sample, and every step in it is one by which the weights hold.
+
+        Each then differs from theirs by less than EVEN / sqrt(N): their norm need not be worked out anew.
+        """
+        last_s, count = float(time_s[-1]), self._count
+        follows = count == len(time_s) and time_s[-2] == self._last_s
+        off = last_s - self._last_s - self._step
+        alike = follows and count * off * off < (EVEN * self._step) ** 2
+        self._last_s, self._alike = last_s, self._alike + 1 if alike else 0
+        return self._alike >= count > 0
+
+    def _look_at(self, time_s: Array) -> None:
+        """Work out the weights of a window, unless it is as even as the one before, and by the same step."""
         steps = time_s[1:] - time_s[:-1]
         step = float(time_s[-1] - time_s[0]) / len(steps)
         tolerance = EVEN * step
@@ -107,8 +127,7 @@ class Derivatives:
         even = steps.dot(steps) < tolerance * tolerance
         if not (even and self._count == len(time_s) and abs(step - self._step) < tolerance):
             self._count, self._step = (len(time_s), step) if even else (0, 0.0)
+            self._alike = 0
             self.weights = weights(time_s)
             slope = self.weights[2]
             self.slope_gain = float(slope.dot(slope)) ** 0.5
-        velocity_m_per_s, acceleration_m_per_s2, slope_m_per_s = self.weights.dot(position_m).tolist()
-        return velocity_m_per_s, acceleration_m_per_s2, slope_m_per_s

@@ -27,6 +27,7 @@ class SampleWindow:
         self._sized = False
         self._data = np.zeros((COLUMNS, _TURNS * SHORTEST))
         self._end = self._count = 0
+        self._last_s = np.nan
 
     def _size(self) -> None:
         period_s = float(np.median(np.diff(self.time_s)))
@@ -41,25 +42,28 @@ class SampleWindow:
             kept = self.length - 1
             self._data[:, :kept] = self._data[:, -kept:]
             self._end = kept
-        self._data[:, self._end] = (time_s, position_m, pressure_pa, np.nan, np.nan)
-        self._end += 1
+        data, end = self._data, self._end  # value by value: a row at once costs twice as much
+        data[0, end], data[1, end], data[2, end] = time_s, position_m, pressure_pa
+        data[3, end] = data[4, end] = np.nan
+        self._end, self._last_s = end + 1, time_s
         self._count = min(self._count + 1, self.length)
         if self._count == SHORTEST and not self._sized:
             self._size()
 
     def set_derivatives(self, velocity_m_per_s: float, acceleration_m_per_s2: float) -> None:
         """Note the derivatives at the latest sample."""
-        self._data[3:, self._end - 1] = (velocity_m_per_s, acceleration_m_per_s2)
+        data, last = self._data, self._end - 1
+        data[3, last], data[4, last] = velocity_m_per_s, acceleration_m_per_s2
 
     def breaks(self, time_s: float) -> bool:
         """Whether a sample cannot follow: its clock did not advance, or a whole record of samples is missing."""
         if not self._count:
             return False
-        times = self.time_s
-        step = time_s - float(times[-1])
+        step = time_s - self._last_s
         if step <= 0 or self._count == 1:
             return step <= 0
-        return step > self.length * float(times[-1] - times[0]) / (self._count - 1)
+        held_s = self._last_s - float(self._data[0, self._end - self._count])
+        return step > self.length * held_s / (self._count - 1)
 
     @property
     def full(self) -> bool:

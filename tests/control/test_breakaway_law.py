@@ -13,7 +13,8 @@ from config.daemon_file import DaemonFile
 from config.quantities import DeviceStatus
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
-from positioner.control.controller import Controller, Decision
+from positioner.control.controller import Controller
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings

@@ -8,7 +8,8 @@ import pytest
 from config.codes import Fault, InhibitReason, Mode, Quality, State
 from config.daemon_file import DaemonFile
 from config.quantities import DeviceStatus
-from positioner.control.controller import Controller, Decision
+from positioner.control.controller import Controller
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings

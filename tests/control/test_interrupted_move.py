@@ -13,7 +13,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from drivers.boundary import NoReply, Reading
 from drivers.in_memory import MemoryDriver
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.daemon.cycle import Cycle
 from positioner.virtual.virtual_cycle import identified, lockstep_cycle

@@ -13,7 +13,7 @@ from config.codes import Mode, Refusal
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.estimation.batch import BatchResult
 from positioner.estimation.refiner import InProcessRefiner

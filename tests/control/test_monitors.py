@@ -8,7 +8,7 @@ from config.codes import Fault, Mode, Quality
 from config.daemon_file import DaemonFile
 from config.errors import InputError
 from config.loading import validated
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from tests.control.test_controller import LAW, STROKE_M, Bench, automatic
 
 Finds = Callable[[Bench], Decision]

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from config.codes import ExperimentState, Fault, Mode, Quality, State
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import ExperimentRequest
 from positioner.estimation.acceptance import Applied
 from positioner.estimation.landings.landing_detector import SlideOutcome

@@ -10,7 +10,7 @@ from config.daemon_file import DaemonFile
 from config.extended_valve import ExtendedValve
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.control.settings import Settings
 from positioner.control.valve_knowledge import ValveKnowledge

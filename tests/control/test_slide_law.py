@@ -10,7 +10,7 @@ from config.codes import Fault, InhibitReason, Mode, State
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.slide_law import Balance, step
 from positioner.control.slide_margins import Margin, Margins

@@ -9,7 +9,7 @@ from config.codes import Fault, Mode, Quality
 from config.quantities import DeviceStatus
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
-from positioner.control.supervision import Limits, SupervisionMemory, supervise
+from positioner.control.supervision import Limits, SupervisionMemory, supervise, usable
 
 LIMITS = Limits(
     stroke_m=0.1,
@@ -34,7 +34,7 @@ def watched(
     """Return the watch after each sample."""
     watches = [memory or SupervisionMemory()]
     for sample in samples:
-        watches.append(supervise(watches[-1], sample, 50e3, requests, LIMITS))
+        watches.append(supervise(watches[-1], sample, 50e3, requests, LIMITS, good=usable(sample, LIMITS)))
     return watches[1:]
 
 
@@ -103,12 +103,12 @@ def test_a_measurement_that_is_no_number_is_implausible() -> None:
 
 def after_a_new_command(lost: int) -> Fault:
     """Return the fault after replies were lost from a new command on, and the device comes back with the one before."""
-    memory = supervise(SupervisionMemory(), good(0.0), 50e3, AUTOMATIC, LIMITS)
+    memory = supervise(SupervisionMemory(), good(0.0), 50e3, AUTOMATIC, LIMITS, good=True)
     for n in range(1, lost + 1):
         lost_reply = replace(good(0.0), now_s=PERIOD_S * n, quality=Quality.LOST)
-        memory = supervise(memory, lost_reply, 60e3, AUTOMATIC, LIMITS)
+        memory = supervise(memory, lost_reply, 60e3, AUTOMATIC, LIMITS, good=False)
     back = replace(good(PERIOD_S * (lost + 1)), held_pa=50e3)
-    return supervise(memory, back, 60e3, AUTOMATIC, LIMITS).fault
+    return supervise(memory, back, 60e3, AUTOMATIC, LIMITS, good=True).fault
 
 
 def test_a_device_that_has_not_got_the_last_command_was_not_restarted() -> None:

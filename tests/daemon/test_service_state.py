@@ -8,7 +8,7 @@ from config.codes import Mode, Quality, ServiceState
 from config.daemon_file import DaemonFile
 from config.quantities import DeviceStatus
 from docs.code_tables import STATES_BEGIN, STATES_END
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.settings import Settings
 from positioner.daemon.ending import Endings
 from positioner.daemon.service_state import ServiceEvent, after_event, service_state, table

@@ -77,6 +77,19 @@ def test_weights_follow_the_grid() -> None:
         assert acceleration == pytest.approx(6.0, rel=1e-4)
 
 
+def test_a_window_that_moves_on_has_the_weights_of_its_own_samples() -> None:
+    steps = np.full(400, 1e-3)
+    steps[150], steps[260] = 1.3e-3, 1.0004e-3
+    steps[300:] *= np.linspace(1.0, 1.001, 100)
+    t = np.cumsum(steps)
+    x = RNG.normal(size=len(t))
+    derivatives = Derivatives()
+    for last in range(51, len(t)):
+        window = slice(last - 51, last)
+        expected = weights(t[window]) @ x[window]
+        assert derivatives.estimate(t[window], x[window]) == pytest.approx(expected.tolist(), rel=1e-3, abs=1e-3)
+
+
 def jerk(t: Array) -> Array:
     """A motion of one sign that begins with a jerk and goes on slowly."""
     after = np.maximum(t - 0.02, 0.0)

@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from config.codes import Ne107Status
 from config.errors import InputError
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.daemon.health.health_file import HealthRecord, read_record, write_record
 from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, State
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.daemon.health.valve_health import Health
 
 CLASS = {

@@ -14,7 +14,7 @@ from math import isfinite, nan
 from config.codes import Mode, Ne107Cause, Ne107Status, Quality, State
 from config.daemon_file import HealthTable
 from config.supervision_table import Monitor, SupervisionTable
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.daemon.health.health_file import HealthRecord

@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from config.codes import Restored
 from config.errors import InputError
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.memory.conditions import Conditions

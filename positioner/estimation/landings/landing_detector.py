@@ -88,6 +88,8 @@ class LandingDetector:
 
     def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None) -> None:
         self._stroke_m, self._finest_m = stroke_m, FINEST_QUANTUM * stroke_m
+        self._finer_m = 2 * self._finest_m
+        """A divisor of a quantum below this would be finer than the finest."""
         low_m, high_m = stops_m if stops_m is not None else (0.0, stroke_m)
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
@@ -113,7 +115,8 @@ class LandingDetector:
         return PATIENCE * (max(longest_s, slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S)
 
     def _visible_m(self, rest: Rest) -> float:
-        return max(VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m)
+        noise_m, least_m = VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m
+        return noise_m if noise_m > least_m else least_m
 
     def update(
         self, time_s: float, position_m: float, command_pa: float, pressure_pa: float, *, arrived: bool = True
@@ -122,7 +125,8 @@ class LandingDetector:
 
         A change counts from when its pressure has arrived, where somebody knows that.
         """
-        self._learn_quantum(position_m)
+        if not 0.0 < self.quantum_m < self._finer_m:
+            self._learn_quantum(position_m)
         if command_pa != self._level_pa:
             self._change_level(time_s, command_pa)
         if self._running_on:
@@ -133,9 +137,9 @@ class LandingDetector:
             self._window.restart(time_s)
         if self.rest is None or self.rest.count < ENOUGH:
             self._window.add(time_s, position_m, pressure_pa)
-        rest = self._window.rest
-        if self.rest is not None:
-            self._watch(time_s, position_m, self.rest)
+        rest, known = self._window.rest, self.rest
+        if known is not None:
+            self._watch(time_s, position_m, known)
             if self.rest is not None and rest is not None:
                 self.rest = rest
             return None
@@ -150,8 +154,6 @@ class LandingDetector:
         return outcome
 
     def _learn_quantum(self, position_m: float) -> None:
-        if 0.0 < self.quantum_m < 2 * self._finest_m:  # a divisor of it would be finer than the finest
-            return
         step_m = abs(position_m - self._position_m)
         if step_m > SAME * self._stroke_m:
             divisor_m = _common_divisor(step_m, self.quantum_m, self._finest_m)
@@ -177,8 +179,10 @@ class LandingDetector:
 
     def _watch(self, time_s: float, position_m: float, rest: Rest) -> None:
         """Find a stem that moves: later than was waited for, or moved by something else than the command."""
-        off_m = abs(position_m - rest.position_m)
-        self._away = self._away + 1 if off_m > self._visible_m(rest) else 0
+        if abs(position_m - rest.position_m) <= self._visible_m(rest):
+            self._away = 0
+            return
+        self._away += 1
         if self._away < DISTURBED:
             return
         self.rest = None

@@ -16,6 +16,7 @@ the creep it is waited for longer: a creep from A down to the tolerance goes on 
 A measured pressure has to rest, too.
 """
 
+from array import array
 from dataclasses import dataclass
 from math import log, sqrt
 
@@ -68,40 +69,50 @@ class RestWindow:
 
     def __init__(self, stroke_m: float) -> None:
         self._tolerance_m = TOLERANCE * stroke_m
-        self._rows = np.empty((MOST, 3))
         self.quantum_m = 0.0
         self._variance_m2: float | None = None
         self.restart(0.0)
 
     def restart(self, time_s: float) -> None:
         """Begin anew: the pressure is changed now."""
-        self._count, self._each, self._in_row = 0, 1, 0
+        self._each, self._in_row = 1, 0
         self._sums = (0.0, 0.0, 0.0)
+        # Rows by columns: to append to these costs a tenth of a row of a matrix.
+        self._times_s, self._positions_m, self._pressures_pa = array("d"), array("d"), array("d")
         self._start_s = time_s
         self._look_s = time_s
         self.rest: Rest | None = None
 
     def add(self, time_s: float, position_m: float, pressure_pa: float) -> None:
         """Take a sample; a pressure that is not measured is NaN."""
-        times_s, positions_m, pressures_pa = self._sums
-        times_s, positions_m = times_s + time_s - self._start_s, positions_m + position_m
-        pressures_pa += pressure_pa
-        self._in_row += 1
-        if self._in_row < self._each:
-            self._sums = (times_s, positions_m, pressures_pa)
+        if self._each == 1:
+            self._append(time_s - self._start_s, position_m, pressure_pa)
         else:
-            each = self._each
-            self._rows[self._count] = (times_s / each, positions_m / each, pressures_pa / each)
-            self._count += 1
-            self._in_row = 0
-            self._sums = (0.0, 0.0, 0.0)
-        if self._count == MOST:
-            self._rows[: MOST // 2] = 0.5 * (self._rows[::2] + self._rows[1::2])
-            self._count //= 2
-            self._each *= 2
-        if time_s >= self._look_s and self._count >= 2 * FEWEST:
+            self._add_up(time_s - self._start_s, position_m, pressure_pa)
+        if time_s >= self._look_s and len(self._times_s) >= 2 * FEWEST:
             self._look_s = self._start_s + LOOKED_AGAIN * (time_s - self._start_s)
             self.rest = self._rest()
+
+    def _append(self, after_s: float, position_m: float, pressure_pa: float) -> None:
+        """Add a row; when they are full, each becomes the mean of two."""
+        self._times_s.append(after_s)
+        self._positions_m.append(position_m)
+        self._pressures_pa.append(pressure_pa)
+        if len(self._times_s) == MOST:
+            self._times_s, self._positions_m, self._pressures_pa = (
+                _of_pairs(each) for each in (self._times_s, self._positions_m, self._pressures_pa)
+            )
+            self._each *= 2
+
+    def _add_up(self, after_s: float, position_m: float, pressure_pa: float) -> None:
+        """Add a sample to those of its row."""
+        each, (times_s, positions_m, pressures_pa) = self._each, self._sums
+        self._sums = (times_s + after_s, positions_m + position_m, pressures_pa + pressure_pa)
+        self._in_row += 1
+        if self._in_row == each:
+            times_s, positions_m, pressures_pa = self._sums
+            self._append(times_s / each, positions_m / each, pressures_pa / each)
+            self._in_row, self._sums = 0, (0.0, 0.0, 0.0)
 
     def look_again(self, time_s: float) -> None:
         """Look at the next sample: the stem has left its rest."""
@@ -119,7 +130,9 @@ class RestWindow:
         return near_s * (1.0 + min(hidden, LONGEST_HIDDEN))
 
     def _rest(self) -> Rest | None:
-        time_s, position_m, pressure_pa = self._rows[: self._count].T
+        time_s, position_m, pressure_pa = (
+            np.array(each) for each in (self._times_s, self._positions_m, self._pressures_pa)
+        )
         half = int(np.searchsorted(time_s, 0.5 * time_s[-1]))
         late_m = position_m[half:]
         if late_m.size < FEWEST:
@@ -145,6 +158,12 @@ class RestWindow:
             count=late_m.size * self._each,
             came_to_rest_s=float(time_s[first]) if first else 0.0,
         )
+
+
+def _of_pairs(values: "array[float]") -> "array[float]":
+    """Return the means of every two values."""
+    even, odd = np.array(values[::2]), np.array(values[1::2])
+    return array("d", (0.5 * (even + odd)).tobytes())
 
 
 def _noise(values: Array) -> float:

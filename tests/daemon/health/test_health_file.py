@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from config.errors import InputError
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
 from positioner.daemon.health.health_file import read_record, write_record
 

@@ -11,7 +11,7 @@ import pytest
 from config.codes import Restored
 from config.daemon_file import DaemonFile
 from config.errors import InputError
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.control.restoration import Restoration
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.memory import MemoryKeeper, StoredMemory

@@ -1,0 +1,72 @@
+"""What the controller remembers from one step to the next, and what one step decides."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from config.codes import Fault, InhibitReason, Mode, State
+from positioner.control.excitation import ActiveExcitation
+from positioner.control.law_memory import LawMemory
+from positioner.control.monitors import MonitorMemory
+from positioner.control.played_experiment import PlayedExperiment
+from positioner.control.pressure_path import PathMemory
+from positioner.control.reference import Reference
+from positioner.control.restoration import Restoration
+from positioner.control.supervision import SupervisionMemory
+from positioner.estimation.acceptance import Applied
+from positioner.estimation.estimates import Estimates
+from positioner.estimation.landings.static_law import StaticLaw
+
+
+@dataclass(frozen=True, slots=True)
+class ConsumedRequests:
+    """Counts of the writes whose mode was left since: a reference or a manual pressure does not come back by itself."""
+
+    reference_writes: int = 0
+    manual_writes: int = 0
+
+
+class ControllerMemory(NamedTuple):
+    """What the controller remembers from one step to the next; a tuple, for it is made anew in each."""
+
+    command_pa: float
+    """The last command given, ..."""
+    wanted_pa: float
+    """... and the pressure that it shall bring about: another, where it leads against a lag."""
+    held_pa: float
+    """What S0 holds, and what it gets back after S3."""
+    supervision: SupervisionMemory
+    monitoring: MonitorMemory
+    reference: Reference
+    applied: Applied
+    consumed: ConsumedRequests
+    state: State
+    excitation: ActiveExcitation | None
+    experiment: PlayedExperiment
+    identifying: bool
+    law: LawMemory | None
+    """None: a law without a memory."""
+    path: PathMemory | None
+    """None: nothing is known of a pressure that arrives late."""
+    restoration: Restoration
+
+
+class Decision(NamedTuple):
+    """What one step decided, for the wire, the registers and the recorder."""
+
+    command_pa: float
+    state: State
+    mode: Mode
+    fault: Fault
+    inhibit_reason: InhibitReason
+    reference_m: float
+    delta_r_m: float
+    sample_age_s: float
+    estimates: Estimates
+    applied: Applied
+    static_law: StaticLaw
+    restoration: Restoration
+    experiment: PlayedExperiment
+    alarms: tuple[Fault, ...] = ()
+    """Monitors whose condition holds for their delay, be they alarms or faults."""
+    measured: bool = True
+    """Whether there was a good measurement since the start."""
