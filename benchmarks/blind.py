@@ -37,13 +37,13 @@ from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.equivalence import algebraic_class
 
 SEEDS: Mapping[str, range] = {
-    "clean": range(36100, 36180),
-    "dirty": range(37100, 37220),
-    "nothing": range(38100, 38220),
-    "two": range(39000, 39006),
-    "removed": range(39100, 39112),
-    "others": range(2620, 2632),
-    "outside": range(2740, 2752),
+    "clean": range(71000, 71020),
+    "dirty": range(72000, 72020),
+    "nothing": range(73000, 73010),
+    "two": range(74000, 74010),
+    "removed": range(75000, 75008),
+    "others": range(2660, 2672),
+    "outside": range(2780, 2792),
 }
 """Nobody has looked at a case before the rules stood; of earlier seeds, see docs/blind.md."""
 APART = 100

@@ -9,6 +9,12 @@ stays below c_k^2, its 99.5 % quantile; motion scatters by more, by anything. He
     sum (x_i+1 - x_i)^2 / 2 n = S^2                   white, within 20 %: what goes on moving is not,
     sum (x_i+1 - 2 x_i + x_i-1)^2 / 6 n = S^2         nor is what wanders
     corr(x, u) < 0.3                                  in the windows, for a drive u that it may follow
+    less than a fifth of them below c_10 σ            the 10 % quantile: no quieter noise is mixed with this one
+
+The last tells a stem at rest from one that goes evenly through a rounding that lies before the noise: q/√12 in motion
+and nothing at rest, it is white and hangs on no drive, and the noise of both together is that of neither. Where the end
+of the quieter noise is then not seen, for the other begins at twice it, both its ends must be those of chi^2 in windows
+of 8 samples and more: no more than a fifth of them above c_90 σ either.
 
 No window in which the stem is seen to move counts, whatever the sampling. Where no scale passes (fewer than 20 degrees
 of freedom, motion from sample to sample throughout) the noise is unknown, which is None and not 0. Of widths that pass,
@@ -26,12 +32,14 @@ at once, measures by third differences d_k = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-
 
 from dataclasses import dataclass
 from math import log, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 VARIANCE = 20.0
 """Of the third difference of white noise of variance 1."""
@@ -49,7 +57,11 @@ ALIKE = 1.25
 """Ratio of the noises that two widths find, up to which they are one."""
 AS_MANY = 0.5
 """Of the samples that another width finds: as many are enough."""
-NORMAL_995 = 2.576
+NORMAL_10, NORMAL_90, NORMAL_995 = -1.2816, 1.2816, 2.576
+TENTH, MOST_OF_TENTH = 0.1, 0.2
+"""Share of the windows beyond a 10 % quantile of chi^2; the largest, before chance, that still is one."""
+ENOUGH_FOR_ENDS = 15.0
+"""Independent windows that show both ends."""
 NEXT, GAP, GROWS = 1.05, 2.0, 1.2
 """Ratio of one scale tried to the next; a scale above the noise's, up to which the rms may grow by so much."""
 BEYOND = 1.25
@@ -87,9 +99,21 @@ class _Windows:
 
     @property
     def limit(self) -> float:
-        """c_k: what 99.5 % of the scatters of noise of 1 stay below (Wilson and Hilferty)."""
+        """c_k: what 99.5 % of the scatters of noise of 1 stay below."""
+        return self.quantile(NORMAL_995)
+
+    def quantile(self, normal: float) -> float:
+        """Return the quantile of the scatters of noise of 1 where a normal variable has its own (Wilson, Hilferty)."""
         third = 2.0 / (9.0 * self.freedom)
-        return float((1.0 - third + NORMAL_995 * sqrt(third)) ** 1.5)
+        return float((1.0 - third + normal * sqrt(third)) ** 1.5)
+
+
+class _Told(NamedTuple):
+    """σ, m, by windows of one width, and the share of them that tell it; mixed: of two noises, and that of neither."""
+
+    noise_m: float
+    share: float
+    mixed: bool = False
 
 
 def noise_by_median(differences: Array) -> Array:
@@ -117,14 +141,14 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
     told = [_of_width(position_m, drive_pa, width) for width in WIDTHS]
     # Where a long window rests so do the shorter ones in it.
     longest = next((i + 1 for i in range(WIDTHS.index(STRAIGHT), -1, -1) if told[i] is None), 0)
-    found = [each for each in told[longest:] if each]
+    found = [each for each in told[longest:] if each and not each.mixed]
     if not found:
         return None
     # Motion only adds: what another width finds far above the least is motion that looks like noise.
-    least_m = min(noise_m for noise_m, _ in found)
-    found = [(noise_m, share) for noise_m, share in found if noise_m <= ALIKE * least_m]
-    most = max(share for _, share in found)
-    noise_m = next(noise_m for noise_m, share in found if share >= AS_MANY * most)
+    least_m = min(each.noise_m for each in found)
+    found = [each for each in found if each.noise_m <= ALIKE * least_m]
+    most = max(each.share for each in found)
+    noise_m = next(each.noise_m for each in found if each.share >= AS_MANY * most)
     if noise_m == 0.0 and np.unique(position_m[np.isfinite(position_m)]).size <= FEW_STEPS:
         return None  # a stem that hardly moves, in numbers that are rounded who knows how
     if drive_pa is None and np.nanmax(position_m) - np.nanmin(position_m) < ALL_NOISE * noise_m:
@@ -168,8 +192,8 @@ def _grid(steps: Array, quantum: float, enough: float) -> float:
     return quantum if part.size >= enough else 0.0
 
 
-def _of_width(position_m: Array, drive_pa: Array | None, width: int) -> tuple[float, float] | None:
-    """Return σ, m, by windows of one width, and the share of them that tell it; None where it is not told."""
+def _of_width(position_m: Array, drive_pa: Array | None, width: int) -> _Told | None:
+    """Return what windows of one width tell; None where they tell nothing."""
     windows = _windows(position_m, drive_pa, width)
     if windows is None:
         return None
@@ -181,18 +205,31 @@ def _of_width(position_m: Array, drive_pa: Array | None, width: int) -> tuple[fl
         return None
     least, most = float(s[fewest - 1]), float(s[-1])
     if least == 0.0:
-        return 0.0, float(np.mean(s == 0.0))
+        return _Told(0.0, float(np.mean(s == 0.0)))
     scales = least / limit * NEXT ** np.arange(int(log(most / least) / log(NEXT)) + 2 + int(log(limit) / log(NEXT)))
     counts = np.searchsorted(s, limit * scales, side="right")
-    grown = rms[np.searchsorted(s, GAP * limit * scales, side="right") - 1]
-    passing = (counts >= fewest) & (rms[counts - 1] <= scales) & (grown <= GROWS * rms[counts - 1])
-    if not passing.any():
-        return None
-    first = int(passing.argmax())
-    count = int(np.searchsorted(s, BEYOND * limit * scales[first], side="right"))
-    noise_m = float(rms[count - 1])
-    still = _is_white(windows.left[:count], noise_m, each) and not _follows(windows, count, each)
-    return (noise_m, count / s.size) if still else None
+    found_m = rms[counts - 1]
+    itself = (counts >= fewest) & (found_m <= scales)
+    quiet, loud = _ends(windows, found_m, counts)
+    ends = itself & ~quiet & ~loud & (windows.share * counts >= ENOUGH_FOR_ENDS) & (width >= STRAIGHT)
+    ended = itself & (rms[np.searchsorted(s, GAP * limit * scales, side="right") - 1] <= GROWS * found_m)
+    for passing in (ends | (ended & ~quiet), ended):
+        if passing.any():
+            first = int(passing.argmax())
+            count = int(np.searchsorted(s, (BEYOND if ended[first] else 1.0) * limit * scales[first], side="right"))
+            noise_m = float(rms[count - 1])
+            if _is_white(windows.left[:count], noise_m, each) and not _follows(windows, count, each):
+                return _Told(noise_m, count / s.size, bool(quiet[first]))
+    return None
+
+
+def _ends(windows: _Windows, noise_m: Array, counts: npt.NDArray[np.intp]) -> tuple[Mask, Mask]:
+    """Return whether too many of the first windows, as many as counts, scatter too little, or too much, for a noise."""
+    s = windows.scatter
+    most = MOST_OF_TENTH + 3.0 * np.sqrt(TENTH * (1.0 - TENTH) / np.maximum(windows.share * counts, 1.0))
+    below = np.searchsorted(s, windows.quantile(NORMAL_10) * noise_m)
+    above = counts - np.searchsorted(s, windows.quantile(NORMAL_90) * noise_m)
+    return below > most * counts, above > most * counts
 
 
 def _windows(position_m: Array, drive_pa: Array | None, width: int) -> _Windows | None:

@@ -1,5 +1,7 @@
 """The noise and the quantum of positions, on made-up samples."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,17 @@ def test_rounding_is_part_of_the_noise(white: float) -> None:
     seen = steps(25, 2000) + np.random.default_rng(5).normal(0.0, white * quantum, 2000)
     rounded = np.round(seen / quantum) * quantum
     assert position_noise_m(rounded) == pytest.approx(quantum * (white**2 + 1 / 12) ** 0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("quanta", [0.1, 0.2])
+def test_a_rounding_that_lies_before_the_noise_is_no_noise(quanta: float) -> None:
+    """Ramps of 60 and rests of 40 samples: a sensor rounds, and the wire adds white noise."""
+    targets = np.random.default_rng(2).uniform(0.0, 0.1, 31)
+    legs = [np.concatenate([np.linspace(begin, end, 60), np.full(40, end)]) for begin, end in pairwise(targets)]
+    quantum = 3e-4
+    rounded = np.round(np.concatenate(legs) / quantum) * quantum
+    white = quanta * quantum * np.random.default_rng(5).standard_normal(rounded.size)
+    assert position_noise_m(rounded + white) == pytest.approx(quanta * quantum, rel=0.1)
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 15])

@@ -2,8 +2,9 @@
 
 The noise is found at rest (`config.noise`), never in motion. A record whose command repeats after a lag L shows the
 position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2; and where nothing rests, what rests in the difference of
-the two tells the noise. Where neither does, it is what the recording says of itself (`# noise_m: 5e-5`, or the option
-`--noise-m`), or it is unknown.
+the two tells the noise. What repeats is no noise, but for the last rounding, q: noise^2 <= repeatability^2 + q^2 / 12.
+Where nothing tells it, it is what the recording says of itself (`# noise_m: 5e-5`, or the option `--noise-m`), or it is
+unknown.
 """
 
 from dataclasses import replace
@@ -71,6 +72,19 @@ def noise_std_m(position_m: Column, command_pa: Column) -> float | None:
     if noise_m is None and (lag := repeat_lag(command_pa)):
         return position_noise_m((position_m[lag:] - position_m[:-lag]) / 2.0**0.5, command_pa[lag:])
     return noise_m
+
+
+def not_repeating_m(noise_m: float | None, repeated_m: float | None, rounded_to_m: float) -> float | None:
+    """Return the noise, m, no more than what does not repeat itself allows.
+
+    Args:
+        noise_m: as found, m; None: unknown.
+        repeated_m: the repeatability, m; None: no command repeats.
+        rounded_to_m: step of the readings, m; rounding hides from a repetition, and is what a reading is off by.
+    """
+    if noise_m is None or repeated_m is None:
+        return noise_m
+    return min(noise_m, float(np.hypot(repeated_m, rounded_to_m / 12.0**0.5)))
 
 
 def repeat_lag(command_pa: Column) -> int | None:

@@ -20,7 +20,7 @@ from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED,
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.motion import rests_first, slips
-from workbench.data.noise_floor import UNKNOWN, noise_std_m, repeatability_m, said_noise_m
+from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 
 GAP = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
@@ -115,11 +115,11 @@ def ready(recording: Recording) -> Record:
     time_s = columns["time_s"]
     seen_m = np.where(valid, position_m, np.nan)
     longest = slice(*max(segments, key=lambda each: each[1] - each[0]))
-    noise_m = said_noise_m(recording)
-    if noise_m is None:
-        noise_m = noise_std_m(seen_m[longest], command_pa[longest])
     repeated_m = repeatability_m(command_pa[longest], seen_m[longest]) if _is_even(time_s[longest]) else None
     quantum = quantum_m(position_m[valid])
+    noise_m = said_noise_m(recording)
+    if noise_m is None:
+        noise_m = not_repeating_m(noise_std_m(seen_m[longest], command_pa[longest]), repeated_m, quantum)
     if quantum:
         notes.append(f"position_m is rounded to {quantum:.3g} m")
     if noise_m is None and repeated_m is None:
