@@ -1,6 +1,6 @@
 """What an extended valve is worth to the law of slides: each effect of the library, with and without its inverse.
 
-    python -m benchmarks.extended_valve [--steps 100] [--period-s 0.02] [--step-s 1.0] [--seed 0] [--effects NAME...]
+    python -m benchmarks.extended_valve [--steps 100] [--period-s 0.02] [--step-s 2.0] [--seed 0] [--effects NAME...]
 
 The seed's valve with one effect more, at the strength in the middle of those that it declares (a weaker one, where
 that would not let the stem make the steps). Its position comes with noise of 1e-4 of the stroke; commands come into
@@ -183,7 +183,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=100)
     parser.add_argument("--period-s", type=float, default=0.02)
-    parser.add_argument("--step-s", type=float, default=1.0)
+    parser.add_argument("--step-s", type=float, default=2.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--effects", nargs="+", choices=first_effects(), default=first_effects(), metavar="NAME")
     arguments = parser.parse_args()

@@ -109,6 +109,7 @@ class InhibitReason(Code):
     EXCURSION_WAITS = 12, "a small move waits, for the last excursion was too recent"
     STAIRCASE_IN_VAIN = 13, "the staircase of slides gave no static law (see its reason)"
     EXCURSION_BUDGET_SPENT = 14, "a small move waits, for the day's travel of the packing is spent"
+    REFERENCE_COMES = 15, "a small move waits, for references keep coming that may take it back"
     RESTORED_WAITS = 17, "a reference waits until the stem rests, for what was restored is provisional"
     RESTORED_CONTRADICTED = 18, "the first landings contradict what was restored: identify the valve"
 

@@ -18,6 +18,8 @@ M = max(1.02 m_s, m_-s + abs(e)), where the first would leave the travel or the 
 depend on the period of the loop, not where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest.
+While references keep coming, one slide lands ahead of a ramp, and two are given only for an error that the coming ones
+do not take back (reference_course.py).
 Why there is no limit cycle: what a slide missed corrects B for the next (each miss is a fraction of the one before),
 the dead band widens from slide to slide, and their number is limited. After the end of a move nothing happens until the
 reference changes, or something else has visibly moved the stem.
@@ -143,6 +145,7 @@ def step(
         memory = _first_margins(memory, balance, settings)
     if observation.outcome is not None:
         memory = _learnt(memory, observation.outcome, observation.quantum_m, balance, settings)
+    memory = replace(memory, course=memory.course.after(observation.now_s, reference_m))
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
         memory = replace(memory, anchor=Anchor(observation.position_m, memory.direction))
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
@@ -158,7 +161,7 @@ def step(
 
 def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: float, settings: SlideSettings) -> bool:
     """Whether the first of two slides has done its work: then the stem need not rest there."""
-    if not memory.excursion or reference_m != memory.target_m or isnan(memory.last_m):
+    if not memory.excursion or isnan(memory.last_m):
         return False
     s, slow_m = memory.direction, SLOW * settings.stroke_m + observation.quantum_m
     beyond_m = min(s * (each - reference_m) for each in (observation.position_m, memory.last_m))
@@ -265,9 +268,26 @@ def _next_slide(
     s = 1 if error_m > 0 else -1
     anchor = memory.anchor.at(rest.position_m, settings.stroke_m)
     memory = replace(memory, anchor=anchor)
-    if s * (target_m - anchor.position_m) >= _way_m(memory, memory.margin(s), settings):
-        return _slide(memory, observation.now_s, target_m, s, balance, settings, excursion=False)
+    way_m = _way_m(memory, memory.margin(s), settings)
+    to_m = target_m + _lead_m(memory, observation.now_s, s, way_m, balance, settings)
+    if s * (to_m - anchor.position_m) >= way_m:
+        return _slide(memory, observation.now_s, to_m, s, balance, settings, excursion=False)
+    if memory.course.takes_back(observation.now_s, error_m, way_m):
+        return replace(memory, inhibit_reason=InhibitReason.REFERENCE_COMES)
     return _excursion(memory, observation, balance, settings)
+
+
+def _lead_m(
+    memory: SlideMemory, now_s: float, direction: int, way_m: float, balance: Balance, settings: SlideSettings
+) -> float:
+    """Return how far ahead of a ramp to land, m, where the site's bounds let it."""
+    lead_m = memory.course.lead_m(now_s, way_m)
+    assert memory.target_m is not None
+    to_m = memory.target_m + lead_m
+    allowed = direction * lead_m > 0.0 and abs(lead_m) <= settings.excursion_limit_m and 0.0 <= to_m <= settings.stroke_m
+    if not allowed or not settings.minimum_pa <= balance.pressure_pa(to_m, direction) <= settings.maximum_pa:
+        return 0.0
+    return lead_m
 
 
 def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:

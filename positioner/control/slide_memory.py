@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import inf, nan
 
 from config.codes import InhibitReason
+from positioner.control.reference_course import ReferenceCourse
 from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
@@ -57,7 +58,7 @@ class Anchor:
         return self if abs(rest_m - self.position_m) <= CREEP * stroke_m else Anchor(rest_m)
 
 
-NOWHERE = Anchor()
+NOWHERE, NO_COURSE = Anchor(), ReferenceCourse()
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,8 @@ class SlideMemory:
     level_pa: float = 0.0
     target_m: float | None = None
     """None while another state commands."""
+    course: ReferenceCourse = NO_COURSE
+    """Of the references until now."""
     direction: int = 0
     """Of the slide in progress."""
     excursion: bool = False

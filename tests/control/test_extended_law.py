@@ -13,7 +13,7 @@ from sim.composition import Composition
 from sim.static_inverse import extended_valve
 from tests.sim.library import EFFECTS, SEED, library, theta_with
 
-COURSE = Course(steps=15, period_s=0.02, step_s=1.0, seed=0)
+COURSE = Course(steps=15, period_s=0.02, step_s=1.3, seed=0)
 
 
 def switched_on(name: str) -> tuple[Composition, ExtendedValve]:

@@ -1,0 +1,92 @@
+"""How the reference comes: does it rest, or will the next one take back what would be corrected now?
+
+A DCS's controller, a ramp or a filter writes a new reference at each of its scans, Δ s. Of such a run of changes
+d_1, d_2, ... (the latest first; each at most `SCAN_S` after the one before) is known
+
+    Δ = the longest of the last intervals,   D = mean abs(d_i),   s_r = the sign of the last three d_i, 0 if they differ
+
+and the reference has come to rest when it has stood for 1.5 Δ. Until then, of an error e = r - x:
+
+    abs(e) <= 3 D                      left alone: the next references may take it back
+    e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
+    else                               corrected as if the reference rested
+
+A ramp that is followed by slides of a way m, for none shorter breaks the stem loose, leaves a sawtooth. Slides that land
+at the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
+
+    -m/2 to m/2,   rms m/sqrt(12)      lead = min(m/2, N D)
+
+with the same travel: no stem that can only be moved by m comes nearer. N D bounds the lead to where N references take it.
+"""
+
+from dataclasses import dataclass
+from math import inf, nan
+
+SCAN_S = 1.2
+"""A DCS writes at least so often, or it writes steps."""
+KEPT = 6
+"""Changes."""
+OVERDUE = 1.5
+"""Intervals: then no further one comes."""
+TAKEN_BACK = 3.0
+"""D: a stem so far off is not met by chance."""
+COMING = 8
+"""N"""
+A_TREND = 3
+"""Changes in one direction."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceCourse:
+    """The last changes of the reference, m, and the intervals between them, s; the latest first."""
+
+    value_m: float = nan
+    changed_s: float = -inf
+    changes_m: tuple[float, ...] = ()
+    intervals_s: tuple[float, ...] = ()
+
+    def after(self, now_s: float, reference_m: float) -> "ReferenceCourse":
+        """Return the course with a reference, m, that is in force now; one after a long rest begins a new run."""
+        if reference_m == self.value_m:
+            return self
+        interval_s = now_s - self.changed_s
+        if not interval_s <= SCAN_S:
+            return ReferenceCourse(reference_m, now_s)
+        return ReferenceCourse(
+            reference_m,
+            now_s,
+            (reference_m - self.value_m, *self.changes_m)[:KEPT],
+            (interval_s, *self.intervals_s)[:KEPT],
+        )
+
+    def rests(self, now_s: float) -> bool:
+        """Whether no next reference is to be waited for."""
+        return not self.intervals_s or now_s - self.changed_s > OVERDUE * max(self.intervals_s)
+
+    @property
+    def change_m(self) -> float:
+        """D, m: what a change is on average; 0 of a reference that came after a rest."""
+        return sum(abs(each) for each in self.changes_m) / len(self.changes_m) if self.changes_m else 0.0
+
+    @property
+    def trend(self) -> int:
+        """s_r: +1 or -1 while it goes on in one direction."""
+        last_m = self.changes_m[:A_TREND]
+        if len(last_m) < A_TREND:
+            return 0
+        return 1 if min(last_m) > 0.0 else -1 if max(last_m) < 0.0 else 0
+
+    def lead_m(self, now_s: float, way_m: float) -> float:
+        """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""
+        return 0.0 if self.rests(now_s) else self.trend * min(0.5 * way_m, COMING * self.change_m)
+
+    def takes_back(self, now_s: float, error_m: float, way_m: float) -> bool:
+        """Whether an error r - x, m, is left to the references to come; the shortest slide that way is way_m."""
+        if self.rests(now_s):
+            return False
+        if abs(error_m) <= TAKEN_BACK * self.change_m:
+            return True
+        coming_m = COMING * self.change_m
+        if self.trend * error_m < 0.0:
+            return abs(error_m) <= coming_m
+        return self.trend != 0 and abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m

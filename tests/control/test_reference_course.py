@@ -1,0 +1,63 @@
+"""How the reference comes: what is left to the references to come, and what is not."""
+
+from collections.abc import Iterable
+
+import pytest
+
+from positioner.control.reference_course import ReferenceCourse
+
+SCAN_S, WAY_M = 0.5, 5e-3
+
+
+def written(values_m: Iterable[float], every_s: float = SCAN_S) -> tuple[ReferenceCourse, float]:
+    """Return the course of references, m, and when the last came."""
+    course, now_s = ReferenceCourse(), 0.0
+    for index, value_m in enumerate(values_m):
+        now_s = index * every_s
+        course = course.after(now_s, value_m)
+    return course, now_s
+
+
+NOISE_M = (0.0600, 0.0602, 0.0599, 0.0603, 0.0601)
+RAMP_M = tuple(0.06 + 5e-4 * i for i in range(5))
+
+
+def test_steps_that_stand_are_corrected_at_once() -> None:
+    course, now_s = written(NOISE_M, every_s=2.0)
+    assert course.rests(now_s)
+    assert not course.takes_back(now_s, 1e-4, WAY_M)
+
+
+def test_errors_of_a_few_changes_are_left_until_the_reference_rests() -> None:
+    course, now_s = written(NOISE_M)
+    assert course.change_m == pytest.approx(2.75e-4)
+    assert course.takes_back(now_s, 8e-4, WAY_M)
+    assert not course.takes_back(now_s, 9e-4, WAY_M)
+    assert course.takes_back(now_s + 0.7, 8e-4, WAY_M)
+    assert not course.takes_back(now_s + 0.8, 8e-4, WAY_M)
+
+
+def test_the_same_reference_again_is_none() -> None:
+    course, now_s = written((*NOISE_M, NOISE_M[-1], NOISE_M[-1]))
+    assert course.rests(now_s)
+
+
+@pytest.mark.parametrize("s", [1, -1])
+def test_a_ramp_is_led_by_half_a_way_and_carries_what_it_reaches(s: int) -> None:
+    course, now_s = written(0.06 + s * (each - 0.06) for each in RAMP_M)
+    assert course.trend == s
+    assert course.lead_m(now_s, WAY_M) == pytest.approx(s * 2.5e-3)
+    assert course.lead_m(now_s, 0.1) == pytest.approx(s * 4e-3), "no farther than eight references"
+    assert course.takes_back(now_s, s * 2.4e-3, WAY_M)
+    assert course.takes_back(now_s, -s * 3.9e-3, WAY_M), "it comes to the stem"
+    assert not course.takes_back(now_s, -s * 4.1e-3, WAY_M)
+    assert not course.takes_back(now_s, s * 2e-3, 0.02), "too slow to carry it"
+    assert course.lead_m(now_s + 0.8, WAY_M) == 0.0, "it has ended"
+
+
+def test_three_changes_make_a_trend_and_one_ends_it() -> None:
+    course, now_s = written((0.06, 0.061, 0.0605, 0.0610, 0.0615))
+    assert course.trend == 0
+    course = course.after(now_s + SCAN_S, 0.0620)
+    assert course.trend == 1
+    assert course.after(now_s + 2 * SCAN_S, 0.0615).trend == 0
