@@ -11,12 +11,12 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
     else                               corrected as if the reference rested
 
-A ramp that is followed by slides of a way m, for none shorter breaks the stem loose, leaves a sawtooth. Slides that land
-at the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
+A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
+the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
 
     -m/2 to m/2,   rms m/sqrt(12)      lead = min(m/2, N D)
 
-with the same travel: no stem that can only be moved by m comes nearer. N D bounds the lead to where N references take it.
+with the same travel: no stem that can only be moved by m comes nearer. N D is as far as N references go.
 """
 
 from dataclasses import dataclass

@@ -284,10 +284,9 @@ def _lead_m(
     lead_m = memory.course.lead_m(now_s, way_m)
     assert memory.target_m is not None
     to_m = memory.target_m + lead_m
-    allowed = direction * lead_m > 0.0 and abs(lead_m) <= settings.excursion_limit_m and 0.0 <= to_m <= settings.stroke_m
-    if not allowed or not settings.minimum_pa <= balance.pressure_pa(to_m, direction) <= settings.maximum_pa:
-        return 0.0
-    return lead_m
+    ahead = 0.0 < direction * lead_m <= settings.excursion_limit_m and 0.0 <= to_m <= settings.stroke_m
+    within = ahead and settings.minimum_pa <= balance.pressure_pa(to_m, direction) <= settings.maximum_pa
+    return lead_m if within else 0.0
 
 
 def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:

@@ -24,9 +24,9 @@ VALVE = load_valve(shipped_valve("seed")).valve
 STROKE_M = VALVE.stroke_m
 PERIOD_S, LAG_S = 0.02, 0.05
 STILL, SMALL = 0.6, 0.604
-AWAY, THERE = 0.055, 2e-3
-"""Of the stroke: beyond the margin, the stem comes back."""
 MARGIN = (VALVE.static_n - VALVE.coulomb_n) / VALVE.spring_n_per_m / STROKE_M
+AWAY, THERE = 1.01 * MARGIN, 2e-3
+"""Of the stroke: from just beyond the margin the stem comes back, from nearer nothing brings it back at once."""
 EXCURSION_LIMIT = 0.2
 
 
