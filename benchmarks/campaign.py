@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from unittest.mock import patch
 
-from benchmarks.faulty_wire import Side, Spoiler, faults_on, on_bus
+from benchmarks.faulty_wire import LATE_S, Side, faults_on, on_bus
 from config.codes import Fault, Mode, Quality, State
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
@@ -36,6 +36,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.pacing import DevicePace
 from positioner.daemon.snapshot import Snapshot
+from positioner.testing.spoiler import Spoiler
 from sim.slave.clocks import Lockstep
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
@@ -240,7 +241,7 @@ def run_case(case: Case) -> Outcome:
             "supervision": {"position_rate": {"threshold": 60.0, "action": case.action}},
         }
     )
-    clock, spoiler, pace = _Recorded(device), Spoiler(), _Pace()
+    clock, spoiler, pace = _Recorded(device), Spoiler(LATE_S), _Pace()
     with (
         patch.object(link_module, "awake_s", lambda: pace.now),
         on_bus(case.bus, device, clock, spoiler) as (table, side),

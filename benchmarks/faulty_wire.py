@@ -1,9 +1,6 @@
 """A simulated device in lockstep on each bus, its wire spoilt on demand: what `benchmarks.campaign` tries.
 
-    drop        the reply is lost              duplicate   it comes twice
-    lose        the request is lost            reorder     it comes after that of the next request
-    delay       it comes after the time-out    truncate    its end is missing
-    disconnect  the connection ends            corrupt     a bit of it is wrong
+Kinds of fault are those of `positioner.testing.spoiler`.
 
 Modbus TCP through a proxy that knows frames; RTU through a line that carries whole ones; CANopen at the node, whose
 replies are its TPDOs. A corrupt CAN frame is none (its check sum): there, and where a bus has no connection, the case
@@ -12,14 +9,11 @@ is left out.
 
 import os
 import select
-import socket
-import struct
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from threading import Lock, Thread
-from time import sleep
+from threading import Thread
 
 from config.canopen_device import CanBus, CanopenDevice
 from config.device import Device as DeviceTable
@@ -27,6 +21,8 @@ from config.device import ModbusRtuDevice, ModbusTcpDevice
 from config.serial_port import SerialPort
 from fieldbus.canopen.loopback import free_channel
 from fieldbus.modbus.server import RegisterServer
+from positioner.testing.fault_proxy import spoilt_wire
+from positioner.testing.spoiler import WIRE_FAULTS, Spoiler
 from sim.slave import canopen_slave
 from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Clock
@@ -36,55 +32,7 @@ from sim.slave.simulated_device import Device
 
 REPLY_TIMEOUT_S = 0.08
 LATE_S = 1.3 * REPLY_TIMEOUT_S
-WIRE_FAULTS = ("drop", "lose", "delay", "duplicate", "reorder", "truncate", "corrupt", "disconnect")
 NOT_ON = {"canopen": {"corrupt", "disconnect"}, "rtu": {"disconnect"}, "modbus": set[str]()}
-HEADER = struct.Struct(">HHHB")
-
-
-class Spoiler:
-    """What is wrong with the wire: a kind, for so many replies (or requests) from now on."""
-
-    def __init__(self) -> None:
-        self.kind = ""
-        self.left = 0
-        self._kept: list[bytes] = []
-        self._lock = Lock()
-
-    def begin(self, kind: str, count: int) -> None:
-        """Spoil that many."""
-        with self._lock:
-            self.kind, self.left = kind, count
-
-    def takes_request(self) -> bool:
-        """Return whether a request gets lost."""
-        return self.kind == "lose" and self._spend()
-
-    def replies(self, reply: bytes) -> list[bytes]:
-        """Return what comes in place of a reply.
-
-        Raises:
-            ConnectionResetError: the connection ends.
-        """
-        if self._kept:
-            late, self._kept = self._kept, []
-            return [reply, *late]
-        if self.kind in ("", "lose") or not self._spend():
-            return [reply]
-        if self.kind == "disconnect":
-            raise ConnectionResetError
-        if self.kind == "delay":
-            sleep(LATE_S)
-        if self.kind == "reorder":
-            self._kept = [reply]
-        wrong = reply[:1] + bytes((reply[1] ^ 0x40,)) + reply[2:]
-        instead = {"duplicate": [reply, reply], "delay": [reply], "truncate": [reply[: len(reply) // 2]]}
-        return {**instead, "corrupt": [wrong]}.get(self.kind, [])
-
-    def _spend(self) -> bool:
-        with self._lock:
-            spent = self.left > 0
-            self.left -= spent
-            return spent
 
 
 @contextmanager
@@ -113,38 +61,8 @@ def _tcp(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tu
     server = RegisterServer(DeviceRegisters(device, clock), "127.0.0.1", 0, 1)
     server.start()
     stack.callback(server.stop)
-    proxy = socket.create_server(("127.0.0.1", 0))
-    stack.callback(proxy.close)
-    stack.callback(proxy.shutdown, socket.SHUT_RDWR)
-    Thread(target=_accept, args=(proxy, server.port, spoiler), daemon=True).start()
-    return ModbusTcpDevice(port=proxy.getsockname()[1], reply_timeout_s=REPLY_TIMEOUT_S), Side(device)
-
-
-def _accept(proxy: socket.socket, port: int, spoiler: Spoiler) -> None:
-    while True:
-        try:
-            near, _ = proxy.accept()
-        except OSError:
-            return
-        Thread(target=_carry_tcp, args=(near, port, spoiler), daemon=True).start()
-
-
-def _carry_tcp(near: socket.socket, port: int, spoiler: Spoiler) -> None:
-    with near, socket.create_connection(("127.0.0.1", port)) as far, suppress(OSError):
-        while frame := _frame(near):
-            if spoiler.takes_request():
-                continue
-            far.sendall(frame)
-            for reply in spoiler.replies(_frame(far)):
-                near.sendall(reply)
-
-
-def _frame(line: socket.socket) -> bytes:
-    """Return the next frame; b"" at the end."""
-    head = line.recv(HEADER.size, socket.MSG_WAITALL)
-    if len(head) < HEADER.size:
-        return b""
-    return head + line.recv(HEADER.unpack(head)[2] - 1, socket.MSG_WAITALL)
+    port = stack.enter_context(spoilt_wire(server.port, spoiler))
+    return ModbusTcpDevice(port=port, reply_timeout_s=REPLY_TIMEOUT_S), Side(device)
 
 
 def _rtu(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tuple[DeviceTable, Side]:
