@@ -12,4 +12,5 @@ Its files:
     valve, open_loop, simulation         in virtual time; in one call, for fitting; as a recording
     parameter_changes, transmitter       friction that ages meanwhile; the position's noise and rounding
     slave                                the simulated device on a bus
+    fmu                                  a valve as a unit for other simulators
 """

@@ -25,6 +25,7 @@ COMMANDS = (
     "import",
     "valve",
     "simulate",
+    "export",
     "play",
     "estimate",
     "response",

@@ -1,0 +1,38 @@
+"""`positioner export fmu`: a valve file as a unit for other simulators."""
+
+import argparse
+from pathlib import Path
+
+HELP = "write a valve for other simulators: a co-simulation FMU (FMI 2.0)"
+EXAMPLE = "positioner export fmu seed -o valve.fmu"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("format", choices=["fmu"], help="what is written")
+    parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="VALVE.fmu")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write it, and say what goes in and comes out."""
+    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.output_files import writable
+    from sim.composition import Composition
+    from sim.fmu.fmu_file import export_fmu
+    from sim.fmu.model_description import variables
+
+    writable(arguments.out, "-o")
+    path = find_valve(arguments.valve)
+    composition = Composition.from_file(load_valve(path), str(path))
+    export_fmu(composition, arguments.out)
+    by_causality = {"input": "in", "output": "out"}
+    told = [
+        f"{by_causality[each.causality]} {each.name}"
+        for each in variables(composition)
+        if each.causality in by_causality
+    ]
+    print(
+        f"{arguments.out}: FMI 2.0 co-simulation, Linux x86-64; {', '.join(told)}; {composition.theta.size} parameters"
+    )
+    return 0
