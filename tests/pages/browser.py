@@ -35,7 +35,7 @@ def served(*words: str, port: str = "--port") -> Iterator[str]:
         finally:
             process.terminate()
             said = process.stderr.read()
-    assert not said
+    assert not said, said
 
 
 @contextmanager

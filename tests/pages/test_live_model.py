@@ -5,6 +5,7 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile, valve
 from positioner.pages.parts.theme import LIGHT
+from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.time_figure import LINES, TimeFigure, Window, window_of
 from workbench.blind.hiding import hide
@@ -60,7 +61,7 @@ def test_the_figure_keeps_extremes_and_every_sample_when_it_is_looked_at_closely
     position_m = 0.05 + 0.02 * np.sin(0.01 * time_s)
     position_m[77_777] += 1e-3
     record = ready(Recording({"time_s": time_s, "command_pa": 1e5 * position_m, "position_m": position_m}))
-    figure = TimeFigure(record)
+    figure = TimeFigure(record, 0.1, Units("mm"))
     drawn = figure.data(("measured",))
     assert len(drawn["y"][0]) < 4000
     assert 1e3 * position_m[77_777] == pytest.approx(np.nanmax([each or np.nan for each in drawn["y"][0]]), rel=1e-3)

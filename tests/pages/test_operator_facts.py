@@ -18,8 +18,8 @@ from positioner.observer.valve_view import ValvePicture
 from positioner.pages.operator_page import facts
 from positioner.pages.operator_page.controls import SIGNED_IN_S, SignedIn
 from positioner.pages.operator_page.role_passwords import read_passwords, set_password
-from positioner.pages.operator_page.units import LENGTHS, Units
 from positioner.pages.parts.sessions import MOST_WRONG, SignIn
+from positioner.pages.parts.units import LENGTHS, Units
 
 STROKE_M = 0.1
 VALUES = dict.fromkeys(BY_NAME, 0.0) | {

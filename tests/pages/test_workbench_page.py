@@ -42,6 +42,29 @@ def shown(page: Page) -> None:
     expect(page.locator(".scatterlayer .trace").first).to_be_visible()
 
 
+def goes_to_where_it_fails_and_in_other_units(page: Page, given_mm: float) -> None:
+    # A sentence goes to where it shows; in other units everything is said anew.
+    page.get_by_test_id("sentences").get_by_role("button", name="after every reversal").click()
+    expect(page.get_by_test_id("where")).to_have_text(re.compile(r"^1 of \d+: after every reversal"))
+    expect(page.locator(".shapelayer path").first).to_be_attached()
+    # What is selected in a plot of forces is marked over time.
+    forces = page.get_by_role("img", name="friction over velocity").locator(".nsewdrag")
+    forces.scroll_into_view_if_needed()
+    box = forces.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 0.1 * box["width"], box["y"] + 0.1 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.5 * box["height"], steps=3)
+    page.mouse.up()
+    expect(page.locator(".legendtext", has_text="chosen")).to_be_visible()
+    page.get_by_test_id("unit-position").click()
+    page.get_by_role("option", name="in", exact=True).click()
+    expect(page.get_by_test_id("error")).to_have_text(f"{given_mm / 25.4:.4g} in")
+    page.get_by_test_id("unit-position").click()
+    page.get_by_role("option", name="mm", exact=True).click()
+    expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
+
+
 def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Path) -> None:
     with opened(address) as page:
         drop(page, "drop", case / "fit.csv")
@@ -50,6 +73,8 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         expect(page.get_by_test_id("verdict")).to_have_attribute("data-kind", "bad")
         shown(page)
         given_mm = error_mm(page)
+
+        goes_to_where_it_fails_and_in_other_units(page, given_mm)
 
         # Dragging changes the error, and undo takes it back.
         slider = page.get_by_test_id("slider-spring_n_per_m")
@@ -60,10 +85,10 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         page.mouse.move(box["x"] + box["width"] / 2, middle_y)
         page.mouse.down()
         page.mouse.move(box["x"] + 0.6 * box["width"], middle_y, steps=3)
-        expect(page.get_by_test_id("error")).not_to_have_text(f"{given_mm:.3f} mm")
+        expect(page.get_by_test_id("error")).not_to_have_text(f"{given_mm:.4g} mm")
         page.mouse.up()
         page.get_by_test_id("undo").click()
-        expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.3f} mm")
+        expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
 
         # A diagnosis of two effects finds what is hidden; added, the error is at the floor.
         page.get_by_test_id("effects").click()
@@ -87,7 +112,7 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         shown(page)
         assert error_mm(page) < 0.01 * given_mm
         page.get_by_test_id("back").click()
-        expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.3f} mm")
+        expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
 
 
 def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, tmp_path: Path) -> None:

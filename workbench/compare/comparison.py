@@ -17,7 +17,7 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from workbench.compare.comparison_sentences import Findings, sentences, shortened
+from workbench.compare.comparison_sentences import Findings, Stretch, judged, shortened
 from workbench.compare.friction_balance import Forces, FrictionBalance, balance, forces
 from workbench.compare.measures import fit_percent, rms, robust, valid_rows
 from workbench.compare.phases import PHASES, phases
@@ -71,6 +71,8 @@ class Comparison(Result):
 
     adequate: bool
     sentences: tuple[str, ...]
+    stretches: tuple[tuple[Stretch, ...], ...]
+    """Where each of the sentences shows."""
     notes: tuple[str, ...]
     fit_percent: float
     rms_m: float
@@ -199,11 +201,13 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
         close=record.floor_m is not None
         and error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
     )
+    said = judged(found)
     simulated_rows = np.concatenate([np.arange(first, end) for first, end in record.segments])
     valid = rows[simulated_rows]
     return Comparison(
         adequate=found.adequate,
-        sentences=sentences(found),
+        sentences=tuple(each.text for each in said),
+        stretches=tuple(each.stretches for each in said),
         notes=(*record.notes, *([free.by.sentence] if free.by.slow else [])),
         fit_percent=fit_percent(record, np.where(rows, run.indicated_m, np.nan)),
         rms_m=error_m,

@@ -1,11 +1,11 @@
-"""Where the model fails, in plain sentences, the gravest first.
+"""Where the model fails, in plain sentences, the gravest first, each with the stretches of time in which it shows.
 
 A finding is said when it is both certain (3.5 standard errors, over slips, or over blocks of 1 s but no
 more of them than slips: between slips an error stands) and matters (a mean
 error above the floor, or a time above two periods).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,28 @@ MOST_LISTED = 8
 """Notes listed one by one."""
 SHARE = 0.5
 """Part of the squared error from which a phase is named."""
+MOST_STRETCHES = 20
+"""Of a sentence, the gravest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A stretch of time, s since the start; of a slip, from the stem's beginning to the model's."""
+
+    begin_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """What is said, and where it shows, the gravest first; nowhere: it is of the whole recording."""
+
+    text: str
+    stretches: tuple[Stretch, ...] = ()
+
+
+Graded = tuple[float, Sentence]
+"""A sentence, and how grave it is, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,22 +79,45 @@ class Findings:
         return bool(self.measured_slips) and self.close and not self.depends_on_input and not unmatched
 
 
-def sentences(found: Findings) -> tuple[str, ...]:
-    """Return the sentences."""
+def judged(found: Findings) -> tuple[Sentence, ...]:
+    """Return what is to be said."""
     if not found.measured_slips:
-        spurious = len(found.events.spurious_s)
-        tail = f", the model makes {_count(spurious, 'spurious ')}" if spurious else ""
-        still = f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion"
-        return (still,) if found.floor_m is not None else (still, UNKNOWN)
+        spurious = found.events.spurious_s
+        tail = f", the model makes {_count(len(spurious), 'spurious ')}" if spurious else ""
+        text = f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion"
+        still = Sentence(text, _at(spurious))
+        return (still,) if found.floor_m is not None else (still, Sentence(UNKNOWN))
     said = []
     if len({each.direction for each in found.measured_slips}) == 1:
         way = "opens" if found.measured_slips[0].direction > 0 else "closes"
-        said.append(f"the stem only {way} in this recording: the other direction is not judged")
+        said.append(Sentence(f"the stem only {way} in this recording: the other direction is not judged"))
     if found.adequate:
-        return (*said, f"the model holds: error {_mm(found.rms_m)}, floor {_mm(found.matters_m)}, no structure left")
+        errors = f"error {_mm(found.rms_m)}, floor {_mm(found.matters_m)}"
+        return (*said, Sentence(f"the model holds: {errors}, no structure left"))
     graded = [*_along_motion(found), *_late(found), *_offset(found), *_trends(found)]
-    said += [text for _, text in sorted(graded, key=lambda each: -each[0])]
+    said += [each for _, each in sorted(graded, key=lambda each: -each[0])]
     return (*said, *_slips(found), *_share(found), *_rest(found, bool(graded)))
+
+
+def sentences(found: Findings) -> tuple[str, ...]:
+    """Return the sentences alone."""
+    return tuple(each.text for each in judged(found))
+
+
+def slip_sentences(events: SlipEvents) -> Mapping[str, tuple[str, ...]]:
+    """Say of each slip what the model makes of it: missed, spurious and matched ones, in their order."""
+    return {
+        "missed": tuple(f"at {each:.2f} s the stem slips, and the model does not" for each in events.missed_s),
+        "spurious": tuple(f"at {each:.2f} s the model slips, and the stem does not" for each in events.spurious_s),
+        "matched": tuple(map(_slip, events.matched)),
+    }
+
+
+def _slip(each: MatchedSlip) -> str:
+    way = f"{'opening' if each.direction > 0 else 'closing'}, {'after a reversal' if each.reversal else 'going on'}"
+    late = f"{_seconds(abs(each.late_s))} {'late' if each.late_s > 0.0 else 'early'}" if each.late_s else "on time"
+    far = f"{_mm(abs(each.farther_m))} too {'far' if each.farther_m > 0.0 else 'short'}"
+    return f"slip at {each.time_s:.2f} s, {way}: the model comes {late} and ends {far}"
 
 
 def shortened(notes: Sequence[str]) -> tuple[str, ...]:
@@ -82,7 +127,7 @@ def shortened(notes: Sequence[str]) -> tuple[str, ...]:
     return (*notes[:MOST_LISTED], f"and {len(notes) - MOST_LISTED} more of the kind")
 
 
-def _along_motion(found: Findings) -> Iterator[tuple[float, str]]:
+def _along_motion(found: Findings) -> Iterator[Graded]:
     """Too far or too short at the end of slips, after reversals and otherwise."""
     for when, reversal in (("after every reversal", True), ("where it goes on in one direction", False)):
         pairs = [each for each in found.events.matched if each.reversal == reversal]
@@ -91,15 +136,15 @@ def _along_motion(found: Findings) -> Iterator[tuple[float, str]]:
         )
 
 
-def _late(found: Findings) -> Iterator[tuple[float, str]]:
+def _late(found: Findings) -> Iterator[Graded]:
     """Slips that come too late or too early; graded as if it stood wrong by a median slip for that long."""
     pairs = found.events.matched
     period_s = float(np.median(np.diff(found.time_s))) if found.time_s.size > 1 else 0.0
     graded = _by_direction(
         pairs, [each.late_s for each in pairs], 2.0 * period_s, "its slips come", ("too late", "too early"), _seconds
     )
-    for _, text in graded:
-        yield 0.5 * found.rms_m, text
+    for _, sentence in graded:
+        yield 0.5 * found.rms_m, sentence
 
 
 def _by_direction(
@@ -109,7 +154,7 @@ def _by_direction(
     when: str,
     words: tuple[str, str],
     unit: Callable[[float], str],
-) -> Iterator[tuple[float, str]]:
+) -> Iterator[Graded]:
     """Say a mean over slips that is certain in both directions, alike or not, or in one only."""
     means = {}
     for direction in (1, -1):
@@ -123,27 +168,30 @@ def _by_direction(
         if pooled.size >= FEWEST and len({each.direction for each in pairs}) == 2:
             mean, error = float(np.median(pooled)), float(np.std(pooled, ddof=1)) / pooled.size**0.5
             if _certain(mean, error, matters):
-                yield abs(mean), f"{when}, {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
+                text = f"{when}, {unit(abs(mean))} {words[0] if mean > 0 else words[1]}, both directions"
+                yield abs(mean), Sentence(text, _of_slips(pairs, values, (1, -1)))
         return
     told = {way: f"{unit(abs(mean))} {words[0] if mean > 0 else words[1]}" for way, mean in means.items()}
     grade = max(abs(mean) for mean in means.values())
     if len(means) == 1:
-        ((way, text),) = told.items()
-        yield grade, f"{when}, {text}, only when {'opening' if way > 0 else 'closing'}"
+        ((way, amount),) = told.items()
+        text = f"{when}, {amount}, only when {'opening' if way > 0 else 'closing'}"
     elif means[1] * means[-1] > 0.0 and 0.5 < means[1] / means[-1] < 2.0:
         both = 0.5 * (means[1] + means[-1])
-        yield grade, f"{when}, {unit(abs(both))} {words[0] if both > 0 else words[1]}, both directions"
+        text = f"{when}, {unit(abs(both))} {words[0] if both > 0 else words[1]}, both directions"
     else:
-        yield grade, f"{when}, {told[1]} when opening and {told[-1]} when closing"
+        text = f"{when}, {told[1]} when opening and {told[-1]} when closing"
+    yield grade, Sentence(text, _of_slips(pairs, values, tuple(means)))
 
 
-def _offset(found: Findings) -> Iterator[tuple[float, str]]:
+def _offset(found: Findings) -> Iterator[Graded]:
     mean, error = _block_mean(found, np.ones(found.time_s.size, np.bool_))
     if _certain(mean, error, found.matters_m) and abs(mean) > 0.5 * found.rms_m:
-        yield abs(mean), f"it stands {_mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
+        text = f"it stands {_mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
+        yield abs(mean), Sentence(text)
 
 
-def _trends(found: Findings) -> Iterator[tuple[float, str]]:
+def _trends(found: Findings) -> Iterator[Graded]:
     """Errors that grow over the stroke or with time."""
     for over, what, unit in (
         (found.position_m, "over the stroke", _mm),
@@ -163,41 +211,70 @@ def _trends(found: Findings) -> Iterator[tuple[float, str]]:
         change = float(slope) * (high - low)
         if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.matters_m, found.rms_m):
             at_low, at_high = slope * low + intercept, slope * high + intercept
-            yield (
-                0.5 * abs(change),
-                f"its error changes {what}: {_signed(at_low)} at {unit(low)}, {_signed(at_high)} at {unit(high)}",
-            )
+            text = f"its error changes {what}: {_signed(at_low)} at {unit(low)}, {_signed(at_high)} at {unit(high)}"
+            yield 0.5 * abs(change), Sentence(text, _runs(found, blocks, np.abs(y)))
 
 
-def _slips(found: Findings) -> Iterator[str]:
+def _slips(found: Findings) -> Iterator[Sentence]:
     missed, spurious = len(found.events.missed_s), len(found.events.spurious_s)
-    judged = len(found.events.matched) + missed  # the others are pieces of a slide, or too small to count
-    said = [f"misses {missed} of {judged} slips"] if missed else []
+    of = len(found.events.matched) + missed  # the others are pieces of a slide, or too small to count
+    said = [f"misses {missed} of {of} slips"] if missed else []
     if spurious:
         said.append(f"makes {_count(spurious, 'spurious ')}")
     if said:
-        yield f"it {' and '.join(said)}"
+        yield Sentence(f"it {' and '.join(said)}", _at((*found.events.missed_s, *found.events.spurious_s)))
 
 
-def _share(found: Findings) -> Iterator[str]:
+def _share(found: Findings) -> Iterator[Sentence]:
     squares = np.bincount(found.phase, found.residual_m**2, len(PHASES))
     worst = int(squares.argmax())
     share = float(squares[worst] / squares.sum()) if squares.sum() else 0.0
     if share > SHARE:
-        part = found.residual_m[found.phase == worst]
+        inside = found.phase == worst
+        part = found.residual_m[inside]
         where = "near the stops" if PHASES[worst] == "near stops" else f"in phase {PHASES[worst]!r}"
-        yield f"{100 * share:.0f} % of the squared error is {where}, {_mm(float(np.sqrt(np.mean(part**2))))} rms"
+        text = f"{100 * share:.0f} % of the squared error is {where}, {_mm(float(np.sqrt(np.mean(part**2))))} rms"
+        run = np.cumsum(np.diff(inside, prepend=inside[0]))
+        grade = np.bincount(run, np.where(inside, found.residual_m**2, 0.0)).astype(np.float64)
+        yield Sentence(text, _runs(found, run, grade))
 
 
-def _rest(found: Findings, named: bool) -> Iterator[str]:
+def _rest(found: Findings, named: bool) -> Iterator[Sentence]:
     if found.floor_m is None:
-        yield f"the error is {_mm(found.rms_m)} rms; {UNKNOWN}"
+        yield Sentence(f"the error is {_mm(found.rms_m)} rms; {UNKNOWN}", _worst(found))
         return
     times = found.rms_m / found.floor_m if found.floor_m else np.inf
     if not found.close:
-        yield f"the error, {_mm(found.rms_m)} rms, is {times:.1f} times the floor of {_mm(found.floor_m)}"
+        text = f"the error, {_mm(found.rms_m)} rms, is {times:.1f} times the floor of {_mm(found.floor_m)}"
+        yield Sentence(text, _worst(found))
     if found.depends_on_input and not named:
-        yield "what is left depends on the command"
+        yield Sentence("what is left depends on the command")
+
+
+def _at(times_s: Sequence[float]) -> tuple[Stretch, ...]:
+    return tuple(Stretch(each, each) for each in times_s[:MOST_STRETCHES])
+
+
+def _of_slips(pairs: Sequence[MatchedSlip], values: Sequence[float], ways: Sequence[int]) -> tuple[Stretch, ...]:
+    """Return where the slips of these directions are, those with the largest values first."""
+    both = sorted(zip(values, pairs, strict=True), key=lambda each: -abs(each[0]))
+    slips = [pair for _, pair in both if pair.direction in ways][:MOST_STRETCHES]
+    return tuple(Stretch(*sorted((each.time_s, each.time_s + each.late_s))) for each in slips)
+
+
+def _worst(found: Findings) -> tuple[Stretch, ...]:
+    """Return the blocks of 1 s with the largest squared error."""
+    blocks = _blocks(found.time_s)
+    return _runs(found, blocks, np.bincount(blocks, found.residual_m**2).astype(np.float64))
+
+
+def _runs(found: Findings, run: NDArray[np.int64], grade: Column) -> tuple[Stretch, ...]:
+    """Return the runs of samples of one number, rising along the recording, by the grade of each; of grade 0 none."""
+    order = np.argsort(run, kind="stable")  # a clock that is set back leaves them out of order
+    first = order[np.searchsorted(run[order], np.arange(grade.size))]
+    last = order[np.searchsorted(run[order], np.arange(grade.size), side="right") - 1]
+    gravest = [each for each in np.argsort(-grade, kind="stable")[:MOST_STRETCHES] if grade[each] > 0.0]
+    return tuple(Stretch(float(found.time_s[first[each]]), float(found.time_s[last[each]])) for each in gravest)
 
 
 def _blocks(time_s: Column) -> NDArray[np.int64]:

@@ -14,5 +14,5 @@ Its files:
     friction_plot           friction against its baseline, a row a minute
     controls                signing in; mode, reference, identification, acknowledgement
     role_passwords          the passwords of operator and engineer, kept in a file as scrypt leaves them
-    facts, units            what is said of a valve, a line each; the units it is said in
+    facts                   what is said of a valve, a line each
 """

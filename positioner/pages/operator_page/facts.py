@@ -8,7 +8,7 @@ from config.codes import Fault, Ne107Status
 from config.registers import BY_NAME
 from positioner.observer.valve_view import ValvePicture
 from positioner.observer.words import EstimateInWords, device_status, estimates_in_words, ne107_causes
-from positioner.pages.operator_page.units import NO_NUMBER, Unit, Units
+from positioner.pages.parts.units import NO_NUMBER, Unit, Units
 
 
 @dataclass(frozen=True, slots=True)

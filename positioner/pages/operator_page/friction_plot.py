@@ -6,8 +6,8 @@ from typing import Any
 from nicegui import ui
 
 from positioner.observer.valve_view import ValveView
-from positioner.pages.operator_page.units import Units
 from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.units import Units
 
 FEWEST = 2
 """Rows that a line needs."""

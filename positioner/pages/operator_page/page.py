@@ -9,13 +9,14 @@ from nicegui import app, ui
 from positioner.pages.operator_page.controls import Door, SignedIn
 from positioner.pages.operator_page.marks import STYLE, SignOfLife
 from positioner.pages.operator_page.overview import Overview
-from positioner.pages.operator_page.units import PERCENT, POSITIONS, PRESSURES, Units
 from positioner.pages.operator_page.valve_panel import ValvePanel
 from positioner.pages.operator_page.watched_valves import Place, WatchedValve, watching
 from positioner.pages.parts.server import Listening, serve
 from positioner.pages.parts.sessions import SignIn
 from positioner.pages.parts.telling import aside
 from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.unit_choice import unit_choice
+from positioner.pages.parts.units import Units
 
 TITLE = "positioner"
 TICK_S = 0.1
@@ -66,7 +67,7 @@ class Tab:
             self._chosen.props('dense dark options-dense borderless aria-label="valve" data-testid="valve"')
             self._chosen.on_value_change(self._show)
             ui.space()
-            self._unit_choices()
+            unit_choice(self._units, self._redraw)
             self._door = Door(self._sign_in, self._signed)
             self._theme.switch()
         self._life = SignOfLife()
@@ -76,22 +77,6 @@ class Tab:
         await self._theme.as_the_browser_prefers()
         self._show()
         ui.timer(TICK_S, self._tick)
-
-    def _unit_choices(self) -> None:
-        for value, names, take in (
-            (PERCENT, list(POSITIONS), self._choose_position),
-            (self._units.pressure.name, list(PRESSURES), self._choose_pressure),
-        ):
-            select = ui.select(names, value=value, on_change=lambda change, take=take: take(change.value))
-            select.props('dense dark options-dense borderless aria-label="unit"')
-
-    def _choose_position(self, name: str) -> None:
-        self._units.position = name
-        self._redraw()
-
-    def _choose_pressure(self, name: str) -> None:
-        self._units.choose_pressure(name)
-        self._redraw()
 
     def _redraw(self) -> None:
         if self._panel is not None:

@@ -12,8 +12,8 @@ from nicegui import events, ui
 
 from config.recording import Column, Recording
 from positioner.observer.trends import thinned
-from positioner.pages.operator_page.units import Unit, Units
 from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.units import Unit, Units
 
 MOST_STEPS = 1500
 """Of what is shown; two rows a step at most."""

@@ -15,8 +15,8 @@ from config.codes import State
 from config.recording import Column
 from positioner.observer.trends import bands, thinned
 from positioner.observer.valve_view import ValveView
-from positioner.pages.operator_page.units import Units
 from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.units import Units
 
 Options = dict[str, Any]
 

@@ -15,10 +15,10 @@ from positioner.pages.operator_page.friction_plot import FrictionPlot
 from positioner.pages.operator_page.marks import grey, mark_fault, mark_ne107
 from positioner.pages.operator_page.recorded_plot import RecordedPlot
 from positioner.pages.operator_page.trend_plot import WINDOWS_S, TrendPlot
-from positioner.pages.operator_page.units import Units
 from positioner.pages.operator_page.watched_valves import WatchedValve
 from positioner.pages.parts.telling import aside, heading
 from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.units import Units
 
 MOVES_S = 120.0
 """Of which the response figures are worked out."""

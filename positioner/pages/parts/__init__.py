@@ -7,5 +7,6 @@ Its files:
     sessions             who came in, and how often a password was wrong
     theme                light and dark, colours of page and plots
     telling              errors and sentences, shown
+    units, unit_choice   the units that a person reads in, and where they are chosen
     figure_view          a plotly figure on a page, its colours those of the theme
 """

@@ -15,6 +15,7 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from config.writing import valve_toml, write_valve
+from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.background import Task, Work
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
@@ -75,6 +76,8 @@ class Desk:
     """The folder of a blind case,"""
     seed: int = 0
     """and what it was drawn from."""
+    units: Units = field(default_factory=lambda: Units(position="mm"))
+    """That a person reads it in."""
     _written: int = 0
 
     def take_recording(self, opened: Opened) -> None:

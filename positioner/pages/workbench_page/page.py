@@ -8,6 +8,7 @@ from nicegui import app, ui
 from positioner.pages.parts.server import Listening, serve
 from positioner.pages.parts.telling import aside, errors_told, heading
 from positioner.pages.parts.theme import Theme
+from positioner.pages.parts.unit_choice import unit_choice
 from positioner.pages.workbench_page.compare_panel import ComparePanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
 from positioner.pages.workbench_page.journal_panel import JournalPanel
@@ -62,6 +63,7 @@ class Workbench:
         with ui.header().classes("items-center"):
             ui.label(TITLE).classes("text-weight-medium")
             ui.space()
+            choices = ui.row().classes("items-center")
             theme.switch()
         await ui.context.client.connected()
         await theme.as_the_browser_prefers()
@@ -72,7 +74,9 @@ class Workbench:
         desk = self._desks[tab]
         desk.pages += 1
         ui.context.client.on_delete(lambda: self._left(desk))
-        TabPage(desk, theme, self._files)
+        shown = TabPage(desk, theme, self._files)
+        with choices:
+            unit_choice(desk.units, shown.changed)
 
     def _left(self, desk: Desk) -> None:
         """Stop what nobody waits for any more, and forget the desks that were left longest ago."""
@@ -92,11 +96,11 @@ class TabPage:
         self._desk = desk
         self._theme = theme
         with ui.column().classes("panel"):
-            self._open = OpenPanel(desk, files, self._changed)
+            self._open = OpenPanel(desk, files, self.changed)
             self._rest = ui.column().classes("w-full")
-        self._changed()
+        self.changed()
 
-    def _changed(self) -> None:
+    def changed(self) -> None:
         """Show what goes with the recording and the valve on the desk."""
         self._open.refresh()
         self._rest.clear()
@@ -108,8 +112,8 @@ class TabPage:
         with self._rest:
             heading("Model against measurement")
             ComparePanel(self._desk, self._theme)
-            SearchPanel(self._desk, self._theme, self._changed)
-            JournalPanel(self._desk, self._theme, self._changed)
+            SearchPanel(self._desk, self._theme, self.changed)
+            JournalPanel(self._desk, self._theme, self.changed)
 
 
 def serve_workbench(recordings: Sequence[Path], valve: str | None, where: Listening, *, opens_browser: bool) -> None:

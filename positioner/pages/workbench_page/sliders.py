@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from nicegui import events, ui
 
 from positioner.pages.parts.telling import heading
+from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.live_model import LiveModel
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.parameters import Parameter
@@ -34,6 +35,7 @@ class Sliders:
         fitted: values and intervals of a fit, by the parameter's name.
         moved: called while something moves,
         settled: and when it has come to rest.
+        units: that it is read in.
     """
 
     def __init__(
@@ -42,8 +44,10 @@ class Sliders:
         fitted: Mapping[str, Fitted],
         moved: Callable[[], None],
         settled: Callable[[], Awaitable[None]],
+        units: Units,
     ) -> None:
         self._live = live
+        self._units = units
         self._moved = moved
         self._settled = settled
         self._held = False
@@ -64,7 +68,8 @@ class Sliders:
         self._follow()
 
     def _row(self, parameter: Parameter, fitted: Fitted | None) -> Row:
-        words, factor, unit = in_words(parameter.name)
+        words, per_si, shown = in_words(parameter.name)
+        factor, unit = self._units.as_chosen(per_si, shown)
         with ui.column().classes("w-full").style("gap: 0"):
             with ui.row().classes("w-full items-baseline justify-between no-wrap"):
                 ui.label(words)

@@ -12,6 +12,8 @@ import numpy as np
 
 from config.recording import Column
 from positioner.pages.parts.theme import Ink
+from positioner.pages.parts.units import Unit, Units
+from workbench.compare.comparison_sentences import Stretch, slip_sentences
 from workbench.compare.slip_matching import SlipEvents
 from workbench.data.record import Record
 from workbench.report.charts import Figure, axis, layout
@@ -19,11 +21,16 @@ from workbench.report.plot_series import extremes, rounded, running_s
 
 MOST, MOVING = 2400, 1200
 """Points of a line in the window at most; and while a slider moves it, when it is drawn many times a second."""
+AROUND_S, AROUND = 2.0, 0.5
+"""Before and after what is gone to: so many seconds at the least, and this part of a long stretch."""
 BESIDE = 0.5
 """Of the window, drawn on either side of it: panning finds something there."""
 LINES = ("measured", "as opened", "fitted", "model", "error as opened", "error fitted", "error", "command", "pressure",
          "model's pressure")  # fmt: skip
+BELOW = ("command", "pressure", "model's pressure")
 MARKS = ("missed slip", "spurious slip", "matched slip", "chosen")
+SLIPS = ("missed", "spurious", "matched")
+"""What the first of them mark."""
 MARKED = {
     "missed slip": ("triangle-up", "model", 11),
     "spurious slip": ("triangle-down-open", "model", 11),
@@ -41,21 +48,23 @@ class Window:
 
 
 class TimeFigure:
-    """The lines of a recording, SI, by the names of LINES; what is None is not drawn."""
+    """The lines of a recording of a valve of a stroke, m, SI, by the names of LINES; what is None is not drawn."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Record, stroke_m: float, units: Units) -> None:
+        self._stroke_m = stroke_m
+        self._units = units
         self._along_s = running_s(record.time_s)
         self._by_setpoint = record.by_setpoint
         self._record = record
         self._lines: dict[str, Column | None] = dict.fromkeys(LINES)
-        factor = 1e3 if record.by_setpoint else 1e-3
-        self._lines["measured"] = 1e3 * np.where(record.valid, record.position_m, np.nan)
-        self._lines["command"] = factor * record.command_pa
-        if record.pressure_pa is not None:
-            self._lines["pressure"] = 1e-3 * record.pressure_pa
+        self._lines["measured"] = np.where(record.valid, record.position_m, np.nan)
+        self._lines["command"] = record.command_pa
+        self._lines["pressure"] = record.pressure_pa
         self.slips = SlipEvents((), (), ())
         self.chosen_s: tuple[float, ...] = ()
         """Times, s since the start, of samples that were chosen in another plot."""
+        self.stretch: Stretch | None = None
+        """What a sentence speaks of: it is shaded."""
         self.window = self.whole
 
     @property
@@ -66,21 +75,24 @@ class TimeFigure:
     def show(self, name: str, position_m: Column | None) -> None:
         """Draw a model's position, m, (n,) and its error; `name` is as opened, fitted or model."""
         error = "error" if name == "model" else f"error {name}"
-        self._lines[name] = None if position_m is None else 1e3 * position_m
-        measured = self._lines["measured"]
-        self._lines[error] = None if position_m is None or measured is None else 1e3 * position_m - measured
+        measured_m = self._lines["measured"]
+        self._lines[name] = position_m
+        self._lines[error] = None if position_m is None or measured_m is None else position_m - measured_m
 
     def show_pressure(self, pressure_pa: Column) -> None:
         """Draw the model's pressure, Pa, (n,)."""
-        self._lines["model's pressure"] = None if self._by_setpoint else 1e-3 * pressure_pa
+        self._lines["model's pressure"] = None if self._by_setpoint else pressure_pa
 
     def data(self, names: tuple[str, ...] = LINES, most: int = MOST) -> Mapping[str, list[Any]]:
         """Return x and y of these lines in the window, a list each, of so many points at most."""
-        drawn = [self._points(self._lines[name], most) for name in names]
+        drawn = [self._points(self._lines[name], self._unit(name).per_si, most) for name in names]
         return {"x": [x for x, _ in drawn], "y": [y for _, y in drawn]}
 
     def marks(self) -> Mapping[str, list[Any]]:
-        """Return x and y of the marks, a list each."""
+        """Return x, y and what is said of the marks, a list each."""
+        said = slip_sentences(self.slips)
+        texts = [*(list(said[kind]) for kind in SLIPS), []]
+        per_si = self._unit("measured").per_si
         times = (self.slips.missed_s, self.slips.spurious_s, tuple(each.time_s for each in self.slips.matched),
                  self.chosen_s)  # fmt: skip
         begin_s = self._record.time_s - self._record.time_s[0]
@@ -89,46 +101,46 @@ class TimeFigure:
             at = np.asarray(each, np.float64)
             rows = np.clip(np.searchsorted(begin_s, at), 0, begin_s.size - 1)
             x.append(rounded(self._along_s[rows], 4))
-            y.append(rounded(1e3 * self._record.position_m[rows], 4))
-        return {"x": x, "y": y}
+            y.append(rounded(per_si * self._record.position_m[rows], 4))
+        return {"x": x, "y": y, "text": texts}
 
     def figure(self, ink: Ink) -> Figure:
         """Return all of it as plotly takes it."""
         x, y = self.data().values()
         traces = [self._trace(name, xs, ys, ink) for name, xs, ys in zip(LINES, x, y, strict=True)]
-        x, y = self.marks().values()
-        for name, xs, ys in zip(MARKS, x, y, strict=True):
+        for name, xs, ys, said in zip(MARKS, *self.marks().values(), strict=True):
             symbol, colour, size = MARKED[name]
             marker = {"symbol": symbol, "size": size, "color": getattr(ink, colour), "line": {"width": 2}}
             traces.append(
                 {
                     "type": "scatter", "mode": "markers", "name": name, "x": xs, "y": ys, "marker": marker,
-                    "hovertemplate": f"%{{x:.3f}} s<extra>{name}</extra>", "showlegend": bool(xs),
+                    "text": said, "hovertemplate": f"%{{x:.3f}} s<br>%{{text}}<extra>{name}</extra>",
+                    "showlegend": bool(xs),
                 }
             )  # fmt: skip
         return {"data": traces, "layout": self._layout(ink)}
 
     def _layout(self, ink: Ink) -> Figure:
         zero = {"zeroline": True, "zerolinecolor": ink.quiet, "zerolinewidth": 1}
-        asked = "set point, mm" if self._by_setpoint else "pressure, kPa"
+        position, asked = self._unit("measured").name, self._unit("command").name
         return layout(
             margin={"l": 58, "r": 12, "t": 8, "b": 40},
             dragmode="zoom",
-            uirevision="time",
+            uirevision=f"time, {position}, {asked}",
+            shapes=self.shades(ink),
             legend={"orientation": "h", "x": 0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"},
             xaxis=axis("time, s", anchor="y3", range=[self.window.begin_s, self.window.end_s], showspikes=True,
                        spikemode="across", spikethickness=1, spikecolor=ink.quiet),
-            yaxis=axis("position, mm", domain=[0.52, 1.0]),
-            yaxis2=axis("error, mm", domain=[0.24, 0.47], **zero),
-            yaxis3=axis(asked, domain=[0.0, 0.19], nticks=4),
+            yaxis=axis(f"position, {position}", domain=[0.52, 1.0]),
+            yaxis2=axis(f"error, {position}", domain=[0.24, 0.47], **zero),
+            yaxis3=axis(f"{'set point' if self._by_setpoint else 'pressure'}, {asked}", domain=[0.0, 0.19], nticks=4),
         )  # fmt: skip
 
     def _trace(self, name: str, x: list[Any], y: list[Any], ink: Ink) -> Figure:
-        below = {"command", "pressure", "model's pressure"}
-        y_axis = "y2" if name.startswith("error") else "y3" if name in below else "y"
+        y_axis = "y2" if name.startswith("error") else "y3" if name in BELOW else "y"
         steps = {"shape": "hv"} if name == "command" else {}
         dash = {"dash": "dot"} if "as opened" in name else {}
-        unit = "mm" if y_axis != "y3" or self._by_setpoint else "kPa"
+        unit = self._unit(name).name
         return {
             "type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "yaxis": y_axis,
             "line": {"color": _colour(name, ink), "width": 1.4, **steps, **dash},
@@ -136,7 +148,19 @@ class TimeFigure:
             "showlegend": bool(x) and y_axis == "y", "connectgaps": False,
         }  # fmt: skip
 
-    def _points(self, values: Column | None, most: int) -> tuple[list[float | None], list[float | None]]:
+    def shades(self, ink: Ink) -> list[Figure]:
+        """Return what shades the stretch that a sentence speaks of."""
+        if self.stretch is None:
+            return []
+        ends = {"x0": self.stretch.begin_s, "x1": self.stretch.end_s, "y0": 0, "y1": 1, "yref": "paper"}
+        line = {"color": ink.better, "width": 1}
+        return [{"type": "rect", "fillcolor": ink.better, "opacity": 0.18, "layer": "below", "line": line, **ends}]
+
+    def _unit(self, name: str) -> Unit:
+        is_pressure = name in BELOW and not self._by_setpoint
+        return self._units.pressure if is_pressure else self._units.position_unit(self._stroke_m)
+
+    def _points(self, values: Column | None, per_si: float, most: int) -> tuple[list[float | None], list[float | None]]:
         if values is None:
             return [], []
         width_s = self.window.end_s - self.window.begin_s
@@ -144,7 +168,7 @@ class TimeFigure:
         first, end = np.searchsorted(self._along_s, ends_s)
         first, end = max(0, int(first) - 1), min(self._along_s.size, int(end) + 1)
         rows = first + extremes(values[first:end], most)
-        return rounded(self._along_s[rows], 5), rounded(values[rows], 4)
+        return rounded(self._along_s[rows], 5), rounded(per_si * values[rows], 5)
 
 
 def _colour(name: str, ink: Ink) -> str:
@@ -153,6 +177,12 @@ def _colour(name: str, ink: Ink) -> str:
     if "fitted" in name:
         return ink.better
     return ink.quiet if "opened" in name or name == "command" else ink.model
+
+
+def around(stretch: Stretch) -> Window:
+    """Return the window in which a stretch is looked at."""
+    more_s = max(AROUND_S, AROUND * (stretch.end_s - stretch.begin_s))
+    return Window(stretch.begin_s - more_s, stretch.end_s + more_s)
 
 
 def window_of(changes: Mapping[str, Any], whole: Window) -> Window | None:

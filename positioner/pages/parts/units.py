@@ -15,6 +15,14 @@ class Unit:
     per_si: float
     places: int
 
+    def fine(self, value_si: float) -> str:
+        """Return a value with its unit to four figures, however small it is.
+
+        >>> LENGTHS["mm"].fine(4.8736e-05)
+        '0.04874 mm'
+        """
+        return f"{self.per_si * value_si:.4g} {self.name}" if math.isfinite(value_si) else f"{NO_NUMBER} {self.name}"
+
     def text(self, value_si: float) -> str:
         """Return a value with its unit.
 
@@ -47,6 +55,20 @@ class Units:
         if self.position == PERCENT:
             return Unit(PERCENT, 100 / stroke_m, 2) if math.isfinite(stroke_m) else LENGTHS["mm"]
         return LENGTHS[self.position]
+
+    def length_unit(self) -> Unit:
+        """Return the unit of lengths that are no positions."""
+        return LENGTHS.get(self.position, LENGTHS["mm"])
+
+    def as_chosen(self, factor: float, name: str) -> tuple[float, str]:
+        """Return the factor from SI and the name of a unit, those of a pressure or a length as chosen.
+
+        >>> Units(pressure=PRESSURES["psi"]).as_chosen(1e-3, "kPa/s")[1], Units().as_chosen(1e-3, "N/mm")
+        ('psi/s', (0.001, 'N/mm'))
+        """
+        plain, per, rest = name.partition("/")
+        chosen = {"kPa": self.pressure, "mm": self.length_unit()}.get(plain)
+        return (factor, name) if chosen is None else (chosen.per_si, f"{chosen.name}{per}{rest}")
 
     def choose_pressure(self, name: str) -> None:
         """Take a pressure's unit by its name."""
