@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from config.errors import InputError
-from config.exports.export_units import SHARES, allowed_units
+from config.exports.export_units import SHARES, allowed_units, ending_of
 from config.recording import BEHIND_POSITIONER, REQUIRED
 
 RANGE_PA = (0.2e5, 1.0e5)
@@ -75,6 +75,17 @@ def _source(word: str) -> Source:
         also = {"_m": "; with - before it, as in -%, from the other end", "_pa": "; or -%, -mA, -p.u."}.get(ending, "")
         raise InputError("--column", f"{word!r}: unknown unit {unit!r}; allowed: {', '.join(allowed)}{also}")
     return Source(name, theirs, unit)
+
+
+def offered_units(ours: str) -> list[str]:
+    """Return the units that a column of ours may be in, those from the other end too.
+
+    >>> offered_units("position_m")[-3:]
+    ['-%', '-p.u.', '-mA']
+    """
+    ending = ending_of(ours)
+    allowed = allowed_units(ending)
+    return [*allowed, *(f"-{unit}" for unit in allowed if _can_be_turned(ending, unit))]
 
 
 def _can_be_turned(ending: str, unit: str) -> bool:

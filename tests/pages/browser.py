@@ -60,7 +60,7 @@ def opened(
         yield page
         context.close()
         browser.close()
-    assert not complaints
+    assert not complaints, complaints
 
 
 def _from_elsewhere(url: str, address: str) -> list[str]:

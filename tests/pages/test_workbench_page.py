@@ -115,7 +115,15 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
 
 
-def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, tmp_path: Path) -> None:
+def export_of(case: Path, path: Path) -> None:
+    """Write a recording as another program would: other names, positions in mm that nobody says are."""
+    rows = [line.split(",") for line in (case / "fit.csv").read_text().splitlines() if not line.startswith("#")]
+    at = [rows[0].index(name) for name in ("time_s", "position_m", "command_pa")]
+    told = [[f"{float(row[at[0]]):.3f}", f"{1e3 * float(row[at[1]]):.4f}", row[at[2]]] for row in rows[1:]]
+    path.write_text("\n".join(";".join(each) for each in [["Zeit", "Hub", "Stellsignal [Pa]"], *told]))
+
+
+def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, case: Path, tmp_path: Path) -> None:
     rubbish = tmp_path / "rubbish.csv"
     rubbish.write_bytes(b"\x00\x01 no recording")
     with opened(address, width_px=400, dark=True) as page:
@@ -123,4 +131,16 @@ def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, tmp_pa
         expect(page.get_by_test_id("opened")).to_have_count(0)
         drop(page, "drop", rubbish)
         expect(page.get_by_role("alert")).to_have_text(re.compile(r"^(warning)?rubbish\.csv: "))
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+        # Of another program's file the columns are proposed, and drawn as they would be read before they are taken.
+        export_of(case, tmp_path / "export.csv")
+        drop(page, "drop", tmp_path / "export.csv")
+        expect(page.get_by_test_id("preview-said")).to_contain_text("stroke")
+        page.get_by_test_id("unit-position_m").click()
+        page.get_by_role("option", name="mm", exact=True).click()
+        expect(page.get_by_test_id("preview")).to_contain_text("Read so: 1001 samples over 10 s")
+        expect(page.get_by_role("img", name="as it would be read").locator(".scatterlayer path").first).to_be_visible()
+        page.get_by_test_id("confirm").click()
+        expect(page.get_by_test_id("opened")).to_contain_text("export.csv: 1001 samples over 10 s")
         assert page.evaluate("document.documentElement.scrollWidth") <= 400

@@ -26,7 +26,9 @@ class FigureView:
         theme.listen(self.redraw)
 
     def redraw(self) -> None:
-        """Draw it anew."""
+        """Draw it anew, if it is still there."""
+        if self.plot.is_deleted:
+            return
         self.plot.update_figure(self._themed())
 
     def restyle(self, changes: Mapping[str, Sequence[Any]], traces: Sequence[int]) -> None:

@@ -9,6 +9,7 @@ Its files; those up to `search` know no browser:
     background, search              long work in a process of its own; what it has told so far
     page                            the page of one tab
     open_panel                      where a recording and a valve come onto the desk
+    columns_panel, export_figure    which column of an export is which; what it would look like, read so
     compare_panel, findings_panel   measured and simulated; what `compare` says, and where it shows
     sliders                         the parameters
     search_panel, journal_panel     which effect is missing; what was added, and what is taken home

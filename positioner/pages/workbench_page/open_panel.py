@@ -12,8 +12,10 @@ from config.loading import SHIPPED
 from config.writing import write_valve
 from positioner.pages.parts.server import MOST_BYTES
 from positioner.pages.parts.telling import aside, errors_told, heading, sentences, tell_error
+from positioner.pages.parts.theme import Theme
+from positioner.pages.workbench_page.columns_panel import ColumnsPanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
-from positioner.pages.workbench_page.opening import OURS, ColumnChoice, Export, Opened, mapped, opened, wrong_with
+from positioner.pages.workbench_page.opening import Export, Opened, opened, wrong_with
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 """Of files that a folder offers."""
@@ -24,8 +26,9 @@ OWN_FILE = "a file of mine"
 class OpenPanel:
     """The panel; `changed` is called when a recording or a valve is on the desk that was not."""
 
-    def __init__(self, desk: Desk, files: Sequence[Path], changed: Callable[[], None]) -> None:
+    def __init__(self, desk: Desk, theme: Theme, files: Sequence[Path], changed: Callable[[], None]) -> None:
         self._desk = desk
+        self._theme = theme
         self._changed = changed
         with ui.element("section").classes("together"):
             with ui.column().classes("wide"):
@@ -45,7 +48,7 @@ class OpenPanel:
         desk = self._desk
         if desk.export is not None:
             with self._mapping:
-                self._columns(desk.export)
+                ColumnsPanel(desk, desk.export, self._theme, self._take_told)
         if desk.opened is None:
             return
         recording = desk.opened.recording
@@ -114,37 +117,6 @@ class OpenPanel:
             each.classes("w-full").props("dense")
         ui.button("Make the valve", on_click=made).props("outline no-caps")
 
-    def _columns(self, export: Export) -> None:
-        """Ask which column is which, the proposal filled in."""
-        heading(f"{export.name}: which column is which?")
-        ui.label(f"{export.preview.what}; {export.preview.header}").classes("quiet")
-        sentences(export.preview.open, "open")
-        rows = [
-            {"name": each.name, "unit": each.unit or "", "first": ", ".join(map(str, each.cells[:3]))}
-            for each in export.preview.columns
-        ]
-        heads = {"name": "column", "unit": "unit", "first": "first values"}
-        columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
-        ui.table(rows=rows, columns=columns, row_key="name").props("dense flat bordered").classes("w-full")
-        with ui.row():
-            asked = {
-                ours: ui.input(f"{ours}, name:unit", value=export.proposed.columns[ours]).props("dense")
-                for ours in OURS
-            }
-            stroke = ui.number("stroke, mm, if position is in %").props("dense")
-            time_format = ui.input("how dates are written", value=export.proposed.time_format).props("dense")
-
-        async def confirmed() -> None:
-            stroke_m = 1e-3 * stroke.value if stroke.value else self._stroke_m()
-            choice = ColumnChoice({ours: each.value or "" for ours, each in asked.items()}, stroke_m, time_format.value)
-            with errors_told():
-                await self._take(await aside(mapped, export, choice))
-
-        ui.button("Read it so", on_click=confirmed).props('no-caps data-testid="confirm"')
-
-    def _stroke_m(self) -> float | None:
-        return self._desk.valve.file.valve.stroke_m if self._desk.valve else None
-
     async def _dropped(self, event: events.UploadEventArguments) -> None:
         path = await self._kept(event)
         event.sender.run_method("reset")
@@ -161,6 +133,10 @@ class OpenPanel:
             self._desk.export = found
             self.refresh()
         else:
+            await self._take(found)
+
+    async def _take_told(self, found: Opened) -> None:
+        with errors_told():
             await self._take(found)
 
     async def _take(self, found: Opened) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from config.exports.column_mapping import RANGE_PA, ExportOptions, read_mapping
+from config.exports.column_mapping import RANGE_PA, ExportOptions, offered_units, read_mapping
 from config.exports.export_preview import ExportPreview, preview
 from config.exports.own_format import own_recording
 from config.exports.plausibility import oddities
@@ -46,6 +46,16 @@ class ColumnChoice:
         if self.time_format:
             words += ["--time-format", self.time_format]
         return (*words, *(["--decimal", self.decimal] if self.decimal else []))
+
+
+def parted(ours: str, theirs: str) -> tuple[str, str]:
+    """Return the name and the unit of a column as `NAME:UNIT` says it; the unit is empty where it says none.
+
+    >>> parted("position_m", "FIC:101.PV:%"), parted("time_s", "FIC:101")
+    (('FIC:101.PV', '%'), ('FIC:101', ''))
+    """
+    name, _, unit = theirs.rpartition(":")
+    return (name, unit) if name and unit in offered_units(ours) else (theirs, "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,15 +96,15 @@ class TabPage:
         self._desk = desk
         self._theme = theme
         with ui.column().classes("panel"):
-            self._open = OpenPanel(desk, files, self.changed)
+            self._open = OpenPanel(desk, theme, files, self.changed)
             self._rest = ui.column().classes("w-full")
         self.changed()
 
     def changed(self) -> None:
         """Show what goes with the recording and the valve on the desk."""
+        self._theme.forget()
         self._open.refresh()
         self._rest.clear()
-        self._theme.forget()
         if self._desk.live is None:
             with self._rest:
                 ui.label("Begin with a recording and a valve, or with a blind case.").classes("quiet")

@@ -1,0 +1,131 @@
+"""Which column is which: the proposal filled in, and what the recording would look like before it is taken."""
+
+import math
+from collections.abc import Awaitable, Callable
+
+from nicegui import ui
+
+from config.errors import InputError
+from config.exports.column_mapping import offered_units
+from positioner.pages.parts.figure_view import Figure, FigureView
+from positioner.pages.parts.telling import aside, heading, sentences
+from positioner.pages.parts.theme import Theme
+from positioner.pages.workbench_page.desk import Desk
+from positioner.pages.workbench_page.export_figure import export_figure
+from positioner.pages.workbench_page.opening import OURS, ColumnChoice, Export, Opened, mapped, parted, wrong_with
+
+NONE, AS_SAID = "", ""
+WORDS = {
+    "time_s": "time",
+    "position_m": "stem position",
+    "command_pa": "command",
+    "reference_m": "set point",
+    "pressure_pa": "actuator pressure",
+    "load_n": "load",
+}
+ASKED = {"--stroke-m": "stroke", "--column": "column", "--time-format": "how dates are written"}
+"""What options of a command line are called here."""
+PREVIEW_PX = 320
+
+
+class ColumnsPanel:
+    """The choice for one export; `take` is given what was read as chosen."""
+
+    def __init__(self, desk: Desk, export: Export, theme: Theme, take: Callable[[Opened], Awaitable[None]]) -> None:
+        self._desk = desk
+        self._export = export
+        self._theme = theme
+        self._take = take
+        self._asked = 0
+        self._read: Opened | None = None
+        heading(f"{export.name}: which column is which?")
+        ui.label(f"{export.preview.what}; {export.preview.header}").classes("quiet")
+        sentences(export.preview.open, "open")
+        with ui.element("div").classes("together"):
+            with ui.column().classes("side"):
+                self._columns = {ours: self._column(ours) for ours in OURS}
+                unit = desk.units.length_unit()
+                stroke_m = self._stroke_m()
+                value = None if stroke_m is None else round(unit.per_si * stroke_m, 6)
+                self._stroke = ui.number(f"stroke, {unit.name}, if position is in %", value=value, min=0)
+                self._time_format = ui.input("how dates are written", value=export.proposed.time_format)
+                for each in (self._stroke, self._time_format):
+                    each.props("dense").classes("w-full").on("blur", self._show)
+            with ui.column().classes("wide"):
+                self._preview = ui.column().classes("w-full").props('data-testid="preview" aria-live="polite"')
+                self._confirm = ui.button("Read it so", on_click=self._taken).props('no-caps data-testid="confirm"')
+                with ui.expansion("first values of every column", icon="table_rows").classes("w-full"):
+                    self._table()
+        ui.timer(0.0, self._show, once=True)
+
+    def _column(self, ours: str) -> tuple[ui.select, ui.select]:
+        name, unit = parted(ours, self._export.proposed.columns[ours])
+        names = [each.name for each in self._export.preview.columns]
+        columns = dict.fromkeys([*names, name]) | {NONE: "not there"}
+        columns = {key: text or key for key, text in columns.items()}
+        units = {AS_SAID: "as it says, or SI"} | {each: each for each in offered_units(ours)}
+        with ui.row().classes("w-full no-wrap items-end").style("gap: 8px"):
+            column = ui.select(columns, value=name, label=WORDS[ours], on_change=self._show, with_input=False)
+            column.props(f'dense data-testid="column-{ours}"').style("flex: 3 1 0; min-width: 0")
+            shown = ui.select(units, value=unit, label="unit", on_change=self._show)
+            shown.props(f'dense data-testid="unit-{ours}"').style("flex: 2 1 0; min-width: 0")
+        return column, shown
+
+    def _stroke_m(self) -> float | None:
+        return self._desk.valve.file.valve.stroke_m if self._desk.valve else None
+
+    def _choice(self) -> ColumnChoice:
+        said = {
+            ours: f"{column.value}:{unit.value}" if column.value and unit.value else column.value or ""
+            for ours, (column, unit) in self._columns.items()
+        }
+        stroke = self._stroke.value
+        stroke_m = stroke / self._desk.units.length_unit().per_si if stroke else None
+        return ColumnChoice(said, stroke_m, self._time_format.value or "")
+
+    async def _show(self) -> None:
+        """Read it as chosen and show what it would be, or why it cannot be read so."""
+        self._asked += 1
+        mine, choice = self._asked, self._choice()
+        self._confirm.set_enabled(False)
+        try:
+            read = await aside(mapped, self._export, choice)
+            said = await aside(wrong_with, read.recording, choice.stroke_m)
+        except InputError as error:
+            asked = ASKED.get(error.source, self._export.name)
+            self._put(mine, None, [f"{asked}: {error.problem}"])
+            return
+        self._put(mine, read, list(said))
+
+    def _put(self, asked: int, read: Opened | None, said: list[str]) -> None:
+        if asked != self._asked or self._preview.is_deleted:
+            return
+        self._read = read
+        self._confirm.set_enabled(read is not None)
+        self._preview.clear()
+        with self._preview:
+            if read is None:
+                ui.label("It cannot be read so:").classes("text-weight-medium")
+            else:
+                ui.label(f"Read so: {read.recording.summary().splitlines()[0]}").classes("text-weight-medium")
+                FigureView(self._theme, lambda: self._drawn(read), PREVIEW_PX, "the recording as it would be read")
+            sentences(said, "preview-said")
+
+    def _drawn(self, read: Opened) -> Figure:
+        stroke_m = self._choice().stroke_m
+        return export_figure(
+            read.recording, math.nan if stroke_m is None else stroke_m, self._desk.units, self._theme.ink
+        )
+
+    def _table(self) -> None:
+        rows = [
+            {"name": each.name, "unit": each.unit or "", "first": ", ".join(map(str, each.cells[:3]))}
+            for each in self._export.preview.columns
+        ]
+        heads = {"name": "column", "unit": "unit", "first": "first values"}
+        columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
+        ui.table(rows=rows, columns=columns, row_key="name").props("dense flat bordered").classes("w-full")
+
+    async def _taken(self) -> None:
+        if self._read is not None:
+            await self._take(self._read)
