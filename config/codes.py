@@ -219,3 +219,42 @@ class Ne107Cause(Code):
     POSITION_RATE = 15, "position changes faster than the valve can"
     SATURATED = 16, "command at its limit"
     OVERRUN = 17, "cycles or replies too slow"
+
+
+class EventKind(Code):
+    """What an event is; what `event_cause` numbers depends on it (`config.codes.CAUSES`)."""
+
+    NONE = 0, "nothing has happened yet"
+    STARTED = 1, "the daemon started"
+    STOPPED = 2, "the daemon ended"
+    FAULT = 3, "a fault is latched"
+    FAULT_GONE = 4, "a fault is acknowledged and gone"
+    ALARM = 5, "an alarm"
+    ALARM_GONE = 6, "an alarm is over"
+    MODE = 7, "the mode is another"
+    HEALTH = 8, "the NE 107 status is another"
+    EXCITED = 9, "the valve is excited"
+    EXCITATION_ENDED = 10, "the excitation has ended"
+    IDENTIFIED = 11, "an identification was applied"
+    NOT_IDENTIFIED = 12, "an identification was refused"
+    RESTORED = 13, "what is known from before a restart is judged anew"
+    EXPERIMENT = 14, "a played experiment"
+    CONFIGURATION = 15, "the configuration is another than at the last start"
+    HISTORY_GAP = 16, "the history has a gap"
+    HISTORY_ANEW = 17, "the history was unreadable, set aside and begun anew"
+    CLOCK_SET = 18, "the gateway's clock was set"
+
+
+CAUSES: dict[EventKind, type[Code]] = {
+    EventKind.FAULT: Fault,
+    EventKind.FAULT_GONE: Fault,
+    EventKind.ALARM: Fault,
+    EventKind.ALARM_GONE: Fault,
+    EventKind.MODE: Mode,
+    EventKind.HEALTH: Ne107Cause,
+    EventKind.EXCITATION_ENDED: InhibitReason,
+    EventKind.NOT_IDENTIFIED: Refusal,
+    EventKind.RESTORED: Restored,
+    EventKind.EXPERIMENT: ExperimentState,
+}
+"""The code of an event's cause; of a kind that is not here the cause is 0, and a text says it."""

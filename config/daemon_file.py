@@ -218,6 +218,14 @@ class MemoryTable(Schema):
     """One small file for each valve there; without it each start knows nothing of the last."""
 
 
+class HistoryTable(Schema):
+    """Table `[history]`: what has happened, kept in a SQLite file for as long and as large as is said here."""
+
+    folder: FolderName
+    keep_days: Annotated[float, Field(gt=0, le=36_500)] = 400.0
+    limit_mb: Annotated[int, Field(ge=4, le=100_000)] = 100
+
+
 class LogTable(Schema):
     """Table `[log]`: JSON lines on standard error."""
 
@@ -242,6 +250,7 @@ class DaemonFile(Schema):
     recorder: RecorderTable | None = None
     health: HealthTable = HealthTable()
     memory: MemoryTable = MemoryTable()
+    history: HistoryTable | None = None
     log: LogTable = LogTable()
 
     @model_validator(mode="after")
@@ -283,7 +292,7 @@ class DaemonFile(Schema):
         return (self.excitation.kind or ("staircase" if self.control.law == "slides" else "sine")) == "staircase"
 
 
-SHARED = frozenset({"supervisory", "log"})
+SHARED = frozenset({"supervisory", "history", "log"})
 """Tables that the valves of a daemon have together."""
 OWN = frozenset(DaemonFile.model_fields) - SHARED - {"valve"}
 """Tables that each valve of several may have for itself."""

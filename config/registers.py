@@ -10,6 +10,7 @@ from itertools import chain
 from typing import Literal
 
 from config.codes import (
+    EventKind,
     ExperimentState,
     Fault,
     InhibitReason,
@@ -228,7 +229,16 @@ EXPERIMENT = (
     Register("experiment_elapsed", 610, "float32", "s", "time since its first point, while it is under way"),
 )
 
-REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH, *EXPERIMENT)
+EVENTS = (
+    Register("event_number", 700, "uint32", "1", "how many events there were: the number of the newest"),
+    Register("event", 702, "uint16", "1", f"the newest: {listed(EventKind)}"),
+    Register("event_class", 703, "uint16", "1", f"its class by NAMUR NE 107: {listed(Ne107Status)}"),
+    Register("event_cause", 704, "uint16", "1", "its cause, a number of the code that goes with it (docs/history.md)"),
+    Register("event_time", 706, "uint32", "s", "when it happened, since 1970, UTC"),
+    Register("history_lost", 708, "uint32", "1", "entries of the history that were lost since the start"),
+)
+
+REGISTERS = (*COMMANDS, *STATUS, *ESTIMATES, *STATISTICS, *IDENTITY, *HEALTH, *EXPERIMENT, *EVENTS)
 
 BY_NAME = {register.name: register for register in REGISTERS}
 

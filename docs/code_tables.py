@@ -1,13 +1,15 @@
 """The tables of the documents that repeat a code, written from the code: `python -m docs.code_tables`.
 
-`codes.md` is written whole; in `health.md` and `reliability.md` what stands between two marks is.
+`codes.md` is written whole; in `health.md`, `history.md` and `reliability.md` what stands between two marks is.
 """
 
+from dataclasses import fields
 from pathlib import Path
 
-from config.codes import Code, Ne107Cause, Ne107Status, Refusal
+from config.codes import CAUSES, Code, EventKind, Ne107Cause, Ne107Status, Refusal
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
+from positioner.history.entries import TABLES, Entry
 from positioner.observer.words import CODES
 
 HERE = Path(__file__).parent
@@ -15,6 +17,10 @@ BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"
 END = "<!-- end of the classes -->"
 STATES_BEGIN = "<!-- states: written by `python -m docs.code_tables` -->"
 STATES_END = "<!-- end of the states -->"
+EVENTS_BEGIN = "<!-- events: written by `python -m docs.code_tables` -->"
+EVENTS_END = "<!-- end of the events -->"
+TABLES_BEGIN = "<!-- tables: written by `python -m docs.code_tables` -->"
+TABLES_END = "<!-- end of the tables -->"
 HEAD = """# What the numbers say
 
 Written by `python -m docs.code_tables` from `config/codes.py`, from which `positioner map` has its texts, too. A number
@@ -22,6 +28,7 @@ never gets a new meaning.
 """
 SERVED: dict[type[Code], str] = {code: register for register, code in CODES.items()} | {
     Refusal: "*_reason, refusal",
+    Ne107Status: "ne107, event_class",
     Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes",
 }
 """The register that serves each."""
@@ -57,9 +64,36 @@ def with_states(document: str) -> str:
     return "\n".join([head + STATES_BEGIN, *table(), STATES_END + tail])
 
 
+def with_events(document: str) -> str:
+    """Return `history.md` with the kinds of events and the tables of the file between their marks."""
+    kinds = [f"| {int(kind)} | `{kind.name}` | {kind.text} | {_cause(kind)} |" for kind in EventKind if kind]
+    events = ["| number | name | | cause |", "|---|---|---|---|", *kinds]
+    tables = [
+        f"| `{each.TABLE}` | {', '.join(_column(each, field.name) for field in fields(each))} |" for each in TABLES
+    ]
+    document = _between(document, EVENTS_BEGIN, EVENTS_END, events)
+    columns = ["| table | columns; what tells a row from another in bold |", "|---|---|", *tables]
+    return _between(document, TABLES_BEGIN, TABLES_END, columns)
+
+
+def _cause(kind: EventKind) -> str:
+    return f"a number of `{CAUSES[kind].__name__}`" if kind in CAUSES else "a text"
+
+
+def _column(of: type[Entry], name: str) -> str:
+    return f"**{name}**" if name in of.KEY else name
+
+
+def _between(document: str, begin: str, end: str, lines: list[str]) -> str:
+    head, _, rest = document.partition(begin)
+    return "\n".join([head + begin, *lines, end + rest.partition(end)[2]])
+
+
 if __name__ == "__main__":
     (HERE / "codes.md").write_text(codes(), encoding="utf-8")
     health = HERE / "health.md"
     health.write_text(renewed(health.read_text(encoding="utf-8")), encoding="utf-8")
     reliability = HERE / "reliability.md"
     reliability.write_text(with_states(reliability.read_text(encoding="utf-8")), encoding="utf-8")
+    history = HERE / "history.md"
+    history.write_text(with_events(history.read_text(encoding="utf-8")), encoding="utf-8")

@@ -44,6 +44,14 @@ REFUSALS_SAID, REFUSALS_SAID_PER_S = 50, 0.2
 """Lines on who was turned away: so many at once, then one in five seconds."""
 SCARCE = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
 SCARCE_WAIT_S = 0.1
+Witness = Callable[[str, str, str], None]
+"""Told of a session: whose it is; `connected`, `turned away`, `refused` or `gone`; and why."""
+
+
+def nobody_asks(_peer: str, _what: str, _why: str) -> None:
+    """Be no witness."""
+
+
 THIS_DEVICE = frozenset((0, 255))
 """Unit numbers that mean the device at this address, besides its own."""
 
@@ -59,6 +67,7 @@ class RegisterServer(RegisterAnswers):
         guard: secures every connection with TLS, and says what each client may do; None serves all in the clear.
         others: the registers of other units behind the same port. With them "this device" is nobody's number.
         limits: of clients and requests.
+        witness: told of sessions: `host:port` or `name (role) at host:port`, what became of it, and why.
     """
 
     def __init__(
@@ -70,8 +79,10 @@ class RegisterServer(RegisterAnswers):
         guard: Guard | None = None,
         others: Mapping[int, Registers] | None = None,
         limits: ServerLimits | None = None,
+        witness: Witness = nobody_asks,
     ) -> None:
         super().__init__(registers)
+        self._witness = witness
         self._limits = limits or ServerLimits()
         self._address = (host, port)
         self._units: dict[int, RegisterAnswers] = {unit: self}
@@ -89,7 +100,7 @@ class RegisterServer(RegisterAnswers):
             InputError: the address or the port cannot be bound.
         """
         try:
-            self._listener = _Listener(self._address, self._reply, self._guard, self._limits)
+            self._listener = _Listener(self._address, self._reply, self._guard, self._limits, self._witness)
         except (OSError, OverflowError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             raise InputError(endpoint(self._address), f"cannot listen there: {reason}") from None
@@ -128,6 +139,7 @@ class RegisterServer(RegisterAnswers):
             guard.authorize(identity, pdu)
         except NotAuthorized as refusal:
             log.warning("%s at %s refused: %s", identity, peer, refusal)
+            self._witness(f"{identity} at {peer}", "refused", str(refusal))
             return exception_reply(pdu[0], ExcCodes.ILLEGAL_FUNCTION)
         return unit.answer(pdu, f"{identity} at {peer}")
 
@@ -145,12 +157,14 @@ class _Listener(ThreadingTCPServer):
         answer: Callable[[int, bytes, str], bytes],
         guard: Guard | None,
         limits: ServerLimits,
+        witness: Witness,
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
         self.answer = answer
         self.identities: dict[str, Identity] = {}
         """Who is at the other end of each secured connection, by its `host:port`."""
         self._guard = guard
+        self._witness = witness
         self._connections: dict[Any, str] = {}
         self._places = Places(limits)
         self._sayable = Allowance(REFUSALS_SAID_PER_S, REFUSALS_SAID)
@@ -202,7 +216,14 @@ class _Listener(ThreadingTCPServer):
             self._say_refused(peer, admitted.refusal)
         if admitted.gone:
             self._dismiss(admitted)
+        if admitted.refusal is None:
+            self._witness(self._said(peer), "connected", "")
         return admitted.refusal is None
+
+    def _said(self, peer: str) -> str:
+        """Return what a peer is called: with the name and role of its certificate, where it has shown one."""
+        identity = self.identities.get(peer)
+        return peer if identity is None else f"{identity} at {peer}"
 
     def _dismiss(self, admitted: Admitted) -> None:
         """End the connection that gives way."""
@@ -217,7 +238,9 @@ class _Listener(ThreadingTCPServer):
             self._unsaid += 1
             return
         unsaid, self._unsaid = self._unsaid, 0
-        log.warning("%s refused: %s%s", peer, reason, f" ({unsaid} more were refused)" if unsaid else "")
+        more = f" ({unsaid} more were refused)" if unsaid else ""
+        log.warning("%s refused: %s%s", peer, reason, more)
+        self._witness(peer, "turned away", f"{reason}{more}")
 
     def process_request(self, request: Any, client_address: Any) -> None:
         self._connections[request] = endpoint(client_address)
@@ -236,6 +259,7 @@ class _Listener(ThreadingTCPServer):
                 self.identities[peer] = self._guard.handshake(secured)
                 if self._has_place(peer, str(client_address[0])):
                     super().finish_request(secured, client_address)
+                    self._witness(self._said(peer), "gone", "")
             except OSError as error:
                 self._say_refused(peer, failure_reason(error))
                 _linger(secured)
@@ -248,6 +272,7 @@ class _Listener(ThreadingTCPServer):
         if peer := self._connections.pop(request, None):
             self._places.leave(peer)
             log.debug("%s gone", peer)
+            self._witness(peer, "gone", "")
         super().shutdown_request(request)
 
     def handle_error(self: BaseServer, _request: Any, client_address: Any) -> None:

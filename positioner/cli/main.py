@@ -22,6 +22,7 @@ COMMANDS = (
     "identify",
     "discriminate",
     "map",
+    "events",
     "import",
     "valve",
     "simulate",

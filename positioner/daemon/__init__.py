@@ -14,4 +14,5 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     recorder, logs                recordings and log lines, written beside the cycle
     memory                        what is known of a valve, kept over restarts
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
+    history                       what has happened, written beside the cycle
 """

@@ -20,6 +20,7 @@ from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.health import Health
+from positioner.daemon.history.valve_history import ValveHistory
 from positioner.daemon.link import Link
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.pacing import Pace
@@ -44,12 +45,14 @@ class Cycle:
         recorder: Recorder | None,
         valve: str | None = None,
         health: Health | None = None,
+        history: ValveHistory | None = None,
     ) -> None:
         self.requests = requests
         self.statistics = CycleStatistics()
         self.link = link
         self.recorder = recorder
         self.health = health
+        self.history = history
         self._controller = controller
         self._pace = pace
         self._valve = valve
@@ -78,6 +81,8 @@ class Cycle:
         before, self.snapshot = self.snapshot, self._decide()
         if _logged_fields(before.decision) != _logged_fields(self.snapshot.decision):
             _log_decision(self.snapshot.decision)
+        if self.history is not None:
+            self.history.enter(before.decision, self.snapshot.decision)
 
     def _decide(self) -> Snapshot:
         sent_pa = self._controller.command_pa
@@ -90,7 +95,7 @@ class Cycle:
             self.recorder.offer(_row(sample, decision, in_force_pa, self.link.counts.lost_samples))
         if self.health is not None:
             self.health.enter(sample, decision, self.requests)
-        return Snapshot(sample, decision)
+        return Snapshot(sample, decision, None if self.history is None else self.history.newest)
 
 
 def run_in_turn(cycles: Sequence[Cycle], stop: Event) -> None:

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 
+from config.codes import EventKind
 from config.daemon_file import DaemonFile
 from config.errors import InputError
 from config.extended_valve import ExtendedValve
@@ -27,7 +28,11 @@ from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.ending import Endings
-from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth
+from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
+from positioner.daemon.health.ne107 import Ne107Condition
+from positioner.daemon.history import HistoryKeeper, ValveHistory
+from positioner.daemon.history.decision_events import Happened
+from positioner.daemon.history.health_hours import HealthLook
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
@@ -99,11 +104,15 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
         on_exit.callback(start_logging(files[0].log.level).stop)
         refinement = RefinementProcess()
         on_exit.callback(refinement.stop)
+        history = HistoryKeeper(files[0].history, source.parent)
+        on_exit.callback(lambda: history.stop(endings.reason or "it could not start"))
         paced = zip(files, extended, _paces(files), strict=True)
         valves = [
-            _assembled(file, valve, pace, source, len(files) == 1, on_exit, refinement) for file, valve, pace in paced
+            _assembled(file, valve, pace, source, len(files) == 1, on_exit, refinement, history)
+            for file, valve, pace in paced
         ]
-        server = _server(valves)
+        history.start()
+        server = _server(valves, history)
         server.start()
         on_exit.callback(server.stop)
         for recorder in [valve.recorder for valve in valves if valve.recorder is not None]:
@@ -132,6 +141,7 @@ def _assembled(
     is_alone: bool,
     on_exit: ExitStack,
     refinement: RefinementProcess,
+    history: HistoryKeeper,
 ) -> ServedValve:
     settings = Settings.of(file, extended)
     link_settings = LinkSettings.of(file, settings.limits.restart_tolerance_pa)
@@ -165,9 +175,13 @@ def _assembled(
         HealthSettings.of(file.health, file.valve.stroke_m, file.supervision), stored.record if stored else None
     )
     with logging_valve(file.valve.name):
-        cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health)
+        happened = history.valve(file, health.settings.monitor_classes)
+        cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health, happened)
+    happened.look = partial(_look, cycle, health)
     keepers: list[HealthKeeper | MemoryKeeper] = [
-        HealthKeeper(health, lambda: cycle.snapshot.decision, file.valve.name, stored)
+        HealthKeeper(
+            health, lambda: cycle.snapshot.decision, file.valve.name, stored, partial(_tell_of_health, happened)
+        )
     ]
     if memory is not None:
         keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
@@ -250,7 +264,26 @@ def _paces(files: Sequence[DaemonFile]) -> list[Pace]:
     ]
 
 
-def _server(valves: Sequence[ServedValve]) -> RegisterServer:
+def _look(cycle: Cycle, health: Health) -> HealthLook:
+    """Return a valve's health and counts as they are now."""
+    statistics, counts = cycle.statistics, cycle.link.counts
+    return HealthLook(
+        ne107_condition(cycle.snapshot.decision, health).status,
+        health.record,
+        health.friction_pa,
+        statistics.cycles,
+        statistics.missed_periods,
+        counts.lost_samples,
+        counts.lost_replies,
+        cycle.recorder.unrecorded if cycle.recorder else 0,
+    )
+
+
+def _tell_of_health(history: ValveHistory, condition: Ne107Condition) -> None:
+    history.happened(Happened(EventKind.HEALTH, condition.status, condition.cause))
+
+
+def _server(valves: Sequence[ServedValve], history: HistoryKeeper) -> RegisterServer:
     first, *others = valves
     where = first.file.supervisory
     return RegisterServer(
@@ -261,6 +294,7 @@ def _server(valves: Sequence[ServedValve]) -> RegisterServer:
         _guard(first.file),
         {valve.file.supervisory.unit: valve.served() for valve in others},
         ServerLimits(where.most_clients, where.clients_per_host, frozenset(where.reserved_hosts), where.requests_per_s),
+        history.session,
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from positioner.control.controller_memory import Decision
 from positioner.control.sample import Sample
+from positioner.history.entries import Event
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,3 +13,5 @@ class Snapshot:
 
     sample: Sample
     decision: Decision
+    event: Event | None = None
+    """The newest of the valve's history, if it has one."""

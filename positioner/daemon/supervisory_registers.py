@@ -44,6 +44,7 @@ from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.service_state import state_by_mode
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.estimates import Estimate
+from positioner.history.entries import Event
 
 log = logging.getLogger(__name__)
 
@@ -106,9 +107,13 @@ class SupervisoryRegisters:
                 self._cycle.requests = self._requested(values)
             except WriteRejected as rejected:
                 self._say(logging.WARNING, "write refused", peer, address=address, reason=rejected.reason)
+                if self._cycle.history is not None:
+                    self._cycle.history.refused(peer, rejected.reason)
                 raise RegisterError(rejected.code) from None
             level = logging.DEBUG if values.keys() <= {"reference", "reference_scaled", "heartbeat"} else logging.INFO
             self._say(level, "write", peer, **values)
+            if self._cycle.history is not None:
+                self._cycle.history.wrote(peer, values)
 
     def _say(self, level: int, event: str, peer: str, **fields: object) -> None:
         """Log what a peer did; of much, some, with how many lines of its host were passed over before."""
@@ -222,6 +227,7 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         **_identity_getters(),
         **_health_getters(cycle, stroke_m),
         **experiment_getters(),
+        **_event_getters(cycle),
     }
     assert getters.keys() == BY_NAME.keys() - {"heartbeat", "service"}, getters.keys() ^ BY_NAME.keys()
     return getters
@@ -338,6 +344,20 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "reversals": lambda _s, _r: health.record.reversals,
         "stiction_index": lambda _s, _r: health.record.stiction_index,
         "moves_judged": lambda _s, _r: health.record.moves_judged,
+    }
+
+
+def _event_getters(cycle: Cycle) -> dict[str, Getter]:
+    def newest(of: Callable[[Event], float]) -> Getter:
+        return lambda s, _: 0 if s.event is None else of(s.event)
+
+    return {
+        "event_number": newest(lambda event: event.number),
+        "event": newest(lambda event: event.kind),
+        "event_class": newest(lambda event: event.ne107),
+        "event_cause": newest(lambda event: event.cause),
+        "event_time": newest(lambda event: int(event.time_s)),
+        "history_lost": lambda _s, _r: 0 if cycle.history is None else cycle.history.lost(),
     }
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from config.codes import (
     Code,
+    EventKind,
     ExperimentState,
     Fault,
     InhibitReason,
@@ -33,6 +34,8 @@ CODES: dict[str, type[Code]] = {
     "experiment_state": ExperimentState,
     "ne107": Ne107Status,
     "ne107_cause": Ne107Cause,
+    "event": EventKind,
+    "event_class": Ne107Status,
 }
 """The code that each register of one serves."""
 

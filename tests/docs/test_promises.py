@@ -1,4 +1,4 @@
-"""Each promise of `docs/reliability.md` names a test, and there is such a test."""
+"""Each promise of `docs/reliability.md` and `docs/history.md` names a test, and there is such a test."""
 
 import ast
 import re
@@ -7,12 +7,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TABLE = (ROOT / "docs" / "reliability.md").read_text().partition("\n| promise | test |\n")[2].partition("\n\n")[0]
-PROMISES = [row.strip("| ").split(" | ") for row in TABLE.splitlines()[1:]]
+DOCUMENTS = ("reliability.md", "history.md")
+TABLES = [
+    (ROOT / "docs" / name).read_text().partition("\n| promise | test |\n")[2].partition("\n\n")[0] for name in DOCUMENTS
+]
+PROMISES = [row.strip("| ").split(" | ") for table in TABLES for row in table.splitlines()[1:]]
 
 
 def test_there_are_promises() -> None:
     assert len(PROMISES) > 30
+    assert all(TABLES)
     assert all(len(each) == 2 for each in PROMISES)
 
 

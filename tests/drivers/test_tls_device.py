@@ -213,6 +213,35 @@ def test_an_observer_reads_and_moves_nothing(caplog: pytest.LogCaptureFixture) -
         driver.close()
 
 
+def test_sessions_and_refusals_are_witnessed_with_name_and_role() -> None:
+    witnessed: list[tuple[str, str, str]] = []
+    device = device_of(SlaveFile(), shipped_valve("seed"))
+    registers = DeviceRegisters(device, Lockstep(device))
+    server = RegisterServer(registers, "127.0.0.1", 0, 1, guarded(), witness=lambda *said: witnessed.append(said))
+    server.start()
+    try:
+        file = ModbusTcpDevice(port=server.port, reply_timeout_s=2.0, tls=tls("observer"))
+        driver = ModbusTcpDriver(file.read_only())
+        driver.open()
+        with pytest.raises(Refused):
+            driver.write(PUSH_PA)
+        driver.close()
+        turned_away(server, tls("outdated"))
+        end_s = time.monotonic() + 60
+        while not {"gone", "turned away"} <= {what for _, what, _ in witnessed}:
+            assert time.monotonic() < end_s, witnessed
+            time.sleep(5e-3)
+    finally:
+        server.stop()
+    named = [
+        (what, why) for who, what, why in witnessed if re.fullmatch(r"observer \(observer\) at 127\.0\.0\.1:\d+", who)
+    ]
+    assert ("connected", "") in named
+    assert ("gone", "") in named
+    assert any(what == "refused" and "needs the role operator" in why for what, why in named)
+    assert all("observer" not in who for who, what, _ in witnessed if what == "turned away")
+
+
 def test_a_certificate_without_role_may_not_even_read(caplog: pytest.LogCaptureFixture) -> None:
     without = ssl.PEM_cert_to_DER_cert((folder() / "device.pem").read_text())
     assert identity_in(without).role is Role.NONE

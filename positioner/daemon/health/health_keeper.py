@@ -54,12 +54,18 @@ class HealthKeeper:
     """A thread from `start` to `stop`. Without a file it only says when the status changes."""
 
     def __init__(
-        self, health: Health, decided: Callable[[], Decision], valve: str, stored: StoredHealth | None
+        self,
+        health: Health,
+        decided: Callable[[], Decision],
+        valve: str,
+        stored: StoredHealth | None,
+        tell: Callable[[Ne107Condition], None] = lambda _: None,
     ) -> None:
         self._health = health
         self._decided = decided
         self._valve = valve
         self._file = stored
+        self._tell = tell
         self._written = health.record
         self._logged = Ne107Condition(())
         self._failed = False
@@ -87,6 +93,7 @@ class HealthKeeper:
             self._logged = now
             level = logging.INFO if now.status in (Ne107Status.GOOD, Ne107Status.FUNCTION_CHECK) else logging.WARNING
             causes = [cause.name for cause in now.causes]
+            self._tell(now)
             log_event(
                 log, level, "health", status=now.status.name, causes=causes, friction_ratio=self._health.friction_ratio
             )

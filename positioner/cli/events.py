@@ -1,0 +1,144 @@
+"""`positioner events`: what has happened, out of a daemon's history, also while it runs."""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from positioner.history import HistoryReader
+
+HELP = "print what has happened: events, or writes with peer and role, from the history of a daemon"
+EXAMPLE = "positioner events daemon.toml --since 2h --follow"
+
+FOLLOW_EVERY_S = 0.5
+TABLES = ("events", "writes", "identifications", "health", "configuration", "configuration_changes")
+DURATIONS_S = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument(
+        "source", type=Path, metavar="CONFIG.toml|FILE", help="the daemon's file, or its history.sqlite or its folder"
+    )
+    parser.add_argument("--valve", metavar="NAME", help="only of this valve")
+    parser.add_argument(
+        "--since", type=_since, metavar="TIME", help="only from then on: 30m, 2h, 7d ago, or 2026-03-01T06:00 (UTC)"
+    )
+    parser.add_argument("--limit", type=_count, metavar="N", help="only the newest N")
+    parser.add_argument("--table", choices=TABLES, default="events", help="what to print (events)")
+    parser.add_argument("--follow", action="store_true", help="go on printing what is new, until Ctrl-C")
+    parser.add_argument("--json", action="store_true", help="print a JSON object a line")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the entries, oldest first."""
+    import time
+
+    from positioner.history import HistoryReader
+
+    show = _as_json if arguments.json else _in_words
+    with HistoryReader(_history_of(arguments.source)) as history:
+        row = 0
+        while True:
+            found = _found(history, arguments, row)
+            for _, entry in found:
+                print(show(entry))
+            if not arguments.follow:
+                return 0
+            row = found[-1][0] if found else row
+            print(end="", flush=True)
+            time.sleep(FOLLOW_EVERY_S)
+
+
+def _history_of(source: Path) -> Path:
+    """Return where the history is.
+
+    Raises:
+        InputError: the daemon's file is at fault, or keeps none.
+    """
+    from config.daemon_file import load_valves
+    from config.errors import InputError
+
+    if source.suffix != ".toml":
+        return source
+    table = load_valves(source)[0].history
+    if table is None:
+        raise InputError(str(source), "has no table [history], so nothing is kept")
+    return source.parent / table.folder
+
+
+def _found(history: "HistoryReader", arguments: argparse.Namespace, after_row: int) -> list[tuple[int, Any]]:
+    from positioner.history import entries
+
+    table = next(each for each in entries.TABLES if arguments.table == each.TABLE)
+    limit = None if after_row else arguments.limit
+    return history.rows(table, arguments.valve, arguments.since, after_row=after_row, limit=limit)
+
+
+def _as_json(entry: Any) -> str:
+    import json
+    import math
+    from dataclasses import asdict
+
+    values = asdict(entry).items()
+    return json.dumps({key: None if isinstance(value, float) and math.isnan(value) else value for key, value in values})
+
+
+def _in_words(entry: Any) -> str:
+    from config.codes import EventKind, Ne107Status
+    from positioner.history.entries import Event, Write
+
+    if isinstance(entry, Event):
+        kind = EventKind(entry.kind).text if entry.kind in list(EventKind) else entry.name
+        return _joined(
+            f"{_clock(entry.time_s)}  {entry.number:6}  {entry.valve}",
+            f"{Ne107Status(entry.ne107).text:15}",
+            kind + (f": {entry.text}" if entry.text else ""),
+        )
+    if isinstance(entry, Write):
+        who = f"{entry.who} ({entry.role}) at {entry.peer}" if entry.who else entry.peer
+        times = f" ({entry.times} times until {_clock(entry.end_s)})" if entry.times > 1 else ""
+        return _joined(_clock(entry.begin_s), entry.valve or "-", who, f"{entry.what} {entry.text}".rstrip() + times)
+    return _joined(*_plain(entry))
+
+
+def _plain(entry: Any) -> Iterator[str]:
+    from dataclasses import asdict
+
+    for name, value in asdict(entry).items():
+        if name in ("time_s", "hour_s"):
+            yield _clock(value)
+        else:
+            yield f"{name} {value:.6g}" if isinstance(value, float) else f"{name} {value}"
+
+
+def _joined(*parts: str) -> str:
+    """Return one line of them, whatever a client has called itself: no control character leaves it."""
+    line = "  ".join(parts)
+    return "".join(each if each.isprintable() else "?" for each in line)
+
+
+def _clock(time_s: float) -> str:
+    from datetime import UTC, datetime
+
+    return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%dT%H:%M:%S}.{int(time_s % 1 * 1000):03}Z"
+
+
+def _since(text: str) -> float:
+    import time
+    from datetime import UTC, datetime
+
+    if text[-1:] in DURATIONS_S and text[:-1].replace(".", "", 1).isdecimal():
+        return time.time() - float(text[:-1]) * DURATIONS_S[text[-1]]
+    try:
+        found = datetime.fromisoformat(text)
+        return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
+    except (ValueError, OverflowError):
+        raise argparse.ArgumentTypeError(f"allowed are 30m, 2h, 7d or 2026-03-01T06:00, got {text[:40]!r}") from None
+
+
+def _count(text: str) -> int:
+    if not (text.isdecimal() and 0 < len(text) < 10 and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1 up, got {text[:40]!r}")
+    return int(text)

@@ -1,0 +1,280 @@
+"""The history's file: SQLite with a write-ahead log, each batch forced to the disk before it counts as written.
+
+A crash or a loss of power leaves all batches before it, whole. Readers never wait for the writer, nor it for them.
+The file is bounded: by age, and by size, where the oldest tenth of the table with the most rows goes first, so that a
+flood of one kind pushes out its own kind; the newest `ALWAYS_KEPT` rows of each stay whatever the clock says.
+
+What is another program's, or of another version of this schema, is refused; what is damaged is set aside.
+"""
+
+import fcntl
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
+from dataclasses import astuple, fields
+from pathlib import Path
+from typing import Any
+
+from config.errors import InputError
+from positioner.history.entries import TABLES, Entry, Event, Setting
+
+FILE_NAME = "history.sqlite"
+APPLICATION = 0x504F5331
+"""In the header of the file: whose it is."""
+VERSION = 1
+"""Of the tables; a change of `entries` has the next."""
+COLUMN_TYPES = {str: "TEXT", int: "INTEGER", float: "REAL"}
+ALWAYS_KEPT = 1000
+FULL_SHARE = 0.9
+"""Of the limit, above which the oldest goes: the write-ahead log needs room, too."""
+BEYOND_IDS = ("-wal", "-shm")
+WAL_PAGES = 128
+"""After so many the write-ahead log goes into the file."""
+WAL_BYTES = 1 << 20
+"""What it may come to with the largest change."""
+SECONDS_A_DAY = 86_400.0
+
+
+class HistoryFull(OSError):
+    """What was to be written is not: no room, or the disk fails. It may be tried again."""
+
+
+class HistoryFile:
+    """The writer; one for a file.
+
+    Args:
+        folder: where it is, made if need be.
+        keep_days: rows older than this go.
+        limit_mb: of the file and its log together, MB.
+
+    Raises:
+        InputError: the folder cannot be written, another daemon writes there, the file is another program's or
+            another version's.
+    """
+
+    def __init__(self, folder: Path, keep_days: float, limit_mb: int) -> None:
+        self.path = folder / FILE_NAME
+        self.set_aside: str | None = None
+        """Why the file that was there could not be used, and what it is called now."""
+        self._keep_s = keep_days * SECONDS_A_DAY
+        self._limit_bytes = limit_mb * 1_000_000
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(folder / f"{FILE_NAME}.lock")
+        except OSError as error:
+            raise InputError(str(folder), f"the history cannot be kept there: {error.strerror}") from None
+        try:
+            self._connection = self._opened()
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def append(self, entries: Iterable[Entry]) -> None:
+        """Write entries, all or none; they are on the disk when this returns.
+
+        Raises:
+            HistoryFull: none was written.
+        """
+        with self._changing():
+            for entry in entries:
+                self._connection.execute(_insert(type(entry)), astuple(entry))
+
+    def expire(self, now_s: float) -> None:
+        """Delete what is too old.
+
+        Raises:
+            HistoryFull: it could not be done now.
+        """
+        with self._changing():
+            for entry in TABLES:
+                if clock := clock_of(entry):
+                    newest = f"(SELECT coalesce(max(rowid), 0) - {ALWAYS_KEPT} FROM {entry.TABLE})"
+                    self._connection.execute(
+                        f"DELETE FROM {entry.TABLE} WHERE rowid <= {newest} AND {clock} < ?", (now_s - self._keep_s,)
+                    )
+
+    def shrink(self) -> None:
+        """Delete the oldest of what there is too much.
+
+        Raises:
+            HistoryFull: it could not be done now.
+        """
+        with self._changing():
+            while self._used_bytes() > FULL_SHARE * self._limit_bytes:
+                if not self._delete_a_tenth():
+                    break
+        with self._changing(in_one=False):
+            self._connection.executescript("PRAGMA incremental_vacuum")  # `execute` frees one page and stops
+
+    def newest_event(self, valve: str) -> Event | None:
+        """Return a valve's newest event, None before its first."""
+        names = ", ".join(field.name for field in fields(Event))
+        said = f"SELECT {names} FROM events WHERE valve = ? ORDER BY number DESC LIMIT 1"
+        found = self._connection.execute(said, (valve,)).fetchone()
+        return Event(*found) if found else None
+
+    def last_write(self) -> int:
+        """Return the number of the newest write."""
+        return int(self._connection.execute("SELECT max(number) FROM writes").fetchone()[0] or 0)
+
+    def settings(self, valve: str) -> dict[str, str]:
+        """Return the configuration of a valve at the last start, by key."""
+        said = f"SELECT key, value FROM {Setting.TABLE} WHERE valve = ? AND value != ''"
+        return dict(self._connection.execute(said, (valve,)).fetchall())
+
+    def close(self) -> None:
+        """Close the file, its log merged into it."""
+        with suppress(sqlite3.Error):  # on a full disk the log stays beside it, and is as good
+            self._connection.close()
+        os.close(self._lock)
+
+    @contextmanager
+    def _changing(self, *, in_one: bool = True) -> Iterator[None]:
+        """Make changes, all or none.
+
+        Raises:
+            HistoryFull: none was made.
+        """
+        try:
+            with self._connection:
+                if in_one:
+                    self._connection.execute("BEGIN IMMEDIATE")
+                yield
+        except sqlite3.Error as error:
+            raise HistoryFull(str(error)) from None
+
+    def _opened(self) -> sqlite3.Connection:
+        try:
+            if not self.path.exists():
+                _make(self.path)
+            return _connected(self.path)
+        except sqlite3.OperationalError as error:
+            raise InputError(str(self.path), f"the history cannot be kept there: {error}") from None
+        except sqlite3.DatabaseError as error:
+            self._put_aside(str(error))
+        return self._opened()
+
+    def _put_aside(self, reason: str) -> None:
+        """Give a damaged file another name, with its log."""
+        for suffix in ("", *BEYOND_IDS):
+            path = self.path.with_name(self.path.name + suffix)
+            if path.exists():
+                path.replace(self.path.with_name(f"{FILE_NAME}.unreadable{suffix}"))
+        self.set_aside = f"{reason}; it is {FILE_NAME}.unreadable now"
+
+    def _delete_a_tenth(self) -> int:
+        """Delete the oldest tenth of the table that has the most rows; return how many they were."""
+        spans = {
+            entry.TABLE: self._connection.execute(
+                f"SELECT count(*), coalesce(min(rowid), 0), coalesce(max(rowid), 0) FROM {entry.TABLE}"
+            ).fetchone()
+            for entry in TABLES
+            if clock_of(entry)
+        }
+        table, (_, first, last) = max(spans.items(), key=lambda each: each[1][0])
+        oldest = first + (last - first) // 10
+        return self._connection.execute(f"DELETE FROM {table} WHERE rowid <= ?", (oldest,)).rowcount
+
+    def _used_bytes(self) -> int:
+        pages, free, size = (
+            self._connection.execute(f"PRAGMA {each}").fetchone()[0]
+            for each in ("page_count", "freelist_count", "page_size")
+        )
+        return int((pages - free) * size) + WAL_BYTES
+
+
+def require_ours(path: Path) -> None:
+    """Refuse what another program or another version has written, before anything of it is touched.
+
+    Raises:
+        InputError: it is not ours, or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(100)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+    if not head.startswith(b"SQLite format 3\0") or int.from_bytes(head[68:72]) != APPLICATION:
+        raise InputError(str(path), "is not a history of this program")
+    if (version := int.from_bytes(head[60:64])) != VERSION:
+        raise InputError(str(path), f"is a history of version {version}, allowed is {VERSION}; move it away")
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    """Open the file to write.
+
+    Raises:
+        InputError: it is not ours, or of another version.
+        DatabaseError: it is damaged; OperationalError: it cannot be opened.
+    """
+    require_ours(path)
+    connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=2.0)
+    try:
+        if said := connection.execute("PRAGMA quick_check(1)").fetchone()[0].removeprefix("ok"):
+            raise sqlite3.DatabaseError(said)
+        connection.execute("PRAGMA journal_mode = WAL").fetchall()
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute(f"PRAGMA wal_autocheckpoint = {WAL_PAGES}").fetchall()
+        connection.execute(f"PRAGMA journal_size_limit = {WAL_BYTES // 2}").fetchall()
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def _make(path: Path) -> None:
+    """Make the file with its tables under another name, then give it its own: it is never half there."""
+    beside = path.with_name(path.name + ".new")
+    beside.unlink(missing_ok=True)
+    with closing(sqlite3.connect(beside, isolation_level=None)) as connection:
+        connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        for statement in (f"PRAGMA application_id = {APPLICATION}", f"PRAGMA user_version = {VERSION}", *schema()):
+            connection.execute(statement)
+    beside.replace(path)
+
+
+def schema() -> list[str]:
+    """Return the statements that make the tables."""
+    return [_table(entry) for entry in TABLES]
+
+
+def _table(entry: type[Entry]) -> str:
+    columns = [f"{field.name} {_column(field.type)}" for field in fields(entry)]
+    key = [f"UNIQUE ({', '.join(entry.KEY)})"] if entry.KEY else []
+    return f"CREATE TABLE {entry.TABLE} ({', '.join(columns + key)}) STRICT"
+
+
+def _column(kind: object) -> str:
+    assert isinstance(kind, type)
+    return COLUMN_TYPES[kind] + ("" if kind is float else " NOT NULL")
+
+
+def _insert(entry: type[Entry]) -> str:
+    names = [field.name for field in fields(entry)]
+    said = f"INSERT INTO {entry.TABLE} ({', '.join(names)}) VALUES ({', '.join('?' * len(names))})"
+    others = [f"{name} = excluded.{name}" for name in names if name not in entry.KEY]
+    return said + (f" ON CONFLICT ({', '.join(entry.KEY)}) DO UPDATE SET {', '.join(others)}" if entry.KEY else "")
+
+
+def clock_of(entry: type[Any]) -> str | None:
+    """Return the column by which a row ages; None of a table that does not grow."""
+    names = {field.name for field in fields(entry)}
+    return next((name for name in ("time_s", "end_s", "hour_s") if name in names), None)
+
+
+def _locked(path: Path) -> int:
+    """Return the descriptor of a lock that one daemon has at a time; it ends with the process.
+
+    Raises:
+        InputError: another daemon has it.
+        OSError: the file cannot be made.
+    """
+    lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise InputError(str(path.parent), "another daemon keeps its history there") from None
+    return lock
