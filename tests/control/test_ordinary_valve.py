@@ -136,7 +136,7 @@ def test_steps_land(seed: int) -> None:
     learning = 0
     for reference_m in references_m(seed):
         move = loop.step_to(reference_m)
-        slides = np.count_nonzero(np.diff([each.decision.command_pa for each in move]))
+        slides = int(np.count_nonzero(np.diff([each.decision.command_pa for each in move])))
         assert slides <= 5, "one tried too short, then two, two again; no other whole mbar lands it better"
         learning += slides > 4
         end = move[-1]

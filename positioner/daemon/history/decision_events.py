@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from config.codes import EventKind, ExperimentState, Fault, Mode, Ne107Cause, Ne107Status, Restored, State
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.daemon.health.ne107 import CLASS, MONITORED
 
 NOT_FOLLOWING = (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 from config.codes import CAUSES, EventKind, Ne107Status
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.daemon.history.audited_writes import Told, written_text
 from positioner.daemon.history.decision_events import Classes, Happened, events_between, noted
 from positioner.daemon.history.health_hours import HealthHours, HealthLook

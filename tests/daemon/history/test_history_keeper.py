@@ -10,7 +10,7 @@ import pytest
 
 from config.codes import EventKind, Fault, Mode, Ne107Cause, Ne107Status, Quality, Refusal
 from config.daemon_file import DaemonFile, HistoryTable
-from positioner.control.controller import Decision
+from positioner.control.controller_memory import Decision
 from positioner.daemon.health import HealthSettings, StoredHealth
 from positioner.daemon.history import HistoryKeeper, history_keeper
 from positioner.daemon.history.decision_events import Happened, events_between
