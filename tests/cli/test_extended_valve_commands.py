@@ -26,7 +26,7 @@ def test_play_prints_what_either_law_leaves(tmp_path: Path, capsys: Capture) -> 
     valve = written(tmp_path / "better.toml", PLAY)
     reference = tmp_path / "reference.csv"
     steps_m = (0.06, 0.064, 0.061, 0.07, 0.066, 0.066)
-    reference.write_text("\n".join(["time_s,reference_m", *(f"{i},{x}" for i, x in enumerate(steps_m)), ""]))
+    reference.write_text("\n".join(["time_s,reference_m", *(f"{2 * i},{x}" for i, x in enumerate(steps_m)), ""]))
     words = ["play", str(valve), "--reference", str(reference), "--law", "slides", "--period-s", "0.02"]
     assert main([*words, "--extended", str(valve), "-o", str(tmp_path / "run.csv")]) == 0
     said = capsys.readouterr().out.splitlines()
