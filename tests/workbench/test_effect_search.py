@@ -124,6 +124,20 @@ def test_it_ends_with_the_effect_that_explains_all(searched: Callable[..., tuple
     assert names(step) == ["ip_lag", "backlash"]
 
 
+@pytest.mark.parametrize(("left", "found"), [(1.2, ["ip_lag", "backlash"]), (1.05, ["ip_lag"])])
+def test_what_explains_all_but_leaves_room_is_not_the_end(
+    searched: Callable[..., tuple[EffectStep, ...]], left: float, found: list[str]
+) -> None:
+    """A second effect of two thirds of the floor hides behind the first one's success; of a third there is no sign."""
+
+    def ends(there: Effects, added: Effects) -> float:
+        effects = there | added
+        return 20.0 if "ip_lag" not in effects else 1.0 if "backlash" in effects else left
+
+    steps = searched(ends, "backlash", "ip_lag")
+    assert [each.added.name for each in steps if each.added] == found
+
+
 def test_it_ends_where_nothing_is_accepted(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
     first, last = searched(lambda there, added: 5.0 if "ip_lag" in there | added else 20.0, "backlash", "ip_lag")
     assert first.added

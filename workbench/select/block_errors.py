@@ -29,6 +29,8 @@ AT_FLOOR, RARELY_OFF = 1.4, 1.75
 
 1.4: friction that is smooth where the model's is not leaves some 1.3 times the noise, which is known to 20 %.
 """
+NOTHING_LEFT = 1.1
+"""The same, where no other effect need be sought: one that adds half the floor to it, as visible ones do, leaves 1.12."""
 MOST_LEFT = 0.1
 """Of the position's standard deviation: a model that leaves more explains little, however badly the valve repeats."""
 MOST_LOG_RATIO = float(np.log(2.0))
@@ -74,6 +76,11 @@ class BlockErrors(Brief):
             return False
         mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
         return mostly and max(self.train_rmse_m, self.test_rest_rmse_m) <= RARELY_OFF * floor_m
+
+    def leaves_nothing(self, floor_m: float | None) -> bool:
+        """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
+        left_m = max(self.train_block_m, self.test_block_m, self.train_rmse_m)
+        return floor_m is not None and left_m <= NOTHING_LEFT * floor_m
 
     def follows(self, motion_std_m: float) -> bool:
         """Whether a typical second's error is small against the motion, given by its standard deviation, m."""

@@ -6,9 +6,9 @@ search ends far behind another's is not searched further, unless the step would 
 another (`AFTER` in its file) is fitted only where that one has evidence, or is in the model already, and what the step
 would add leaves something to explain. Before they are judged, the valve without is fitted once more from the base
 parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
-model explains all, nothing more is accepted, or three effects are added. Where two steps leave something to explain,
-the first is tried with its runner-up added, too, and taken back if that leads farther. Of three effects, one that is
-not needed beside the others has stood in for them, and is taken out.
+model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
+two steps leave something to explain, the first is tried with its runner-up added, too, and taken back if that leads
+farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -133,10 +133,13 @@ class EffectSearch:
                 steps[-1] = without_missing(steps[-1], following, self._library)
             steps = self._judged_anew([*steps, following])
             added = steps[-1].added
-            if added is None or added.model is None or added.model.explained or len(steps) == MOST_ADDED:
+            if added is None or added.model is None or len(steps) == MOST_ADDED or self._leaves_nothing(added.model):
                 break
             here = added.model
         return steps
+
+    def _leaves_nothing(self, model: EvaluatedModel) -> bool:
+        return model.explained and model.errors.leaves_nothing(self._split.floor_m)
 
     def _without_stand_in(self, steps: list[EffectStep]) -> list[EffectStep]:
         """Search anew without an effect that is not needed beside those that were added after it.
