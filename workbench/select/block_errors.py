@@ -30,7 +30,7 @@ AT_FLOOR, RARELY_OFF = 1.4, 1.75
 1.4: friction that is smooth where the model's is not leaves some 1.3 times the noise, which is known to 20 %.
 """
 NOTHING_LEFT = 1.1
-"""The same, where no other effect need be sought: one that adds half the floor to it, as visible ones do, leaves 1.12."""
+"""The same, where no other effect need be sought: one that adds half the floor to it, in squares, leaves 1.12."""
 MOST_LEFT = 0.1
 """Of the position's standard deviation: a model that leaves more explains little, however badly the valve repeats."""
 MOST_LOG_RATIO = float(np.log(2.0))

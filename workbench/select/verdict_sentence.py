@@ -40,7 +40,8 @@ def verdict_sentence(
         return said + knife_edges_sentence(best.errors) + _suspicion(steps[0].suspected) + _scatter(parts)
     if verdict == "missing":
         suspicion = _suspicion(steps[-1].suspected) if steps[-1].added is None else ""
-        return f"Missing: {names}; {fell}, and nothing is left to explain.{knife_edges_sentence(best.errors)}{suspicion}"
+        said = f"Missing: {names}; {fell}, and nothing is left to explain."
+        return said + knife_edges_sentence(best.errors) + suspicion
     if verdict == "one_of":
         rivals = (tuple(each.name for each in step.indistinguishable) for step in steps)
         return f"Missing: {names}, or another that does as well; {fell}." + "".join(
