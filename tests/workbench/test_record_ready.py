@@ -6,6 +6,9 @@ import pytest
 from config.errors import InputError
 from config.noise import quantum_m
 from config.recording import Column, Recording
+from config.valve_file import EffectTable
+from sim.composition import Composition
+from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
 from workbench.data.noise_floor import noise_std_m, repeatability_m
 from workbench.data.record import ready, require_units
@@ -131,3 +134,26 @@ def test_nothing_to_simulate_is_refused() -> None:
         ready(Recording(plain() | {"position_m": np.full(1000, np.nan)}))
     with pytest.raises(InputError, match="no stretch of at least"):
         ready(Recording({name: column[:2] for name, column in plain().items()}))
+
+
+def begun_before(count: int = 1000) -> Recording:
+    """A stem that leaves its place 8 samples in, behind a lag, by a command that is there from the first sample on."""
+    file = SEED.model_copy(update={"effect": (EffectTable.model_validate({"name": "ip_lag", "time_constant_s": 0.1}),)})
+    composition = Composition.from_file(file)
+    command_pa = np.repeat([4e4, 6e4, 2e4, 7e4], count // 4)
+    response = respond(composition, composition.theta, command_pa[:-1], 0.01, position_m=0.0, pressure_pa=0.0)
+    noise = NOISE_M * np.random.default_rng(3).standard_normal(count)
+    columns = {"time_s": 0.01 * np.arange(count), "command_pa": command_pa}
+    return Recording(columns | {"position_m": response.indicated_m + noise})
+
+
+def test_a_motion_that_no_command_of_the_record_began_is_not_judged() -> None:
+    recording = begun_before()
+    record = ready(recording)
+    ((first, _),) = record.segments
+    assert 20 < first < 150
+    assert f"judged from sample {first + 1} on, where it first rests" in record.notes[-1]
+    later = {name: column[first:] for name, column in recording.columns.items()}
+    assert ready(Recording(later)).segments == ((0, 1000 - first),), "what begins at rest is judged from there"
+    known = dict(recording.columns) | {"pressure_pa": recording.columns["command_pa"]}
+    assert ready(Recording(known)).segments[0][0] == 0, "its cause is measured"

@@ -65,7 +65,7 @@ def test_a_record_that_begins_with_a_step_is_judged_from_where_the_stem_rests(nu
     recording = seen(from_row=int(jumps[number]))
     compared = compare(recording, ASYMMETRIC)
     assert compared.adequate, compared.sentences
-    assert any("is in motion at sample 1: simulated and judged from sample 2 on" in each for each in compared.notes)
+    assert any("about to move: simulated and judged from sample 2 on" in each for each in compared.notes)
 
 
 def test_where_nothing_rests_the_noise_is_unknown_and_nothing_is_judged(capsys: Capture, tmp_path: Path) -> None:

@@ -60,20 +60,28 @@ def directions(position_m: Column, noise_m: float) -> Directions:
     return np.where(np.abs(across) > NOTICED * noise_m, np.sign(across), 0.0).astype(np.int64)
 
 
-def rests_first(position_m: Column, noise_m: float) -> int | None:
+def rests_first(position_m: Column, noise_m: float, held: int = 0) -> int | None:
     """Return the row of an unbroken stretch of positions, m, (n,), at which the stem first rests; None if nowhere.
 
-    0 where its first `AT_ONCE` samples lie in a band, or on a straight line: at rest, or at a velocity that they tell.
-    Else it rests where it stays, within that band, for as many samples as it took to get there, `AT_ONCE` to
-    `LONGEST_REST`.
+    0 where its first samples, `AT_ONCE` and those up to the first change of the command, lie in a band, or `AT_ONCE` on
+    a straight line: at rest, or at a velocity that they tell. Else it rests where it stays, within that band, for as
+    many samples as it took to get there, `AT_ONCE` to `LONGEST_REST`.
+
+    Args:
+        position_m: m, (n,).
+        noise_m: standard deviation of the noise, m.
+        held: samples for which the command stays what it was at the first: what moves the stem by then was on its way
+            before the record, and nothing there tells how far.
     """
     rows = np.flatnonzero(np.isfinite(position_m))
     x = position_m[rows]
     band_m = BAND * noise_m
-    left = np.flatnonzero(np.abs(x[: LONGEST_REST + 1] - x[:1]) > band_m)
-    if not left.size or left[0] >= AT_ONCE or _is_straight(x[:AT_ONCE], 0.5 * band_m):
+    left = np.flatnonzero(np.abs(x[: max(LONGEST_REST + 1, held)] - x[:1]) > band_m)
+    if not left.size or rows[left[0]] >= max(AT_ONCE, held):
         return 0
-    row = 1
+    if left[0] < AT_ONCE and _is_straight(x[:AT_ONCE], 0.5 * band_m):
+        return 0
+    row = int(left[0])
     while row < x.size:
         stay = min(max(AT_ONCE, row), LONGEST_REST)
         if row + stay > x.size:

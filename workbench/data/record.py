@@ -3,8 +3,9 @@
 The clock set back, a gap, or rows that the daemon's recorder missed begin a new segment, simulated from rest on its
 own. Samples that the daemon lost are a longer period: it wrote no command in the meantime. A position that is not a
 number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. What
-begins in motion, at a velocity that its samples do not tell, begins where the stem first rests, if that is in its first
-third. Nothing else is touched, and `notes` has a sentence for each of these, samples counted from 1.
+begins in motion, at a velocity that its samples do not tell, or with a motion that no command of it began, begins where
+the stem first rests, if that is in its first third. Nothing else is touched, and `notes` has a sentence for each of
+these, samples counted from 1.
 """
 
 from collections.abc import Iterator, Mapping
@@ -144,16 +145,25 @@ def ready(recording: Recording) -> Record:
 def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
     """Let the segments that begin in motion begin at rest."""
     for first, end in record.segments:
-        rest = rests_first(np.where(record.valid, record.position_m, np.nan)[first:end], record.scale_m)
+        position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
+        rest = rests_first(position_m, record.scale_m, _held_at_first(record, first, end))
         if rest is None or rest > LATEST_REST * (end - first) or end - first - rest < SHORTEST:
             yield first, end
             continue
         if rest:
             notes.append(
-                f"the stem is in motion at sample {first + 1}: simulated and judged from sample {first + rest + 1} on, "
-                "where it first rests"
+                f"the stem is in motion at sample {first + 1}, or about to move: simulated and judged from sample "
+                f"{first + rest + 1} on, where it first rests"
             )
         yield first + rest, end
+
+
+def _held_at_first(record: Record, first: int, end: int) -> int:
+    """Return for how many samples a segment's command stays what it was; 0 where what drives the stem is measured."""
+    if record.pressure_pa is not None or record.load_n is not None:
+        return 0
+    changed = np.flatnonzero(record.command_pa[first:end] != record.command_pa[first])
+    return int(changed[0]) if changed.size else end - first
 
 
 def require_few_samples(recording: Recording) -> None:
