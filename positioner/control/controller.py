@@ -96,7 +96,8 @@ class Controller:
         trust, exciting = memory.restoration.trust, memory.excitation is not None and not memory.excitation.ended
         followed = memory.applied.count > 0 or (self._settings.valve is not None and bool(self._statics.landings))
         found = trust is Restored.CONFIRMED or (followed and trust is not Restored.PROVISIONAL)
-        if memory.applied.ratios is None or not found or exciting:
+        # What is kept says where slides balance; of a stem that swings past that, it would not agree with a landing.
+        if memory.applied.ratios is None or not found or exciting or self._statics.law.swing:
             return None
         settings, estimates = self._settings, self._identification.estimates
         stroke_m = settings.limits.stroke_m

@@ -99,7 +99,13 @@ def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) 
         observation = stem_observed(observation, seen.valve, statics.way)
         memory = with_margins_at(memory, seen.reference_m, seen.valve)
     balance = slides.Balance(
-        seen.ratios, statics.landings, statics.held, seen.stroke_m, statics.valve, seen.sample.now_s
+        seen.ratios,
+        statics.balances,
+        statics.held,
+        seen.stroke_m,
+        statics.valve,
+        seen.sample.now_s,
+        statics.law.swing if statics.valve is None else 0.0,
     )
     return slides.step(memory, observation, seen.reference_m, balance, settings)
 

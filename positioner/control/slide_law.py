@@ -85,6 +85,12 @@ class Balance:
     valve: ExtendedValve | None = None
     """In place of the straight law, where its effects are known."""
     now_s: float = 0.0
+    swing: float = 0.0
+    """ρ, share of its way by which the stem swings past its balance (estimation/landings/swing.py)."""
+
+    def slide_pa(self, from_m: float, to_m: float, direction: int) -> float:
+        """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""
+        return self.pressure_pa(to_m - self.swing * (to_m - from_m) if self.swing else to_m, direction)
 
     def pressure_pa(self, position_m: float, direction: int) -> float:
         """Return B(x, s), Pa."""
@@ -98,7 +104,7 @@ class Balance:
         if self.valve is not None:
             followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
             return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
-        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c
+        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
 
     def known_at(self, position_m: float, outcome: SlideOutcome) -> bool:
         """Whether slides had landed near a position, m, before an outcome, as it did."""
@@ -180,6 +186,7 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
         s: min(
             (abs(each.position_m - each.from_m) for each in balance.landings if each.direction == s), default=guess_m
         )
+        / (1.0 - balance.swing)
         for s in (1, -1)
     }
     margins = memory.margins
@@ -344,7 +351,7 @@ def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, setting
     beyond_m = s * (position_m + goes_on_m - target_m)
     lacks_m = RETURN * memory.margins.of(-s, turning=True).sure_m - beyond_m
     to_m = target_m - s * max(0.0, lacks_m) if beyond_m > lacks_m else target_m
-    return min(max(balance.pressure_pa(to_m, -s), settings.minimum_pa), settings.maximum_pa)
+    return min(max(balance.slide_pa(position_m, to_m, -s), settings.minimum_pa), settings.maximum_pa)
 
 
 def _slide(
@@ -357,7 +364,7 @@ def _slide(
     *,
     excursion: bool,
 ) -> SlideMemory:
-    wanted_pa = balance.pressure_pa(to_m, direction)
+    wanted_pa = balance.slide_pa(memory.anchor.position_m, to_m, direction)
     level_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
     if level_pa == memory.level_pa:  # nothing would change: what the stem does not do now it will not do then
         return replace(memory, slides=MOST_SLIDES, slide_s=now_s)

@@ -138,7 +138,7 @@ def test_steps_land(seed: int) -> None:
         move = loop.step_to(reference_m)
         slides = int(np.count_nonzero(np.diff([each.decision.command_pa for each in move])))
         assert slides <= 5, "one tried too short, then two, two again; no other whole mbar lands it better"
-        learning += slides > 4
+        learning += int(slides > 4)
         end = move[-1]
         assert all(each.decision.command_pa == mbar(each.decision.command_pa) for each in move)
         assert loop.valve.position_m == pytest.approx(reference_m, abs=LANDED_M)

@@ -1,6 +1,7 @@
 """The law of slides and the staircase: on simulated valves at slow loops, and what they may not do."""
 
 from dataclasses import replace
+from math import exp, pi
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,23 @@ def test_each_direction_has_its_own_friction(effect: dict[str, object], up_pa: f
     assert law.down.value == pytest.approx(down_pa, rel=3e-3)
     assert loop.decision.applied.ratios == law.ratios
     for at in (0.6, 0.603, 0.55):
+        assert abs(loop.step_to(at)[-1] - at) < 1e-3
+
+
+@pytest.mark.parametrize("viscous_ns_per_m", [140.0, 260.0], ids=["zeta 0.26", "zeta 0.49"])
+def test_a_stem_that_swings_past_its_balance_lands_where_it_shall(viscous_ns_per_m: float) -> None:
+    loop = Loop(0.05, identify=False)
+    loop.valve.change(viscous_ns_per_m=viscous_ns_per_m)
+    loop.identify()
+    law = loop.decision.static_law
+    omega = (VALVE.spring_n_per_m / VALVE.mass_kg) ** 0.5
+    zeta = viscous_ns_per_m / (2 * VALVE.mass_kg * omega)
+    r = exp(-pi * zeta / (1 - zeta * zeta) ** 0.5)
+    assert law.swing == pytest.approx(r / (1 + r), abs=0.01)
+    assert abs(law.slope.value - SLOPE_PA_PER_M) < 3 * law.slope.std
+    assert abs(law.up.value - FRICTION_PA) < 0.01 * FRICTION_PA
+    assert abs(law.down.value - FRICTION_PA) < 0.01 * FRICTION_PA
+    for at in (0.6, 0.603, 0.55, 0.7, 0.69):
         assert abs(loop.step_to(at)[-1] - at) < 1e-3
 
 

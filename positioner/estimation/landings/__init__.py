@@ -8,6 +8,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     stem_at_rest, landing_detector    does the stem rest, and where; which rests are landings, sample by sample
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
     extended_balance                  the same of a valve whose effects are known
+    swing                             how far past its balance a stem swings and sticks there
     landing_shift                     was the sensor shifted while landings were gathered
     static_identification             all of it, sample by sample, and what it says of other estimates
     recording_landings                the same from a whole recording

@@ -17,6 +17,7 @@ from positioner.estimation.landings.extended_balance import contradicted
 from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
 from positioner.estimation.landings.landing_shift import shifted
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
+from positioner.estimation.landings.swing import balanced
 
 LONGEST_WAY, OFF, LIKE = 0.03, 1e-3, 0.15
 """Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should, or by a share of its
@@ -38,6 +39,7 @@ class StaticIdentification:
     Attributes:
         detector: of the rests.
         landings: the latest first.
+        balances: the same, each where its balance is: a stem that swings sticks past it.
         held: changes of the command that did not move the stem, the latest first.
         law: from the landings.
         valve: the extended valve, as long as the landings do not say that it is another.
@@ -66,6 +68,7 @@ class StaticIdentification:
             -1: deque(maxlen=self._each),
         }
         self.landings: tuple[SlideOutcome, ...] = ()
+        self.balances: tuple[SlideOutcome, ...] = ()
         self.held: tuple[SlideOutcome, ...] = ()
         self._elsewhere = 0
         self.law: StaticLaw = no_static_law(Refusal.LANDINGS_TOO_FEW)
@@ -120,6 +123,7 @@ class StaticIdentification:
         if self._valve is not None:
             self.valve = None if contradicted(self._valve, self.law) else self._valve
         self.landings = self.law.slides if self.law.valid else landings
+        self.balances = tuple(balanced(each, self.law.swing) for each in self.landings)
 
     def _gave_way(self, outcome: SlideOutcome) -> bool:
         """Whether the packing that holds the stem gave way, for a slide by the law would have gone elsewhere.
@@ -130,8 +134,9 @@ class StaticIdentification:
         if not law.valid or went_m > LONGEST_WAY * self._stroke_m:
             self._elsewhere = 0
             return False
-        should_m = local_balance.ahead_m(outcome, law.ratios, self.landings, self._stroke_m)
-        scatter_m = local_balance.scatter_m(law.ratios, self.landings, self._stroke_m)
+        should_m = local_balance.ahead_m(outcome, law.ratios, self.balances, self._stroke_m)
+        should_m /= 1.0 - law.swing
+        scatter_m = local_balance.scatter_m(law.ratios, self.balances, self._stroke_m)
         allowed_m = max(LIKE * abs(should_m), OFF * self._stroke_m + 3.0 * (scatter_m + outcome.std_m))
         elsewhere = abs(went_m - should_m) > allowed_m
         self._elsewhere = self._elsewhere + 1 if elsewhere else 0
@@ -147,7 +152,10 @@ class StaticIdentification:
         last = max(both, key=lambda each: each.time_s)
         far = [each for each in both if abs(each.position_m - each.from_m) > LONGEST_WAY * self._stroke_m]
         doubtful = ([last], [*far, last])
-        return any(shifted({*self.landings, *more}, self._stroke_m) for more in doubtful)
+        return any(
+            shifted({*self.balances, *(balanced(each, self.law.swing) for each in more)}, self._stroke_m)
+            for more in doubtful
+        )
 
     def tested(self, estimates: Estimates) -> Estimates:
         """Return estimates whose friction is refused if the landings contradict it."""

@@ -11,6 +11,7 @@ The residuals say how well the law holds: with n landings,
     cov θ = s^2 (X' W X)^-1,    deviations times t(n - 3) / 3
 
 which is the Cramér-Rao bound of white residuals, widened so that three deviations are 99.7 % for few landings, too.
+A stem that swings past its balance has its landings on the law with their balances (`swing.py`).
 The friction of the seed's symmetric model is φ = (φ_up + φ_down)/2; what that model calls impossible is the offset
 
     (φ_up - φ_down)/2        0 without preload and with the same friction both ways
@@ -30,6 +31,7 @@ from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.local_balance import bent_by_pa
+from positioner.estimation.landings.swing import balanced, swing_of
 
 FEWEST, FEWEST_EACH = 5, 2
 """Landings in all, and in each direction."""
@@ -62,6 +64,7 @@ class StaticLaw:
         residual_m: standard deviation of where a slide lands about the law, m: of the landings, or what a valve bent as
             they are (`local_balance`) does over the middle of the travel, whichever is more.
         covariance: of (κ, φ_up, φ_down); (3, 3).
+        swing: ρ, share of its way by which the stem swings past its balance and sticks there; 0: it does not.
     """
 
     slope: Estimate
@@ -70,6 +73,7 @@ class StaticLaw:
     slides: tuple[SlideOutcome, ...]
     residual_m: float
     covariance: Array
+    swing: float = 0.0
 
     @property
     def landings(self) -> int:
@@ -145,20 +149,24 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
     ups, kept = sum(each.direction > 0 for each in slides), len(slides)
     if kept < FEWEST or min(ups, kept - ups) < FEWEST_EACH:
         return no_static_law(Refusal.LANDINGS_TOO_FEW, slides)
-    X, p = X[slid], p[slid]
+    swing, swing_std = swing_of(slides, X[slid], p[slid], stroke_m)
+    ways = np.array([(each.position_m - each.from_m) / stroke_m for each in slides])
+    balances = tuple(balanced(each, swing) for each in slides)
+    X, p = columns(balances, stroke_m)
     if np.linalg.matrix_rank(X, tol=1e-3) < 3:
         return no_static_law(Refusal.ILL_CONDITIONED, slides)
     theta, weights = _huber(X, p)
     residual_pa = p - X @ theta
     free = kept - 3
-    seen_pa = max(FINEST, max(each.std_m for each in landings) / stroke_m) * abs(theta[0])
+    finest = max(FINEST, swing_std * sqrt(float(ways @ ways) / kept), max(each.std_m for each in landings) / stroke_m)
+    seen_pa = finest * abs(theta[0])
     s = max(sqrt(float(residual_pa @ residual_pa) / free), seen_pa)
     scale = np.diag((1 / stroke_m, 1.0, 1.0))
     covariance = scale @ np.linalg.inv(X.T @ (weights[:, None] * X)) @ scale * (s * t_of_three_deviations(free)) ** 2
     slope, up_pa, down_pa = (scale @ theta).tolist()
     std = np.sqrt(np.diag(covariance))
     reason = _refusal(slope, up_pa + down_pa, std, s, stroke_m)
-    bent_pa = _bent_by_pa(Ratios(-slope, -(up_pa + down_pa) / 2, (up_pa - down_pa) / 2), slides, stroke_m)
+    bent_pa = _bent_by_pa(Ratios(-slope, -(up_pa + down_pa) / 2, (up_pa - down_pa) / 2), balances, stroke_m)
     return StaticLaw(
         slope=Estimate(slope, float(std[0]), reason),
         up=Estimate(up_pa, float(std[1]), reason),
@@ -166,6 +174,7 @@ def static_law(landings: Sequence[SlideOutcome], stroke_m: float) -> StaticLaw:
         slides=slides,
         residual_m=max(s, bent_pa) / abs(slope) if slope else inf,
         covariance=covariance,
+        swing=swing,
     )
 
 
