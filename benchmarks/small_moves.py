@@ -5,10 +5,10 @@
 Each row is a valve of its own: first the daemon's S3 identifies it under the row's noise, and nothing else is told to
 the controller; then come the steps, their sizes from 0.1 to 10 % of stroke, evenly in the logarithm (evenly in size
 for the second row), 2 s each, in a loop of 1 ms with one cycle of delay; what comes every 0.5 s is `--following`.
-Slower loops and pressures have more time, and only slides run from 20 ms on, where a sine identifies nothing. All figures are of the true stem, in % of stroke:
-what the error is at the end of the step, and how far the stem was beyond the reference on the way. The last table
-leaves each loop alone at a fixed reference. Takes some minutes. The last column of the first is the processor time of
-one step of the control core, on average.
+Slower loops and pressures have more time, and only slides run from 20 ms on, where a sine identifies nothing. All
+figures are of the true stem, in % of stroke: what the error is at the end of the step, and how far the stem was beyond
+the reference on the way. The last table leaves each loop alone at a fixed reference. Takes some minutes. The last
+column of the first is the processor time of one step of the control core, on average.
 
 `--following` prints another table alone: a DCS that writes every 0.5 s, first a ramp of 1 % of stroke a second up and
 down for a minute, then for another the noise of a controller's output, steps of 0.2 % (standard deviation) about 60 %.
