@@ -1,6 +1,7 @@
 """Small moves: the three laws on the same random steps of the seed's valve, in one run.
 
-    python -m benchmarks.small_moves [--steps 100] [--rest-s 120] [--seed 0] [--laws NAME...] [--following]
+    python -m benchmarks.small_moves [--steps 100] [--rest-s 120] [--seed 0] [--laws NAME...]
+    python -m benchmarks.small_moves --following [--noise-pu 1e-4] [--seed 0]
 
 Each row is a valve of its own: first the daemon's S3 identifies it under the row's noise, and nothing else is told to
 the controller; then come the steps, their sizes from 0.1 to 10 % of stroke, evenly in the logarithm (evenly in size
@@ -289,7 +290,7 @@ def followed(loop: Loop, references: np.ndarray) -> str:
     )
 
 
-def following(seed: int) -> Iterator[str]:
+def following(seed: int, noise_pu: float) -> Iterator[str]:
     """Yield the table of references that come every 0.5 s."""
     ramp, noise = written(seed)
     own = " and ".join(f"{np.abs(np.diff(each)).sum() * 60.0 / FOLLOWED_S:.2f}" for each in (ramp, noise))
@@ -299,7 +300,7 @@ def following(seed: int) -> Iterator[str]:
     yield f"{'':18}{columns}{columns}"
     for period_s in PERIODS_S:
         for law in LAWS:
-            case = Case("", period_s=period_s, known=True)
+            case = Case("", noise_pu, period_s=period_s, known=True)
             said = "".join(followed(Loop(law, case, seed), each) for each in (ramp, noise))
             yield f"{1e3 * period_s:4g} ms {law:>10}{said}"
 
@@ -345,10 +346,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=LAWS, metavar="NAME")
     parser.add_argument("--following", action="store_true", help="references every 0.5 s, alone")
+    parser.add_argument("--noise-pu", type=float, default=1e-4, help="of the position, with --following (1e-4)")
     arguments = parser.parse_args()
     started_s = time.monotonic()
     lines = report(arguments.steps, arguments.rest_s, arguments.seed, arguments.laws)
-    for line in following(arguments.seed) if arguments.following else lines:
+    for line in following(arguments.seed, arguments.noise_pu) if arguments.following else lines:
         print(line, flush=True)
     print(f"{time.monotonic() - started_s:.0f} s")
 

@@ -1,7 +1,7 @@
 """The law of slides and the staircase: on simulated valves at slow loops, and what they may not do."""
 
 from dataclasses import replace
-from math import exp, pi
+from math import exp, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -193,15 +193,28 @@ def test_a_loop_left_alone_does_nothing() -> None:
     assert len(commands) == 1
 
 
-def test_a_ramp_is_followed_within_a_slide() -> None:
+def test_a_ramp_is_followed_by_slides_that_land_ahead_of_it_and_its_end_is_reached() -> None:
+    """A sawtooth of half a slide either way, but for the first and the last, and hardly more travel than the ramp's."""
     loop = Loop(0.05)
     loop.step_to(0.5)
-    errors = []
+    errors, paths = [], []
     for reference_pu in np.linspace(0.5, 0.8, 61):
-        path = loop.step_to(float(reference_pu), cycles=10)
-        errors.append(abs(path[-1] - reference_pu))
-    assert max(errors) < 2 * LEAST
+        paths.append(loop.step_to(float(reference_pu), cycles=10))
+        errors.append(paths[-1][-1] - reference_pu)
+    assert np.abs(errors).max() < 1.1 * LEAST
+    assert np.sqrt(np.mean(np.square(errors))) < 1.3 * LEAST / sqrt(12)
+    assert np.abs(np.diff(np.concatenate(paths))).sum() < 0.3 + 3 * LEAST
     assert abs(loop.step_to(0.8)[-1] - 0.8) < 1e-3
+
+
+def test_noise_of_a_reference_is_not_chased_and_what_stays_of_it_is_reached() -> None:
+    loop = Loop(0.05)
+    loop.step_to(0.6)
+    for noise in np.random.default_rng(0).normal(0.0, 2e-3, 40):
+        path = loop.step_to(0.6 + float(noise), cycles=10)
+    assert np.ptp(path) < 1e-3
+    assert loop.decision.inhibit_reason is InhibitReason.REFERENCE_COMES
+    assert abs(loop.step_to(0.603)[-1] - 0.603) < 1e-3
 
 
 def test_the_staircase_stays_in_its_window_and_leaves_what_it_found_when_it_fails() -> None:
