@@ -42,8 +42,13 @@ FOLDER = Path("docs/discover")
 Line = Mapping[str, Any]
 
 
-def cases(repeats: int) -> list[tuple[str, str, int]]:
-    """Return family, what is hidden and seed of all cases, in turn through the families."""
+def cases(repeats: int, nothing: int = NOTHING) -> list[tuple[str, str, int]]:
+    """Return family, what is hidden and seed of all cases, in turn through the families.
+
+    Args:
+        repeats: cases of each effect.
+        nothing: cases with nothing hidden.
+    """
     known = [
         ("library", name, SEEDS["library"] + 20 * k + i)
         for k in range(repeats)
@@ -52,8 +57,8 @@ def cases(repeats: int) -> list[tuple[str, str, int]]:
     outside = [
         ("outside", name, SEEDS["outside"] + 20 * k + i) for k in range(repeats) for i, name in enumerate(OUTSIDE)
     ]
-    nothing = [("nothing", "", SEEDS["nothing"] + i) for i in range(NOTHING)]
-    ranked = [((i + 0.5) / len(each), case) for each in (known, outside, nothing) for i, case in enumerate(each)]
+    clean = [("nothing", "", SEEDS["nothing"] + i) for i in range(nothing)]
+    ranked = [((i + 0.5) / len(each), case) for each in (known, outside, clean) for i, case in enumerate(each)]
     return [case for _, case in sorted(ranked)]
 
 
@@ -137,6 +142,7 @@ def kept(folder: Path) -> list[Line]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=1, help="of each effect (1)")
+    parser.add_argument("--nothing", type=int, default=NOTHING, help=f"cases with nothing hidden ({NOTHING})")
     parser.add_argument("--family", nargs="*", choices=SEEDS, default=list(SEEDS), help="families to run (all)")
     parser.add_argument("--cases", type=int, help="run at most so many now (all)")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (one a core)")
@@ -145,7 +151,11 @@ def main() -> None:
     arguments = parser.parse_args()
     lines = kept(arguments.out)
     there = {each["seed"] for each in lines}
-    todo = [each for each in cases(arguments.repeats) if each[0] in arguments.family and each[2] not in there]
+    todo = [
+        each
+        for each in cases(arguments.repeats, arguments.nothing)
+        if each[0] in arguments.family and each[2] not in there
+    ]
     todo = [] if arguments.table else todo[: arguments.cases]
     arguments.out.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(arguments.workers) as pool, (arguments.out / "cases.jsonl").open("a") as file:

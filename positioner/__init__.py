@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from workbench.blind.hiding import Hidden, hide
     from workbench.compare.comparison import Comparison, compare
     from workbench.data.imposed_motion import read_imposed
+    from workbench.discover.discovery import Discovery, discover
     from workbench.fit.fitting import Fit, fit
     from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
     from workbench.select.diagnosis import Diagnosis, diagnose
@@ -77,6 +78,7 @@ _ROOMS = {
     "workbench.blind.hiding": ("Hidden", "hide"),
     "workbench.compare.comparison": ("Comparison", "compare"),
     "workbench.data.imposed_motion": ("read_imposed",),
+    "workbench.discover.discovery": ("Discovery", "discover"),
     "workbench.fit.fitting": ("Fit", "fit"),
     "workbench.forces.force_diagnosis": ("ForceDiagnosis", "diagnose_forces"),
     "workbench.select.diagnosis": ("Diagnosis", "diagnose"),
@@ -91,6 +93,7 @@ __all__ = [
     "Comparison",
     "Device",
     "Diagnosis",
+    "Discovery",
     "Driver",
     "DriverError",
     "Extension",
@@ -114,6 +117,7 @@ __all__ = [
     "compare",
     "diagnose",
     "diagnose_forces",
+    "discover",
     "estimate",
     "extend",
     "fit",

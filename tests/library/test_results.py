@@ -15,6 +15,8 @@ import positioner as pos
 from config.results.block import Table, as_html, as_text
 from config.results.result import Result
 from positioner.cli.main import main
+from workbench.discover import discovery
+from workbench.discover.grammar import FORMS
 
 LONGEST = 300
 
@@ -49,11 +51,15 @@ def bench() -> pos.Recording:
 def results(hidden: pos.Hidden, stepped: pos.Recording, bench: pos.Recording) -> dict[str, Result]:
     """One result of each kind."""
     effects = ["asymmetric_friction"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(discovery, "FORMS", [form for form in FORMS if form.name == "scaled_over_direction_sign"])
+        discovered = pos.discover(hidden.fit, hidden.base, test=hidden.test)
     return {
         "Recording": hidden.fit,
         "Comparison": pos.compare(hidden.fit, hidden.base),
         "Fit": pos.fit(hidden.fit, hidden.base, profile=False),
         "Diagnosis": pos.diagnose(hidden.fit, hidden.base, test=hidden.test, effects=effects),
+        "Discovery": discovered,
         "Extension": pos.extend(hidden.fit, hidden.base, effects, test=hidden.test),
         "ForceDiagnosis": pos.diagnose_forces(bench, hidden.base),
         "ResponseFigures": pos.respond(stepped),
@@ -66,6 +72,7 @@ KINDS = (
     "Comparison",
     "Fit",
     "Diagnosis",
+    "Discovery",
     "Extension",
     "ForceDiagnosis",
     "ResponseFigures",

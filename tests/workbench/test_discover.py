@@ -16,6 +16,7 @@ from sim.interpreted import interpreted
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.blind.input_signal import excitation
 from workbench.discover import discovery
+from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
 from workbench.discover.grammar import FORMS, Form
@@ -137,6 +138,32 @@ def test_a_hidden_spring_is_found_written_and_added(
     better = load_valve(folder / "better.toml")
     assert better.effect[0].parameters["force_n"] == pytest.approx(RATE_N_PER_M * BARE.valve.stroke_m, rel=0.05)
     assert Composition.from_file(better).effects[0].equation.startswith("F = -F_1 g")
+
+
+def test_a_curve_goes_through_its_heights_and_stays_level_beyond(tmp_path: Path) -> None:
+    form = named("force_over_position_bump")
+    values = {"force_n": 40.0, "place": 0.4, "width": 0.1, "travel_m": 0.1}
+    curve, heights = curve_of(form, values, (0.05, 0.95))
+    knots = [float(each.text.split()[-1]) for each in curve.quantities if each.key.startswith("height_")]
+    assert heights == pytest.approx([np.exp(-(((s - 0.4) / 0.1) ** 2)) for s in knots], abs=2e-3)
+    found = dict(zip([each.key for each in curve.quantities], (40.0, *heights, 0.1), strict=True))
+    (tmp_path / "mine.py").write_text(form_text(curve, found), encoding="utf-8")
+    effect = read_effect(tmp_path / "mine.py")
+    laws = interpreted((effect,))
+
+    def added_n(s: float, **changed: float) -> float:
+        q = laws.parameters([0.0] * 8 + [{**found, **changed}[key] for key in effect.parameters])
+        return float(laws.force(laws.Stem(0.0, 0.1 * s, 0.0, 0.0), q, ()))
+
+    for s in np.linspace(0.1, 0.9, 33):
+        assert added_n(s) == pytest.approx(force_n("force_over_position_bump", 0.1 * s, **values)[0], abs=0.6)
+    assert [added_n(s, height_0=0.5) for s in (0.01, 0.05)] == pytest.approx([-20.0, -20.0])
+    assert effect.off(SEED.valve)[:3] == (40.0, 0.0, 0.0), "it vanishes by its heights: what they are in units of stays"
+
+
+def test_a_form_over_time_has_no_curve() -> None:
+    assert not has_curve(named("scaled_over_time_rise"))
+    assert has_curve(named("drag_over_speed_power"))
 
 
 def test_where_nothing_is_left_no_form_is_sought(folder: Path) -> None:

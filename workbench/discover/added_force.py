@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from config.recording import Column
+from config.results.result import Brief
 from sim.composition import Composition
 from sim.effect import Effect, execute
 from sim.interpreted import interpreted
@@ -38,8 +39,8 @@ class Landing:
     missing_n: float
 
 
-@dataclass(frozen=True, slots=True)
-class AddedForce:
+@dataclass(frozen=True, slots=True, repr=False)
+class AddedForce(Brief):
     """What a form adds over its variable."""
 
     over: Column

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill, indent
 
+from workbench.discover.curve import FLAT, HEIGHT
 from workbench.discover.grammar import Form, Quantity
 
 WIDTH = 116
@@ -40,7 +41,7 @@ def form_text(form: Form, found: Mapping[str, float] | None = None, remarks: Seq
         *(fill(each, WIDTH) for each in remarks),
         '"""',
     ]
-    parameters = "\n".join(_declared(each, None if found is None else found[each.key]) for each in form.quantities)
+    parameters = "\n".join(_declared(each, _begin(each, found)) for each in form.quantities)
     names = ", ".join(each.symbol for each in form.quantities)
     return (
         "\n\n".join(
@@ -93,6 +94,14 @@ def _declared(each: Quantity, found: float | None) -> str:
     return f"    {each.key}: Annotated[float, Parameter({', '.join(words)})]".replace("'", '"')
 
 
+def _begin(each: Quantity, found: Mapping[str, float] | None) -> float | None:
+    """Return where a fit is to begin; a height of a curve that is next to nothing begins at nothing."""
+    if found is None:
+        return None
+    value = found[each.key]
+    return 0.0 if each.key.startswith(HEIGHT) and abs(value) < FLAT else value
+
+
 def _functions(form: Form) -> list[str]:
     variable, place = form.variable, form.place
     types = dict.fromkeys(form.arguments, "float") | {"q": "Parameters", "z": "Memory"}
@@ -104,4 +113,7 @@ def _functions(form: Form) -> list[str]:
         *([variable.code] if variable.code else []),
         f"return {result}",
     ]
-    return [*([variable.upkeep] if variable.upkeep else []), head + "\n" + indent("\n".join(body), "    ")]
+    return [
+        *(each for each in (variable.upkeep, form.shape.functions) if each),
+        head + "\n" + indent("\n".join(body), "    "),
+    ]

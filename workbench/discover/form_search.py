@@ -1,18 +1,25 @@
 """The search for a form: ranked, fitted, judged as effects are, the nearest taken further.
 
-Forms of the first turn are all fitted; those of the second only where none of the first explains the recordings.
+The forms of a turn race: one whose searches are far behind another's waits, and is told by what it had come to. Where
+the best of a turn is accepted and leaves something to explain, its curve is tried: the same place and variable with a
+free shape. The forms of the second turn are fitted only where none of this explains the recordings.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
+from pathlib import Path
+from typing import TypeVar
 
 from config.errors import InputError
 from config.results.result import Brief
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from sim.effect import Effect
+from sim.effect import Effect, find_effect
 from workbench.data.held_out import Split
+from workbench.discover.added_force import variable_range
+from workbench.discover.curve import curve_of, has_curve
+from workbench.discover.form_file import write_forms
 from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import Form
 from workbench.discover.proposal import Proposal, proposed
@@ -24,8 +31,17 @@ from workbench.select.effect_search import BETTER, OUT_OF_RACE, EffectSearch, Pr
 
 FIRST, MOST = 5, 15
 """Forms fitted in the first turn, and in both."""
+IN_RACE = 3.0
+"""Factor on the cost of the best of a turn at the same stage, above which a form waits; beside those that are fitted
+already it is `OUT_OF_RACE`: on the way costs are higher than where searches stay."""
+CURVED_BELOW = 0.5
+"""Factor on the cost of the valve as it is, below which a form is near enough for its curve to be tried."""
 ROUNDS, NEAREST = 2, 2
 """Rounds in which so many forms that came nearest are taken further."""
+
+
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -62,24 +78,25 @@ class FormSearch:
         order = proposed(base.fit, self.split, self.forms, self.effects, self.workers)
         on_proposal(tuple(self.forms[each.name].name for each in order))
         models: dict[str, EvaluatedModel | str] = {}
-        step = judged_step(base, models, 1, self.effects)
-        turns = (order[:FIRST], order[FIRST:MOST])
-        for turn in turns:
-            models |= self._fitted(step.before, turn)
-            step = self._judged(step.before, models)
+        here = _Tried(judged_step(base, models, 1, self.effects), dict(self.forms), dict(self.effects))
+        for turn in (order[:FIRST], order[FIRST:MOST]):
+            models |= self._fitted(here.step.before, turn, _least(models))
+            here = self._judged(here, models)
             for _ in range(ROUNDS):
-                if _explains(step):
+                if _explains(here.step):
                     break
-                models |= self._taken_further(step.before, models)
-                step = self._judged(step.before, models)
-            if _explains(step):
+                models |= self._taken_further(here, models)
+                here = self._judged(here, models)
+            here = self._with_curve(here, models)
+            if _explains(here.step):
                 break
+        step = here.step
         rest = tuple(self.forms[each.name].name for each in order if each.name not in models)
-        named = tuple(replace(each, name=self.forms[each.name].name) for each in step.candidates)
-        return SearchedForms(step.before, named, self._found(step), rest)
+        named = tuple(replace(each, name=here.forms[each.name].name) for each in step.candidates)
+        return SearchedForms(step.before, named, self._found(here), rest)
 
-    def _fitted(self, base: EvaluatedModel, turn: Sequence[Proposal]) -> dict[str, EvaluatedModel | str]:
-        """Fit the valve with each form by two searches; by one where that ends far behind another form's.
+    def _fitted(self, base: EvaluatedModel, turn: Sequence[Proposal], least: float) -> dict[str, EvaluatedModel | str]:
+        """Fit the valve with each form by two searches; those wait that are far behind another's on the way.
 
         Whether searches agree does not matter here: a form is believed for what it leaves, wherever it was found.
         """
@@ -87,41 +104,71 @@ class FormSearch:
 
         def begun(each: Proposal) -> BegunFit | str:
             try:
-                begun = begun_fit(train, self.valve, (each.name,), base.fit, points=each.points)
-                return begun.landed().carried().settled(1)
+                return begun_fit(train, self.valve, (each.name,), base.fit, points=each.points).landed()
             except InputError as error:
                 return error.problem
 
-        fits: list[BegunFit | str] = []
-        for each in on_threads(begun, turn, self.workers):
-            fits.append(each)
-            self.tell(what, 0.7 * len(fits) / len(turn))
-        least = min((each.cost for each in fits if not isinstance(each, str)), default=inf)
+        racers = self._each(begun, {each.name: each for each in turn}, what, 0.0, 0.4)
+        refused: dict[str, EvaluatedModel | str] = {n: each for n, each in racers.items() if isinstance(each, str)}
+        fast = {name: each for name, each in racers.items() if not isinstance(each, str)}
+        waiting: dict[str, BegunFit] = {}
+        stages: tuple[Callable[[BegunFit], BegunFit], ...] = (BegunFit.carried, lambda each: each.settled(1))
+        for i, further in enumerate(stages):
+            fast, slower = _parted(fast, least)
+            waiting |= slower
+            fast = self._each(further, fast, what, 0.4 + 0.2 * i, 0.6 + 0.2 * i)
+        ended = min((each.cost for each in fast.values()), default=inf)
 
-        def finished(each: BegunFit | str) -> EvaluatedModel | str:
-            if isinstance(each, str):
-                return each
-            lost = each.cost > OUT_OF_RACE * least
+        def finished(each: BegunFit) -> EvaluatedModel:
+            lost = each.cost > IN_RACE * min(least, ended)
             return evaluated((each if lost else each.settled(1)).judged(profile=False), self.split)
 
-        models: dict[str, EvaluatedModel | str] = {}
-        for one, model in zip(turn, on_threads(finished, fits, self.workers), strict=True):
-            models[one.name] = model
-            self.tell(what, 0.7 + 0.3 * len(models) / len(turn))
-        return models
+        models = self._each(finished, fast, what, 0.8, 1.0)
+        left = {name: evaluated(each.left(), self.split) for name, each in waiting.items()}
+        return refused | left | models
+
+    def _each(
+        self, function: Callable[[S], T], by_name: Mapping[str, S], what: str, begin: float, end: float
+    ) -> dict[str, T]:
+        """Apply a function to what is there of each form, on the workers."""
+        found: dict[str, T] = {}
+        for name, each in zip(by_name, on_threads(function, tuple(by_name.values()), self.workers), strict=True):
+            found[name] = each
+            self.tell(what, begin + (end - begin) * len(found) / len(by_name))
+        return found
+
+    def _with_curve(self, here: "_Tried", models: dict[str, EvaluatedModel | str]) -> "_Tried":
+        """Try the curve of the best form where it is accepted, near, and leaves something to explain."""
+        added = here.step.added
+        if added is None or added.model is None or _explains(here.step) or not has_curve(here.forms[added.name]):
+            return here
+        fit, before = added.model.fit, here.step.before
+        if fit.cost > CURVED_BELOW * before.fit.cost:
+            return here
+        form, effect = here.forms[added.name], here.effects[added.name]
+        self.tell(f"giving {form.name} a free shape", 0.0)
+        values = {key: float(fit.valve.effect[-1].parameters[key]) for key in effect.parameters}
+        curve, heights = curve_of(form, values, variable_range(form, fit, self.split))
+        (path,) = write_forms([curve], Path(added.name).parent)
+        effects = {**here.effects, path: find_effect(path, "forms")}
+        ground = replace(before.fit, seeds=(Composition.from_file(fit.valve).theta[: before.fit.seeds[0].size],))
+        begun = begun_fit(self.split.train.recording, self.valve, (path,), ground, landed=False, points=[heights])
+        models[path] = evaluated(begun.carried().settled(2).judged(profile=False), self.split)
+        return self._judged(_Tried(here.step, {**here.forms, path: curve}, effects), models)
 
     def _taken_further(
-        self, base: EvaluatedModel, models: Mapping[str, EvaluatedModel | str]
+        self, tried: "_Tried", models: Mapping[str, EvaluatedModel | str]
     ) -> dict[str, EvaluatedModel | str]:
         """Search again for the forms that came nearest, from where they came to: a stair may have held them up."""
         fitted = {name: each for name, each in models.items() if isinstance(each, EvaluatedModel)}
+        base = tried.step.before
         nearest = sorted(fitted, key=lambda name: fitted[name].fit.cost)[:NEAREST]
 
         def again(name: str) -> EvaluatedModel:
             here = fitted[name].fit
             theta = Composition.from_file(here.valve).theta
             bare = theta[: base.fit.seeds[0].size]
-            declared = self.effects[name].parameters.values()
+            declared = tried.effects[name].parameters.values()
             point = tuple(v for v, each in zip(theta[bare.size :].tolist(), declared, strict=True) if not each.given)
             ground = replace(base.fit, seeds=(bare, *base.fit.seeds[-2:]))
             begun = begun_fit(self.split.train.recording, self.valve, (name,), ground, points=[point])
@@ -131,23 +178,26 @@ class FormSearch:
         self.tell(f"taking {len(nearest)} forms further", 0.0)
         return dict(zip(nearest, on_threads(again, nearest, self.workers), strict=True))
 
-    def _judged(self, base: EvaluatedModel, models: Mapping[str, EvaluatedModel | str]) -> EffectStep:
+    def _judged(self, here: "_Tried", models: Mapping[str, EvaluatedModel | str]) -> "_Tried":
         """Judge the forms, against the bare valve fitted again from the best one's own spring and friction.
 
         A failure of the bare valve's search must not look like physics.
         """
-        step = judged_step(base, models, 1, self.effects)
+        base = here.step.before
+        step = judged_step(base, models, 1, here.effects)
         if step.added is None or step.added.model is None:
-            return step
+            return replace(here, step=step)
         bare = ValveFile(valve=step.added.model.fit.valve.valve, effect=base.fit.valve.effect)
         search = EffectSearch(
             self.split, {}, self.valve.valve, seed=self.seed, workers=self.workers, progress=self.tell
         )
         again = search.base(bare)
-        return step if again.fit.cost > BETTER * base.fit.cost else judged_step(again, models, 1, self.effects)
+        better = again.fit.cost <= BETTER * base.fit.cost
+        return replace(here, step=judged_step(again, models, 1, here.effects) if better else step)
 
-    def _found(self, step: EffectStep) -> tuple[FoundForm, ...]:
+    def _found(self, here: "_Tried") -> tuple[FoundForm, ...]:
         """Return what explains the recordings: what a step would add, and what is not told from it."""
+        step = here.step
         if not _explains(step):
             return ()
         believed = {each.name: each for each in (step.added, *step.indistinguishable) if each}
@@ -155,7 +205,28 @@ class FormSearch:
         best, *others = models
         fit = profiled(models[best].fit, self.split.train.recording)
         models[best] = replace(models[best], fit=fit)
-        return tuple(FoundForm.of(self.forms[n], self.effects[n], models[n], self.split) for n in (best, *others))
+        return tuple(FoundForm.of(here.forms[n], here.effects[n], models[n], self.split) for n in (best, *others))
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A step of the search so far, and what its candidates are: forms by their files' names, the same as effects."""
+
+    step: EffectStep
+    forms: Mapping[str, Form]
+    effects: Mapping[str, Effect]
+
+
+def _least(models: Mapping[str, EvaluatedModel | str]) -> float:
+    return min((each.fit.cost for each in models.values() if isinstance(each, EvaluatedModel)), default=inf)
+
+
+def _parted(racers: Mapping[str, BegunFit], least: float) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:
+    """Return those that are in the race on their way, and those that are not."""
+    here = {name: each.screening_cost for name, each in racers.items()}
+    limit = min(IN_RACE * min(here.values(), default=inf), OUT_OF_RACE * least)
+    fast = {name: each for name, each in racers.items() if here[name] <= limit}
+    return fast, {name: each for name, each in racers.items() if name not in fast}
 
 
 def _explains(step: EffectStep) -> bool:

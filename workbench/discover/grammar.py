@@ -21,9 +21,11 @@ its spring, a drag in proportion to w its viscous friction, a force in proportio
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from config.results.result import Brief
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Quantity(Brief):
     """A parameter of a form as its file declares it: `sim.effect.Parameter`, with its symbol in the equation."""
 
     key: str
@@ -37,8 +39,8 @@ class Quantity:
     given: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+@dataclass(frozen=True, slots=True, repr=False)
+class Shape(Brief):
     """What stands for g: its words, its equation and its expression in the variable's symbol, written {0}."""
 
     name: str
@@ -47,10 +49,12 @@ class Shape:
     expression: str
     quantities: tuple[Quantity, ...] = ()
     imports: tuple[str, ...] = ()
+    functions: str = ""
+    """Of the file, which the expression calls."""
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+@dataclass(frozen=True, slots=True, repr=False)
+class Variable(Brief):
     """What a shape goes over."""
 
     name: str
@@ -73,8 +77,8 @@ class Variable:
     """What it imports of `sim.first_order_lag`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+@dataclass(frozen=True, slots=True, repr=False)
+class Place(Brief):
     """Where a form acts, and its strength c."""
 
     name: str
@@ -91,8 +95,8 @@ class Place:
     imports: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Form:
+@dataclass(frozen=True, slots=True, repr=False)
+class Form(Brief):
     """One sentence of the grammar."""
 
     place: Place

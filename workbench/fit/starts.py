@@ -130,12 +130,18 @@ def _slower(parameter: Parameter, value: float) -> float:
 def weakest_start(error: SimulationError, added: Sequence[Parameter], seed: Vector) -> Place:
     """Return the best base fit with the effects as weak as they may be, at whichever end of their ranges that is.
 
+    What goes either way from nothing is weakest there, not at an end; and there stems take long to simulate.
+
     Args:
         error: by whose cost the ends are compared.
         added: the parameters of the effects to be added.
         seed: theta of the best base fit, with the effects switched off.
     """
-    ends = [tuple(each.least for each in added), tuple(each.most for each in added)]
+    nothing = {each.name: float(seed[each.index]) for each in added if each.least < 0.0 < each.most}
+    ends = [
+        tuple(nothing.get(each.name, each.least) for each in added),
+        tuple(nothing.get(each.name, each.most) for each in added),
+    ]
     places = (error.coordinates(seed), *(_with(error, seed, added, values) for values in ends))
     return Place(min(places, key=error.cost), "base fit 1")
 
