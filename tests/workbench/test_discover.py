@@ -1,18 +1,23 @@
 """Forms: each is an effect's file and adds what its equation says; one that is hidden is found, written and added."""
 
+import struct
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
+from config.modbus_map import SIMULATED_MAP
 from config.recording import write_recording
-from config.valve_file import load_valve
+from config.valve_file import ValveFile, load_valve
 from config.writing import valve_toml
 from positioner.cli.main import main
+from positioner.cli.parts.children import port_in, running
 from sim.composition import Composition
 from sim.effect import Effect, read_effect
 from sim.interpreted import interpreted
+from sim.simulation import simulate
+from tests.independent import independent_client
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.blind.input_signal import excitation
 from workbench.discover import discovery
@@ -117,7 +122,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_hidden_spring_is_found_written_and_added(
+@pytest.mark.real_time
+def test_a_hidden_spring_is_found_written_added_and_served(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)
@@ -138,6 +144,29 @@ def test_a_hidden_spring_is_found_written_and_added(
     better = load_valve(folder / "better.toml")
     assert better.effect[0].parameters["force_n"] == pytest.approx(RATE_N_PER_M * BARE.valve.stroke_m, rel=0.05)
     assert Composition.from_file(better).effects[0].equation.startswith("F = -F_1 g")
+    assert served_m(folder / "better.toml") == pytest.approx(resting_m(better), abs=1e-5)
+    without = better.model_copy(update={"effect": ()})
+    assert resting_m(without) > resting_m(better) + 4e-3, "or the slave may have served the valve without it"
+
+
+PUSHED_PA, PUSHED_S = 60e3, 2.0
+
+
+def served_m(valve: Path) -> float:
+    """Return where a slave that serves the valve comes to rest under a pressure, as an independent client reads it."""
+    slave = valve.with_name("slave.toml")
+    sensor = "[sensor]\nnoise_std_m = 0.0\n"
+    slave.write_text(f'valve = "{valve.name}"\n{sensor}[clock]\nmode = "lockstep"\nperiod_s = 0.02\n', encoding="utf-8")
+    with running("sim", slave, "--port", "0") as ready, independent_client(port_in(ready)) as client:
+        for _ in range(round(PUSHED_S / 0.02)):
+            client.write(SIMULATED_MAP.command_pa.address, list(struct.unpack(">HH", struct.pack(">f", PUSHED_PA))))
+        (position_m,) = struct.unpack(">f", struct.pack(">HH", *client.read_input(0, 2)))
+    return float(position_m)
+
+
+def resting_m(valve: ValveFile) -> float:
+    time_s = np.arange(0.0, PUSHED_S, 0.02)
+    return float(simulate(valve, time_s, np.full(time_s.size, PUSHED_PA)).position_m[-1])
 
 
 def test_a_curve_goes_through_its_heights_and_stays_level_beyond(tmp_path: Path) -> None:

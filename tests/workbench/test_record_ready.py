@@ -113,6 +113,22 @@ def test_what_repeats_is_no_noise_but_for_the_last_rounding(noise: float, quantu
     assert found == pytest.approx((noise**2 + quantum**2 / 12.0) ** 0.5, rel=0.15)
 
 
+def test_two_laps_that_begin_apart_are_compared_from_where_they_agree() -> None:
+    columns = plain(600)
+    command, generator = (
+        np.concatenate([columns["command_pa"][:400], columns["command_pa"][:200]]),
+        np.random.default_rng(3),
+    )
+    position = np.concatenate([columns["position_m"][:400], columns["position_m"][:200]])
+    position[:60] = position[60]
+    alike = position + 1e-5 * generator.standard_normal(600)
+    alike[:60] += 0.02
+    assert repeatability_m(command, alike) == pytest.approx(1e-5, rel=0.2)
+    strayed = alike.copy()
+    strayed[500:560] += 1e-3
+    assert repeatability_m(command, strayed) == pytest.approx(1e-3 * (60.0 / 140.0 / 2.0) ** 0.5, rel=0.2)
+
+
 @pytest.mark.parametrize(
     ("column", "factor", "said"),
     [

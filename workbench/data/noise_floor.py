@@ -19,6 +19,8 @@ NOISE = "noise_m"
 """Key under which a recording says its noise."""
 REPEATS = 1e-3
 """A command repeats if its rms difference over the lag is below this part of its rms deviation."""
+AGREED, WITHIN = 10, 4.0
+"""Samples, and deviations of the noise, in which two laps are seen to agree."""
 UNKNOWN = (
     "the noise of the sensor is unknown, so that no verdict rests on it: the stem rests nowhere long enough, and no "
     "command repeats. Say it, --noise-m M, or record the stem at rest, the command held for 40 samples"
@@ -119,12 +121,24 @@ def _ranges(x: Column) -> Column:
 def repeatability_m(command_pa: Column, position_m: Column) -> float | None:
     """Return the repeatability in m of an evenly sampled stretch, None if its command does not repeat itself.
 
-    A first lap of three or more is left out: it begins elsewhere.
+    A first lap of three or more is left out: it begins elsewhere. Of two, what comes before they first agree: until
+    then they differ by where they began, and not by what the valve does not repeat.
     """
     lag = repeat_lag(command_pa)
     if lag is None:
         return None
     first = lag if position_m.size > 2.5 * lag else 0
     difference = position_m[first + lag :] - position_m[first:-lag]
+    if not first:
+        difference = difference[_agreed(difference, noise_std_m(position_m, command_pa)) :]
     finite = difference[np.isfinite(difference)]
     return float(np.sqrt(np.mean(finite**2) / 2.0)) if finite.size else None
+
+
+def _agreed(difference_m: Column, noise_m: float | None) -> int:
+    """Return from where on two laps have agreed within the noise, over so many samples; 0 if they never do."""
+    if noise_m is None:
+        return 0
+    near = np.abs(difference_m) <= WITHIN * 2.0**0.5 * noise_m
+    together = np.convolve(near, np.ones(AGREED), "valid") == AGREED
+    return int(np.argmax(together)) if together.size else 0

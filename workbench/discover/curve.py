@@ -83,7 +83,7 @@ def _knots(form: Form, values: Mapping[str, float], span: tuple[float, float]) -
         knots = [low, *(each for each in about if low < each < high), high]
     else:
         knots = sorted([*evenly, *([values["place"]] if low < values.get("place", low) < high else [])])
-    apart = min(NEARER * (high - low), 0.3 * values.get("width", high - low))
+    apart = min(NEARER * (high - low), 0.2 * values.get("width", high - low))
     kept = knots[:1]
     for each in knots[1:]:
         if each - kept[-1] >= apart:
