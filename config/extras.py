@@ -18,6 +18,8 @@ EXTRAS = {
     "nicegui": "web",
     "fastapi": "web",
     "uvicorn": "web",
+    "distributed": "fleet",
+    "dask": "fleet",
 }
 """The extra, by the name of the module that is missing."""
 

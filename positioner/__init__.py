@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from workbench.data.imposed_motion import read_imposed
     from workbench.discover.discovery import Discovery, discover
     from workbench.fit.fitting import Fit, fit
+    from workbench.fleet.fleet import Fleet, fleet
     from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
     from workbench.select.diagnosis import Diagnosis, diagnose
     from workbench.select.extension import Extension, extend
@@ -80,6 +81,7 @@ _ROOMS = {
     "workbench.data.imposed_motion": ("read_imposed",),
     "workbench.discover.discovery": ("Discovery", "discover"),
     "workbench.fit.fitting": ("Fit", "fit"),
+    "workbench.fleet.fleet": ("Fleet", "fleet"),
     "workbench.forces.force_diagnosis": ("ForceDiagnosis", "diagnose_forces"),
     "workbench.select.diagnosis": ("Diagnosis", "diagnose"),
     "workbench.select.extension": ("Extension", "extend"),
@@ -98,6 +100,7 @@ __all__ = [
     "DriverError",
     "Extension",
     "Fit",
+    "Fleet",
     "ForceDiagnosis",
     "Fraction",
     "Hidden",
@@ -121,6 +124,7 @@ __all__ = [
     "estimate",
     "extend",
     "fit",
+    "fleet",
     "hide",
     "read_imposed",
     "respond",

@@ -18,6 +18,7 @@ Its rooms, each on those before it:
     forces     the same where a rig imposes the position, and there is nothing to simulate
     blind      recordings with an effect that nobody knows
     report     all of it for a browser
+    fleet      many valves at once
 """
 
 from config.recording import Recording

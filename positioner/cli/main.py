@@ -34,6 +34,7 @@ COMMANDS = (
     "diagnose",
     "discover",
     "extend",
+    "fleet",
     "workbench",
     "page",
     "reproduce",

@@ -66,13 +66,25 @@ def write(path: Path, title: str, parts: Iterable[Html]) -> None:
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    library = require_plotly(path)
+    _write(path, title, parts, require_plotly(path), _shipped("page.js"))
+
+
+def write_without_plots(path: Path, title: str, parts: Iterable[Html]) -> None:
+    """Write a page that needs no script.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    _write(path, title, parts, "", "")
+
+
+def _write(path: Path, title: str, parts: Iterable[Html], library: str, script: str) -> None:
     page = Template(_shipped("page.html")).substitute(
         title=escape(title),
         style=_shipped("page.css"),
         body="\n".join(parts),
         plotly=library,
-        script=_shipped("page.js"),
+        script=script,
     )
     try:
         path.write_text(page, encoding="utf-8")

@@ -1,0 +1,208 @@
+"""Fleet: the valves of a manifest, ranked by what their recordings say of them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from config.errors import InputError
+from config.loading import validated
+from config.results.block import Block, Table
+from config.results.result import Result
+from config.valve_file import ValveFile, find_valve, load_valve
+from workbench.fleet.engine import cluster, work
+from workbench.fleet.examination import UNREADABLE, Examination, Request, unreadable
+from workbench.fleet.manifest import Entry, Manifest, read_manifest
+from workbench.fleet.store import Store, request_key
+from workbench.fleet.valve_course import ValveCourse
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_LINES = 30
+Told = Callable[[str, Entry, Examination], None]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Fleet(Result):
+    """The valves, the gravest first."""
+
+    courses: tuple[ValveCourse, ...]
+    examined: int
+    """Recordings examined in this run; all others were kept from before."""
+    count: int
+
+    @property
+    def complaining(self) -> tuple[ValveCourse, ...]:
+        """The valves of which something is wrong."""
+        return tuple(each for each in self.courses if each.gravest)
+
+    @property
+    def bad(self) -> list[tuple[str, Entry, str]]:
+        """The recordings that could not be examined, with valve and reason."""
+        return [
+            (course.name, entry, found.sentence)
+            for course in self.courses
+            for entry, found in course.examined
+            if found.outcome == UNREADABLE
+        ]
+
+    def blocks(self) -> list[Block]:
+        """Say how many valves deserve a look, which, and which recordings could not be read."""
+        head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure", "")
+        rows = [
+            (str(rank), each.name, each.kind, _since(each), f"{100 * each.cost_share:.2f}", each.sure, _said(each))
+            for rank, each in enumerate(self.complaining, start=1)
+        ]
+        said: list[Block] = [
+            f"{len(self.complaining)} of {len(self.courses)} valves deserve a look; {self.count} recordings, "
+            f"{self.examined} of them examined now, {len(self.bad)} unreadable"
+        ]
+        if rows:
+            said.append(Table(head, rows[:MOST_LINES]))
+        if len(rows) > MOST_LINES:
+            said.append(f"and {len(rows) - MOST_LINES} more")
+        said += [f"{name}: {entry.recording}: {reason}" for name, entry, reason in self.bad]
+        return said
+
+    def frame_columns(self) -> Mapping[str, list[object]]:
+        """Return a row a valve, in the order of the ranking; docs/fleet.md says what each column is."""
+        from workbench.fleet.tables import valve_columns
+
+        return valve_columns(self.courses)
+
+    def plot(self) -> "Figure":
+        """Draw how far each complaining valve is off, in the order of the ranking."""
+        from config.results.drawing import MEASURED, line, panels
+
+        figure, (axes,) = panels((3.2,))
+        shares = [100.0 * each.cost_share for each in self.complaining]
+        line(axes, list(range(1, len(shares) + 1)), shares, MEASURED)
+        axes.set_xlabel("rank")
+        axes.set_ylabel("off by, % of stroke")
+        return figure
+
+
+def fleet(
+    manifest: Path | str,
+    out: Path | str,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    told: Told | None = None,
+) -> Fleet:
+    """Rank the valves of a manifest; what was examined before is not examined again.
+
+    Args:
+        manifest: CSV or TOML, see `workbench.fleet.manifest`.
+        out: the folder where examinations are kept.
+        scheduler: address of a Dask scheduler, whose workers see the recordings under the same paths; without one,
+            workers of this machine.
+        workers: how many of these, by default one a core.
+        told: called with valve, recording and what came of it, as it comes.
+
+    Raises:
+        InputError: a fault in the manifest, a folder of another form, no scheduler there.
+        CommandFailed: the scheduler is gone.
+    """
+    read = read_manifest(Path(manifest))
+    store = Store(Path(out))
+    running = [_Running(name, entries, read, store, told) for name, entries in read.valves.items()]
+    waiting = [each for each in running if not each.is_through()]
+    if waiting:
+        with cluster(scheduler, workers) as client:
+            work(client, waiting, lambda: None)
+    courses = tuple(sorted((each.course for each in running), key=ValveCourse.order))
+    return Fleet(courses, sum(each.examined for each in running), read.count)
+
+
+class _Running:
+    """A valve's course under way."""
+
+    def __init__(
+        self, name: str, entries: Sequence[Entry], manifest: Manifest, store: Store, told: Told | None
+    ) -> None:
+        self._entries, self._folder, self._store, self._told = entries, manifest.folder, store, told
+        self._asked: Request | None = None
+        self.examined = 0
+        self.course = ValveCourse(name)
+        try:
+            self._model = self.course.given = load_valve(_valve_path(entries[0].file, manifest.folder))
+        except InputError as error:
+            for entry in entries:
+                self._tell(entry, unreadable(str(error)))
+
+    def is_through(self) -> bool:
+        """Take all that is kept; return whether that was all."""
+        self._asked = self._next()
+        return self._asked is None
+
+    def following(self) -> Request | None:
+        """Return what has to be examined next; None: all is."""
+        asked, self._asked = self._asked or self._next(), None
+        return asked
+
+    def take(self, found: Examination) -> None:
+        """Keep what came of it."""
+        self.examined += 1
+        entry = self._entries[len(self.course.examined)]
+        if found.outcome != UNREADABLE:  # what could not be read, or killed its worker, is tried again
+            self._store.put(self._key(entry), found)
+        self._tell(entry, found)
+
+    def _next(self) -> Request | None:
+        """Return the next recording that was not examined before; what was, is taken as it was kept."""
+        while len(self.course.examined) < len(self._entries):
+            entry = self._entries[len(self.course.examined)]
+            path = self._folder / entry.recording
+            try:
+                key = self._key(entry)
+            except OSError as error:
+                self._tell(entry, unreadable(f"cannot be read: {error.strerror}"))
+                continue
+            kept = self._store.get(key)
+            if kept is None:
+                return Request(key, str(path.resolve()), self._model, not self.course.readable)
+            self._tell(entry, kept)
+        return None
+
+    def _key(self, entry: Entry) -> str:
+        return request_key(self._folder / entry.recording, self._model, not self.course.readable)
+
+    def _tell(self, entry: Entry, found: Examination) -> None:
+        self.course.take(entry, found)
+        if found.model is not None:
+            self._model = _valve_in(found.model)
+        if self._told:
+            self._told(self.course.name, entry, found)
+
+
+def _valve_in(text: str) -> ValveFile:
+    import tomllib
+
+    return validated(ValveFile, tomllib.loads(text), "model")
+
+
+def _valve_path(written: str, folder: Path) -> Path:
+    return folder / written if written.endswith(".toml") else find_valve(written)
+
+
+def _since(course: ValveCourse) -> str:
+    return f"{course.gravest[0].time:%Y-%m-%d}" if course.gravest else ""
+
+
+def _said(course: ValveCourse) -> str:
+    return course.gravest[1].sentence if course.gravest else ""
+
+
+def at(text: str) -> datetime:
+    """Read a date or time that a person gave.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise InputError(text, "is no date or time: allowed is YYYY-MM-DD, or with a time") from None

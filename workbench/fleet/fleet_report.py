@@ -1,0 +1,110 @@
+"""The ranking as one page: a line a valve with a sparkline, and what is behind it folded under the line.
+
+The diagnosis report of a valve has five megabytes, of plots: the page has the command that makes it instead.
+"""
+
+from html import escape
+from pathlib import Path
+
+from workbench.fleet.examination import Examination
+from workbench.fleet.fleet import Fleet
+from workbench.fleet.valve_course import ValveCourse
+from workbench.report.page import (
+    Html,
+    Row,
+    bullets,
+    folded,
+    heading_alone,
+    preformatted,
+    section,
+    table,
+    text,
+    write_without_plots,
+)
+from workbench.report.units import Shown, length
+
+WIDTH_PX, HEIGHT_PX, RADIUS_PX = 120, 24, 2
+LEAST_RATIO, MOST_RATIO = 1.0, 100.0
+"""Of error to floor, between which a sparkline goes, by its logarithm."""
+
+
+def report_fleet(fleet: Fleet, path: Path, manifest: str) -> None:
+    """Write the page; the same fleet, the same bytes.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    facts = f"{len(fleet.courses)} valves, {fleet.count} recordings, {len(fleet.bad)} unreadable"
+    parts = [heading_alone(f"Fleet of {manifest}", facts), _ranking(fleet)]
+    parts += [_drill_down(rank, course) for rank, course in enumerate(fleet.complaining, start=1)]
+    if fleet.bad:
+        bad = [f"{name}: {entry.recording}: {reason}" for name, entry, reason in fleet.bad]
+        parts.append(section("unreadable", "Recordings that could not be examined", bullets(bad)))
+    well = [course.name for course in fleet.courses if not course.gravest]
+    parts.append(section("well", "As their models say", text(", ".join(well) or "none")))
+    write_without_plots(path, f"Fleet of {manifest}", parts)
+
+
+def _ranking(fleet: Fleet) -> Html:
+    rows = [
+        Row((str(rank), course.name, course.kind, _since(course), _share(course), course.sure), kind="over")
+        for rank, course in enumerate(fleet.complaining, start=1)
+    ]
+    if not rows:
+        return section("ranking", "Valves that deserve a look", text("None: all are as their last models say."))
+    head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure")
+    return section("ranking", "Valves that deserve a look", table("ranked", head, rows, words=(1, 2, 3, 5)))
+
+
+def _drill_down(rank: int, course: ValveCourse) -> Html:
+    assert course.gravest
+    entry, found = course.gravest
+    history = [
+        Row((each.time.date().isoformat(), each.recording, _outcome(came), length(came.error_before_m)))
+        for each, came in course.examined
+    ]
+    tried = [Row((each.name, length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
+    command = f"positioner diagnose {entry.recording} --valve {entry.file} --report {course.name}.html"
+    return folded(
+        f"valve-{rank}",
+        f"{rank}. {course.name}: {course.kind}",
+        sparkline(course),
+        text(found.sentence),
+        table(f"history-{rank}", ("when", "recording", "came of it", "error before, mm"), history, words=(0, 1, 2)),
+        table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else Html(""),
+        preformatted(command),
+    )
+
+
+def sparkline(course: ValveCourse) -> Html:
+    """Return the error of the valve's last model, in floors, over its recordings: low is well."""
+    points = [_height(found) for _, found in course.readable]
+    step = (WIDTH_PX - 2 * RADIUS_PX) / max(len(points) - 1, 1)
+    places = [(RADIUS_PX + i * step, y) for i, y in enumerate(points)]
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS_PX}" fill="currentColor"/>' for x, y in places)
+    label = escape(f"error over the floor of {course.name}, {len(points)} recordings")
+    return Html(
+        f'<svg role="img" aria-label="{label}" width="{WIDTH_PX}" height="{HEIGHT_PX}">'
+        f'<polyline points="{line}" fill="none" stroke="currentColor"/>{dots}</svg>'
+    )
+
+
+def _height(found: Examination) -> float:
+    from math import log
+
+    ratio = (found.error_before_m or 0.0) / found.floor_m if found.floor_m else MOST_RATIO
+    share = log(min(max(ratio, LEAST_RATIO), MOST_RATIO)) / log(MOST_RATIO)
+    return HEIGHT_PX - RADIUS_PX - share * (HEIGHT_PX - 2 * RADIUS_PX)
+
+
+def _outcome(found: Examination) -> str:
+    return found.outcome.replace("_", " ") + (f": {', '.join(found.effects)}" if found.effects else "")
+
+
+def _since(course: ValveCourse) -> str:
+    return f"{course.gravest[0].time:%Y-%m-%d}" if course.gravest else ""
+
+
+def _share(course: ValveCourse) -> Shown:
+    return Shown(f"{100.0 * course.cost_share:.2f}", f"{course.cost_share:.6g}")

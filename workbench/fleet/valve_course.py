@@ -1,0 +1,129 @@
+"""A valve's recordings in turn, each held against the model that the one before left; what the valve complains of.
+
+unreadable recording    the model stays
+as before               the model stays
+changed                 the refitted valve is the model from now on
+missing                 the valve with the effect is
+one of, unexplained, untold   the model stays: nobody knows what it is
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from config.valve_file import ValveFile
+from workbench.fleet.examination import CHANGED, UNREADABLE, UNTOLD, Examination
+from workbench.fleet.manifest import Entry
+
+KINDS: Mapping[str, tuple[str, ...]] = {
+    "sticks": (
+        "stribeck",
+        "dwell_stiction",
+        "asymmetric_friction",
+        "position_friction",
+        "pressure_friction",
+        "pressure_power_friction",
+        "presliding",
+        "presliding_hysteresis",
+        "asymmetric_viscosity",
+        "coulomb_n",
+        "static_n",
+        "viscous_ns_per_m",
+    ),
+    "drifts": ("friction_drift",),
+    "lost calibration": ("sensor_gain", "sensor_offset", "sensor_nonlinearity", "sensor_lag", "quantisation"),
+    "play or stop": ("backlash", "end_stop"),
+    "air supply or leak": ("supply_limit", "rate_limit", "ip_lag", "dead_time"),
+    "spring or diaphragm": ("preload", "spring_hardening", "area_variation", "spring_n_per_m"),
+    "flow": ("flow_force", "quadratic_drag"),
+}
+"""What an engineer calls it, by the effect that is missing or the parameter that changed."""
+UNKNOWN_KIND = "something new"
+GRAVEST = ("missing", "one_of", "unexplained", "untrusted", "unjudged", "unfinished", UNTOLD, CHANGED)
+"""Outcomes that are complaints, the gravest first."""
+SURE = {"missing": "sure", "one_of": "one of several", CHANGED: "sure"}
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A valve file that was accepted: from when on, by which recording, and why."""
+
+    when: datetime
+    recording: str
+    why: str
+    effects: tuple[str, ...]
+    """Added to it by that recording."""
+    text: str
+
+
+@dataclass(slots=True)
+class ValveCourse:
+    """What is known of a valve, as its recordings are examined one after another."""
+
+    name: str
+    given: ValveFile | None = None
+    """Its file; None: it cannot be read."""
+    examined: list[tuple[Entry, Examination]] = field(default_factory=list)
+    models: list[Model] = field(default_factory=list)
+
+    def take(self, entry: Entry, found: Examination) -> None:
+        """Go on with what came of the next recording."""
+        self.examined.append((entry, found))
+        if found.model is not None:
+            model = Model(entry.time, entry.recording, found.sentence, found.effects, found.model)
+            self.models.append(model)
+
+    @property
+    def readable(self) -> list[tuple[Entry, Examination]]:
+        """The recordings that could be examined."""
+        return [(entry, found) for entry, found in self.examined if found.outcome != UNREADABLE]
+
+    def complaints(self) -> Iterator[tuple[Entry, Examination]]:
+        """Yield the recordings that changed what is known; that a drawing was first fitted is none."""
+        first = True
+        for entry, found in self.readable:
+            if found.outcome in GRAVEST and not (first and found.outcome == CHANGED):
+                yield entry, found
+            first = False
+
+    @property
+    def gravest(self) -> tuple[Entry, Examination] | None:
+        """The gravest of them, of equal ones the latest; None: the valve is as it was."""
+        found = sorted(self.complaints(), key=lambda each: each[0].time, reverse=True)
+        return min(found, key=lambda each: GRAVEST.index(each[1].outcome), default=None)
+
+    @property
+    def kind(self) -> str:
+        """What an engineer calls it; empty if nothing is wrong."""
+        if self.gravest is None:
+            return ""
+        _, found = self.gravest
+        names = found.effects or tuple(each.name for each in found.changes)
+        return ", ".join(dict.fromkeys(map(kind_of, names))) or UNKNOWN_KIND
+
+    @property
+    def sure(self) -> str:
+        """How sure that is, in words."""
+        return SURE.get(self.gravest[1].outcome, "not sure what") if self.gravest else ""
+
+    @property
+    def cost_share(self) -> float:
+        """How far the stem is from where the valve's last good model has it, rms, of the stroke: the gravest's."""
+        if self.gravest is None or self.given is None:
+            return 0.0
+        return (self.gravest[1].error_before_m or 0.0) / self.given.valve.stroke_m
+
+    def order(self) -> tuple[int, float, str]:
+        """Sort by this: the gravest outcome first, then what it costs, then the name."""
+        place = GRAVEST.index(self.gravest[1].outcome) if self.gravest else len(GRAVEST)
+        return place, -self.cost_share, self.name
+
+    def model_at(self, time: datetime) -> str | None:
+        """Return the text of the model that held at a time; None: still the given file."""
+        return next((each.text for each in reversed(self.models) if each.when <= time), None)
+
+
+def kind_of(name: str) -> str:
+    """Return what an engineer calls an effect, or a parameter that changed."""
+    effect = name.partition(".")[0]
+    return next((kind for kind, names in KINDS.items() if effect in names), UNKNOWN_KIND)
