@@ -33,6 +33,7 @@ from sim.composition import Composition
 from sim.effect import first_effects
 from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import NOISE_M, Trial
+from workbench.fleet.engine import cluster
 from workbench.fleet.examination import AS_BEFORE, CHANGED
 from workbench.fleet.fleet import Fleet, fleet
 from workbench.fleet.tables import write_tables
@@ -41,6 +42,7 @@ DURATION_S, PERIOD_S = 20.0, 0.02
 TIGHTER = 1.3
 """Factor on the friction of a valve whose packing was tightened."""
 ONE_IN = 10
+TASKS = 500
 SPRING, AUTUMN = "2026-03-01", "2026-09-01"
 
 
@@ -157,6 +159,16 @@ def main(words: Sequence[str] | None = None) -> None:
     for name in sorted(result.missed | result.false):
         print(f"  {'missed' if name in result.missed else 'false'}: {name} {truth[name]}")
     print(f"{found.examined} examined in {took_s:.1f} s on {given.workers} workers")
+    print(f"scheduler: {1e3 * overhead_s(given.workers):.1f} ms a task")
+
+
+def overhead_s(workers: int) -> float:
+    """Return what Dask takes for a task that does nothing, s."""
+    with cluster(None, workers) as client:
+        client.gather([client.submit(abs, 0, pure=False) for _ in range(workers)])
+        began_s = time.monotonic()
+        client.gather([client.submit(abs, i, pure=False) for i in range(TASKS)])
+        return (time.monotonic() - began_s) / TASKS
 
 
 if __name__ == "__main__":

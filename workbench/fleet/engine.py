@@ -12,6 +12,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.metadata import version
 from typing import Any, Protocol
 
 from config.errors import CommandFailed, InputError
@@ -40,7 +41,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """Give a client of a scheduler; without an address, of one that runs with its workers while this lasts.
 
     Raises:
-        InputError: nobody answers at the address.
+        InputError: nobody answers at the address, or its workers are none of ours.
         ModuleNotFoundError: Dask is not installed; names the extra.
     """
     distributed = needed("distributed", WHO)
@@ -50,6 +51,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         except (OSError, ValueError) as error:
             raise InputError(scheduler, f"no scheduler answers there: {' '.join(str(error).split())}") from None
         with client:
+            _require_same_rules(client, scheduler)
             yield client
         return
     with (
@@ -66,6 +68,27 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         distributed.Client(local) as client,
     ):
         yield client
+
+
+def own_version() -> str:
+    """Return which positioner this process has."""
+    return version("positioner")
+
+
+def _require_same_rules(client: Any, scheduler: str) -> None:
+    """See that there are workers, and that they would examine as this machine does.
+
+    Raises:
+        InputError: they would not.
+    """
+    try:
+        theirs = set(client.run(own_version).values())
+    except Exception as error:  # whatever a worker without our packages comes to
+        problem = f"its workers have no positioner[sim,fleet]: {type(error).__name__}: {error}"
+        raise InputError(scheduler, " ".join(problem.split())) from None
+    if theirs != {own_version()}:
+        there = ", ".join(sorted(theirs)) or "no workers"
+        raise InputError(scheduler, f"has {there}; allowed are workers with positioner {own_version()}")
 
 
 def work(client: Any, courses: Sequence[Course], told: Callable[[], None]) -> None:

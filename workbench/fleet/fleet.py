@@ -140,15 +140,17 @@ class _Running:
 
     def following(self) -> Request | None:
         """Return what has to be examined next; None: all is."""
-        asked, self._asked = self._asked or self._next(), None
-        return asked
+        self._asked = self._asked or self._next()
+        return self._asked
 
     def take(self, found: Examination) -> None:
         """Keep what came of it."""
+        assert self._asked
+        key, self._asked = self._asked.key, None
         self.examined += 1
         entry = self._entries[len(self.course.examined)]
         if found.outcome != UNREADABLE:  # what could not be read, or killed its worker, is tried again
-            self._store.put(self._key(entry), found)
+            self._store.put(key, found)
         self._tell(entry, found)
 
     def _next(self) -> Request | None:
@@ -157,7 +159,7 @@ class _Running:
             entry = self._entries[len(self.course.examined)]
             path = self._folder / entry.recording
             try:
-                key = self._key(entry)
+                key = request_key(path, self._model, not self.course.readable)
             except OSError as error:
                 self._tell(entry, unreadable(f"cannot be read: {error.strerror}"))
                 continue
@@ -166,9 +168,6 @@ class _Running:
                 return Request(key, str(path.resolve()), self._model, not self.course.readable)
             self._tell(entry, kept)
         return None
-
-    def _key(self, entry: Entry) -> str:
-        return request_key(self._folder / entry.recording, self._model, not self.course.readable)
 
     def _tell(self, entry: Entry, found: Examination) -> None:
         self.course.take(entry, found)

@@ -64,6 +64,7 @@ def _drill_down(rank: int, course: ValveCourse) -> Html:
         for each, came in course.examined
     ]
     tried = [Row((each.name, length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
+    models = [Row((f"{each.when:%Y-%m-%d}", each.recording, each.why)) for each in course.models]
     command = f"positioner diagnose {entry.recording} --valve {entry.file} --report {course.name}.html"
     return folded(
         f"valve-{rank}",
@@ -71,6 +72,7 @@ def _drill_down(rank: int, course: ValveCourse) -> Html:
         sparkline(course),
         text(found.sentence),
         table(f"history-{rank}", ("when", "recording", "came of it", "error before, mm"), history, words=(0, 1, 2)),
+        table(f"models-{rank}", ("model from", "by", "why"), models, words=(0, 1, 2)) if models else Html(""),
         table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else Html(""),
         preformatted(command),
     )
