@@ -15,6 +15,7 @@ EXTRAS = {
     "can": "canopen",
     "cryptography": "tls",
     "shtab": "completion",
+    "prometheus_client": "metrics",
     "nicegui": "web",
     "fastapi": "web",
     "uvicorn": "web",

@@ -5,6 +5,7 @@ of two words is sent most significant word first and is written whole or not at 
 as on the wire; many tools print them from 1.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import chain
 from typing import Literal
@@ -176,6 +177,43 @@ ESTIMATES = (
     Register("offset_applied", 282, "float32", "Pa", "(up - down) / 2 as the law uses it; 0 in the seed's model"),
 )
 
+JITTER_BOUNDS_S = {
+    "10us": 10e-6,
+    "20us": 20e-6,
+    "50us": 50e-6,
+    "100us": 100e-6,
+    "200us": 200e-6,
+    "500us": 500e-6,
+    "1ms": 1e-3,
+    "2ms": 2e-3,
+    "5ms": 5e-3,
+    "10ms": 10e-3,
+    "any": math.inf,
+}
+"""Of the histogram of how far a period was from the one of the daemon's file: registers `jitter_within_*`."""
+
+REQUESTERS = ("plain", "observer", "operator", "engineer", "refused")
+"""Whose requests are counted: in the clear, of a role, and what a role may not."""
+
+
+def _histogram() -> tuple[Register, ...]:
+    of = "periods, in real time, that differed from [cycle] period_s"
+    return tuple(
+        Register(
+            f"jitter_within_{name}", 320 + 2 * i, "uint32", "1", f"{of}{f' by {name} at the most' * (name != 'any')}"
+        )
+        for i, name in enumerate(JITTER_BOUNDS_S)
+    )
+
+
+def _requests() -> tuple[Register, ...]:
+    texts = ("in the clear", "of observers", "of operators", "of engineers", "that a role may not make, refused")
+    return tuple(
+        Register(f"requests_{name}", 344 + 2 * i, "uint32", "1", f"requests to this port {text}")
+        for i, (name, text) in enumerate(zip(REQUESTERS, texts, strict=True))
+    )
+
+
 STATISTICS = (
     Register("cycles", 300, "uint32", "1", "cycles run, wraps"),
     Register("missed_periods", 302, "uint32", "1", "periods in which no cycle ran"),
@@ -185,6 +223,9 @@ STATISTICS = (
     Register("jitter_99", 310, "float32", "s", "99 % of the last periods differ from the median by less than this"),
     Register("cycle_time", 312, "float32", "s", "median time a cycle took, bus included"),
     Register("unrecorded", 314, "uint32", "1", "samples the recorder could not write"),
+    Register("jitter_sum", 316, "uint64", "1e-6 s", "sum of how far periods differed from [cycle] period_s"),
+    *_histogram(),
+    *_requests(),
 )
 
 IDENTITY = (

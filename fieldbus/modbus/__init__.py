@@ -3,7 +3,7 @@
 Its files:
 
     server, connection, register_answers    answers on TCP: the server, one client's frames, what a request gets
-    admission                               who gets a place, and how often each host may ask
+    admission, request_counts               who gets a place, and how often each host may ask; how often who asked
     client                                  asks on TCP
     serial_line, rtu                        the serial line, and the frames on it
     pdu, exception_codes, layout            what frames carry; how a refusal is said; values in registers

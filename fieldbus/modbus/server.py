@@ -30,6 +30,7 @@ from fieldbus.modbus.admission import Admitted, Allowance, Places, ServerLimits
 from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.exception_codes import exception_reply
 from fieldbus.modbus.register_answers import RegisterAnswers, Registers
+from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.tls import NOBODY, Guard, Identity, NotAuthorized, failure_reason
 
 log = logging.getLogger(__name__)
@@ -68,6 +69,7 @@ class RegisterServer(RegisterAnswers):
         others: the registers of other units behind the same port. With them "this device" is nobody's number.
         limits: of clients and requests.
         witness: told of sessions: `host:port` or `name (role) at host:port`, what became of it, and why.
+        counts: of requests by who asked.
     """
 
     def __init__(
@@ -80,8 +82,10 @@ class RegisterServer(RegisterAnswers):
         others: Mapping[int, Registers] | None = None,
         limits: ServerLimits | None = None,
         witness: Witness = nobody_asks,
+        counts: RequestCounts | None = None,
     ) -> None:
         super().__init__(registers)
+        self._counts = counts or RequestCounts()
         self._witness = witness
         self._limits = limits or ServerLimits()
         self._address = (host, port)
@@ -127,7 +131,10 @@ class RegisterServer(RegisterAnswers):
         unit = self._units.get(number)
         if unit is None:
             return exception_reply(pdu[0], ExcCodes.GATEWAY_NO_RESPONSE)
-        return unit.answer(pdu, peer) if self._guard is None else self._permitted(self._guard, unit, pdu, peer)
+        if self._guard is not None:
+            return self._permitted(self._guard, unit, pdu, peer)
+        self._counts.enter(None)
+        return unit.answer(pdu, peer)
 
     def _permitted(self, guard: Guard, unit: RegisterAnswers, pdu: bytes, peer: str) -> bytes:
         """Answer what the client's role permits; refuse the rest, as Modbus/TCP Security has it."""
@@ -139,8 +146,10 @@ class RegisterServer(RegisterAnswers):
             guard.authorize(identity, pdu)
         except NotAuthorized as refusal:
             log.warning("%s at %s refused: %s", identity, peer, refusal)
+            self._counts.refuse()
             self._witness(f"{identity} at {peer}", "refused", str(refusal))
             return exception_reply(pdu[0], ExcCodes.ILLEGAL_FUNCTION)
+        self._counts.enter(identity.role)
         return unit.answer(pdu, f"{identity} at {peer}")
 
 

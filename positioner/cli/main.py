@@ -23,6 +23,7 @@ COMMANDS = (
     "discriminate",
     "map",
     "events",
+    "metrics",
     "import",
     "valve",
     "simulate",

@@ -48,7 +48,7 @@ class Cycle:
         history: ValveHistory | None = None,
     ) -> None:
         self.requests = requests
-        self.statistics = CycleStatistics()
+        self.statistics = CycleStatistics(pace.period_s)
         self.link = link
         self.recorder = recorder
         self.health = health

@@ -1,16 +1,32 @@
-"""How punctual the cycle is: the last cycles' start times and durations, summed up only when somebody asks."""
+"""How punctual the cycle is: the last cycles' start times and durations, summed up only when somebody asks.
 
+In real time also a histogram over all cycles, of how far the time from one cycle's start to the next's was from the
+period that the daemon's file asks for.
+"""
+
+from bisect import bisect_left
 from itertools import pairwise
 from statistics import median
 
+from config.registers import JITTER_BOUNDS_S
+
+BOUNDS_S = tuple(JITTER_BOUNDS_S.values())
 LENGTH = 1000
 """Cycles looked back on."""
 
 
 class CycleStatistics:
-    """Written by the cycle thread; read by others, who may see a cycle half entered and no harm in it."""
+    """Written by the cycle thread; read by others, who may see a cycle half entered and no harm in it.
 
-    def __init__(self) -> None:
+    Args:
+        period_s: that is asked for; None for a device in lockstep, which has no jitter.
+    """
+
+    def __init__(self, period_s: float | None = None) -> None:
+        self._asked_s = period_s
+        self._last_s: float | None = None
+        self._off = [0] * len(BOUNDS_S)
+        self.jitter_sum_us = 0
         self.cycles = 0
         self.missed_periods = 0
         self._started_s = [0.0] * LENGTH
@@ -23,6 +39,15 @@ class CycleStatistics:
         self._took_s[slot] = took_s
         self.missed_periods += missed
         self.cycles += 1
+        last_s, self._last_s = self._last_s, started_s
+        if self._asked_s is not None and last_s is not None:
+            off_s = abs(started_s - last_s - self._asked_s)
+            self._off[bisect_left(BOUNDS_S, off_s)] += 1
+            self.jitter_sum_us += round(off_s * 1e6)
+
+    def periods_within(self, bound: int) -> int:
+        """Return how many periods were off by at most the bound of that number among `JITTER_BOUNDS_S`."""
+        return sum(self._off[: bound + 1])
 
     def period_s(self) -> float:
         """Return the median period; 0 before the second cycle."""

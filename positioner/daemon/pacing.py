@@ -31,6 +31,11 @@ MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 class Pace(Protocol):
     """Says when a cycle begins and what time it is."""
 
+    @property
+    def period_s(self) -> float | None:
+        """How far cycles should be apart; None where the device says."""
+        ...
+
     def prepare(self) -> None:
         """Make the calling thread, which is the cycle's, as punctual as can be. Called once, before it cycles."""
         ...
@@ -63,7 +68,7 @@ class RealTimePace:
     """
 
     def __init__(self, period_s: float, phase_s: float | None = None, may_spin: bool = True) -> None:
-        self._period_s = period_s
+        self.period_s = period_s
         self._phase_s = phase_s
         self._may_spin = may_spin
         self._spin_s = 0.0
@@ -72,18 +77,18 @@ class RealTimePace:
     def prepare(self) -> None:
         """Ask the system for priority; spin only with it."""
         if raise_priority() and self._may_spin:
-            self._spin_s = min(MOST_SPIN_S, SPIN_SHARE * self._period_s)
+            self._spin_s = min(MOST_SPIN_S, SPIN_SHARE * self.period_s)
 
     def wait(self) -> int:
         """Sleep, then spin, until the next deadline. A missed one is not made up for."""
         now_s = time.monotonic()
         if self._due_s is None:
-            self._due_s = now_s if self._phase_s is None else now_s - (now_s - self._phase_s) % self._period_s
-        due_s = self._due_s + self._period_s
+            self._due_s = now_s if self._phase_s is None else now_s - (now_s - self._phase_s) % self.period_s
+        due_s = self._due_s + self.period_s
         missed = 0
         if now_s > due_s:
-            missed = int((now_s - due_s) / self._period_s)
-            due_s += missed * self._period_s
+            missed = int((now_s - due_s) / self.period_s)
+            due_s += missed * self.period_s
         self._due_s = due_s
         rest_s = due_s - self._spin_s - now_s
         if rest_s > 0:
@@ -107,6 +112,8 @@ class RealTimePace:
 
 class DevicePace:
     """As fast as a device in lockstep answers; its clock is the time."""
+
+    period_s = None
 
     def __init__(self) -> None:
         self._now_s = 0.0

@@ -21,6 +21,7 @@ from config.roles import Role
 from drivers import driver_for
 from drivers.boundary import DriverError, Reading
 from fieldbus.modbus.admission import ServerLimits
+from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard
 from positioner.control.controller import Controller
@@ -40,6 +41,7 @@ from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
+from positioner.daemon.service_manager import ServiceManager
 from positioner.daemon.service_state import service_state
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 
@@ -69,12 +71,12 @@ class ServedValve:
         """Its name."""
         return self.file.valve.name
 
-    def served(self) -> SupervisoryRegisters:
-        """Return its supervisory registers."""
+    def served(self, requests: RequestCounts) -> SupervisoryRegisters:
+        """Return its supervisory registers, the server's counts among them."""
         settings = self.settings
         state = partial(service_state, limits=settings.limits, shadow=self.file.cycle.shadow)
         return SupervisoryRegisters(
-            self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name, state
+            self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name, state, requests
         )
 
     def leave(self) -> None:
@@ -99,7 +101,7 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
     Raises:
         InputError: a device is not there or not as described, a port is taken, recordings cannot be written.
     """
-    endings = Endings()
+    endings, manager = Endings(), ServiceManager()
     with ExitStack() as on_exit:
         on_exit.callback(start_logging(files[0].log.level).stop)
         refinement = RefinementProcess()
@@ -124,9 +126,12 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
                 keeper.start()
                 on_exit.callback(keeper.stop)
         try:
-            print(f"serving {', '.join(valve.name for valve in valves)} on {server.address}", flush=True)
-            _run(valves, server, endings)
+            said = f"serving {', '.join(valve.name for valve in valves)} on {server.address}"
+            print(said, flush=True)
+            manager.ready(max(_slowest_s(valve.file) for valve in valves), said)
+            _run(valves, server, endings, manager)
         finally:
+            manager.stopping(endings.reason)
             for valve in valves:
                 valve.leave()
         log_event(log, logging.INFO, "stopped", status=endings.status, reason=endings.reason)
@@ -212,7 +217,7 @@ def _announce(valve: ServedValve, port: int) -> None:
             log_event(log, logging.WARNING, "device is not there", reason=valve.unreachable_reason)
 
 
-def _run(valves: Sequence[ServedValve], server: RegisterServer, endings: Endings) -> None:
+def _run(valves: Sequence[ServedValve], server: RegisterServer, endings: Endings, manager: ServiceManager) -> None:
     """Run the cycles until something ends the daemon; nobody is served any more once they stop.
 
     Each has a thread of its own, save that valves on one line share that line's.
@@ -229,11 +234,17 @@ def _run(valves: Sequence[ServedValve], server: RegisterServer, endings: Endings
     try:
         while not endings.came:
             threads[0].join(SIGNAL_CHECK_S)
+            manager.feed([valve.cycle.statistics.cycles for valve in valves])
     finally:
         server.stop()
         stop.set()
         for thread in threads:
             thread.join()
+
+
+def _slowest_s(file: DaemonFile) -> float:
+    """Return how long one cycle may take, replies that do not come included."""
+    return max(file.cycle.period_s, file.device.longest_exchange_s)
 
 
 def _by_line(valves: Sequence[ServedValve]) -> list[list[ServedValve]]:
@@ -285,16 +296,17 @@ def _tell_of_health(history: ValveHistory, condition: Ne107Condition) -> None:
 
 def _server(valves: Sequence[ServedValve], history: HistoryKeeper) -> RegisterServer:
     first, *others = valves
-    where = first.file.supervisory
+    where, requests = first.file.supervisory, RequestCounts()
     return RegisterServer(
-        first.served(),
+        first.served(requests),
         where.host,
         where.port,
         where.unit,
         _guard(first.file),
-        {valve.file.supervisory.unit: valve.served() for valve in others},
+        {valve.file.supervisory.unit: valve.served(requests) for valve in others},
         ServerLimits(where.most_clients, where.clients_per_host, frozenset(where.reserved_hosts), where.requests_per_s),
         history.session,
+        requests,
     )
 
 

@@ -26,18 +26,22 @@ from config.registers import (
     ESTIMATED,
     EXPERIMENT,
     FLOAT_TEST,
+    JITTER_BOUNDS_S,
     LONG_TEST,
     MAP_VERSION,
     REGISTERS,
+    REQUESTERS,
     SIZE,
     WORD_TEST,
     Register,
 )
 from fieldbus.modbus.register_answers import RegisterError, Table
+from fieldbus.modbus.request_counts import RequestCounts
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.daemon.backoff import LinesPerPeer
 from positioner.daemon.cycle import Cycle
+from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.experiment_registers import WriteRejected, experiment_asked, experiment_getters
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.logs import log_event, logging_valve
@@ -68,6 +72,7 @@ class SupervisoryRegisters:
         maximum_pa: float,
         valve: str | None = None,
         state: Callable[[Decision], ServiceState] = state_by_mode,
+        requests: RequestCounts | None = None,
     ) -> None:
         self._cycle = cycle
         self._valve = valve
@@ -77,6 +82,7 @@ class SupervisoryRegisters:
         self._heartbeat = 0
         self._lines = LinesPerPeer()
         self._values = _getters(cycle, stroke_m) | {"service": lambda s, _: state(s.decision)}
+        self._values |= _request_getters(requests or RequestCounts())
 
     def read(self, table: Table, address: int, count: int) -> Sequence[int]:  # noqa: ARG002 - both tables are the same
         """Return words of one snapshot; addresses between registers read 0.
@@ -229,7 +235,8 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         **experiment_getters(),
         **_event_getters(cycle),
     }
-    assert getters.keys() == BY_NAME.keys() - {"heartbeat", "service"}, getters.keys() ^ BY_NAME.keys()
+    of_others = {"heartbeat", "service", *(f"requests_{each}" for each in REQUESTERS)}
+    assert getters.keys() == BY_NAME.keys() - of_others, getters.keys() ^ BY_NAME.keys()
     return getters
 
 
@@ -325,7 +332,20 @@ def _statistics_getters(cycle: Cycle) -> dict[str, Getter]:
         "jitter_99": lambda _s, _r: statistics.jitter_99_s(),
         "cycle_time": lambda _s, _r: statistics.cycle_time_s(),
         "unrecorded": lambda _s, _r: cycle.recorder.unrecorded if cycle.recorder else 0,
+        "jitter_sum": lambda _s, _r: statistics.jitter_sum_us,
+        **{f"jitter_within_{name}": _periods_within(statistics, i) for i, name in enumerate(JITTER_BOUNDS_S)},
     }
+
+
+def _periods_within(statistics: CycleStatistics, bound: int) -> Getter:
+    return lambda _s, _r: statistics.periods_within(bound)
+
+
+def _request_getters(requests: RequestCounts) -> dict[str, Getter]:
+    def of(requester: str) -> Getter:
+        return lambda _s, _r: requests.of(requester)
+
+    return {f"requests_{each}": of(each) for each in REQUESTERS}
 
 
 def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:

@@ -1,0 +1,49 @@
+"""`positioner metrics`: running valves for Prometheus."""
+
+import argparse
+from pathlib import Path
+
+HELP = "serve what daemons measure of themselves and of their valves for Prometheus: /metrics over HTTP"
+EXAMPLE = "positioner metrics daemon.toml --listen-port 9502"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("config", type=Path, nargs="+", metavar="CONFIG.toml", help="a daemon's file: all its valves")
+    pem = ("AUTHORITY.pem", "CERTIFICATE.pem", "KEY")
+    parser.add_argument("--tls", nargs=3, type=Path, metavar=pem, help="read with this observer's certificate")
+    parser.add_argument("--listen-host", default="127.0.0.1", help="where it listens (127.0.0.1)")
+    parser.add_argument("--listen-port", type=int, default=9502, metavar="N", help="at which port (9502)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until told to end."""
+    from threading import Event
+
+    from config.errors import InputError
+    from config.extras import needed
+    from config.tls_table import Tls
+    from positioner.cli.parts.daemon_address import HANDSHAKE_TIMEOUT_S
+
+    needed("prometheus_client", "positioner metrics")
+    from config.daemon_file import load_valves
+    from positioner.metrics.exporter import serve_metrics
+    from positioner.metrics.scraped_valve import ScrapedValve
+
+    if not 0 <= arguments.listen_port <= 65535:
+        raise InputError("--listen-port", f"must lie between 0 (any free one) and 65535, got {arguments.listen_port}")
+    tls = None
+    if arguments.tls is not None:
+        authority, certificate, key = arguments.tls
+        tls = Tls(authority=authority, certificate=certificate, key=key, handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
+    valves: dict[str, ScrapedValve] = {}
+    for path in arguments.config:
+        for file in load_valves(path):
+            name, where = file.valve.name, file.supervisory
+            if name in valves:
+                raise InputError(str(path), f"valve.name: {name!r} is also in another file; metrics tell by names")
+            valves[name] = ScrapedValve(name, (where.host, where.port, where.unit), tls)
+    port = serve_metrics(list(valves.values()), arguments.listen_host, arguments.listen_port)
+    print(f"serving metrics of {', '.join(valves)} on http://{arguments.listen_host}:{port}/metrics", flush=True)
+    Event().wait()
+    return 0
