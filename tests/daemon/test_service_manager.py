@@ -1,13 +1,19 @@
 """What systemd is told, on a socket of the test's own and a clock that the test sets."""
 
 import os
+import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from positioner.cli.parts.children import port_in
 from positioner.daemon.service_manager import ServiceManager
+from tests.children import running
+from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
 
 
 class Systemd:
@@ -98,6 +104,34 @@ def test_a_watchdog_of_another_process_is_not_ours(tmp_path: Path) -> None:
     manager.feed([1])
     assert systemd.told() == []
     systemd.socket.close()
+
+
+@pytest.mark.real_time
+def test_a_running_daemon_says_when_it_serves_feeds_the_watchdog_and_says_that_it_ends(tmp_path: Path) -> None:
+    systemd = Systemd(str(tmp_path / "notify"))
+    systemd.socket.settimeout(60.0)
+    environment = {**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "1000000"}
+    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+        words = [sys.executable, "-P", "-m", "positioner.cli", "run"]
+        path = daemon_file(tmp_path, port_in(slave), device=PATIENT)
+        with subprocess.Popen(
+            [*words, path], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as daemon:
+            try:
+                ready = systemd.told()
+                fed = [systemd.told() for _ in range(3)]
+                daemon.send_signal(signal.SIGTERM)
+                while (last := systemd.told()) == ["WATCHDOG=1"]:
+                    pass
+            finally:
+                daemon.terminate()
+                daemon.wait(60)
+    systemd.socket.close()
+    assert ready[0] == "READY=1"
+    assert ready[1].startswith("STATUS=serving FV-101 on 127.0.0.1:")
+    assert ready[2:] == ["WATCHDOG_USEC=6000000"], "three replies that do not come within two seconds"
+    assert fed == [["WATCHDOG=1"]] * 3
+    assert last == ["STOPPING=1", "STATUS=Terminated"]
 
 
 def test_nobody_who_listens_is_no_harm(tmp_path: Path) -> None:
