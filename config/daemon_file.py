@@ -177,10 +177,14 @@ class SupervisoryTable(Schema):
 
 
 class RecorderTable(Schema):
-    """Table `[recorder]`: recordings in a folder, a new file at a size, the oldest deleted beyond a number."""
+    """Table `[recorder]`: recordings in a folder, a new file at a size or an age; the oldest are deleted."""
 
     folder: FolderName
     file_bytes: Annotated[int, Field(ge=10_000)] = 50_000_000
+    file_s: NonNegative = 86_400.0
+    """A file older than this is followed by a new one; 0: only a full one is."""
+    compress: bool = True
+    """Those before the newest two are compressed, by a process of its own."""
     keep_files: Annotated[int, Field(ge=1)] = 20
 
 

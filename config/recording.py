@@ -5,18 +5,20 @@ is known, has `reference_m`, the set point, in the place of `command_pa`. `press
 force on the stem, positive in the opening direction), `reference_m`, `state` and further columns are optional. A row's
 command is the one in force from its time to the next row's. Lines that begin with `#` at the top carry metadata,
 `# key: value`. A last line torn by a crash is left out and told as `torn`. A byte order mark before it all is no part
-of it. A file named `.parquet` holds the same columns.
+of it. A file named `.parquet` holds the same columns; one named `.gz` is such a CSV, compressed.
 """
 
 import csv
+import gzip
 import os
+import zlib
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,8 @@ BEHIND_POSITIONER = ("time_s", "reference_m", "position_m")
 CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
 
+LONGEST_LINE, MOST_CHARACTERS = 1_000_000, 10_000_000_000
+"""Of a compressed recording."""
 LONGEST_NAMED = 300
 """Characters of the names there are that a message shows."""
 
@@ -189,11 +193,16 @@ def _read(
             columns, metadata = _read_parquet(path)
             first_line = 0
             _require(path, required, list(columns), "the file has", or_required)
+        elif path.suffix == ".gz":
+            with gzip.open(path, "rt", newline="", encoding="utf-8-sig") as packed:
+                columns, metadata, first_line = _table(path, _moderate(path, packed), required, or_required)
         else:
             with path.open(newline="", encoding="utf-8-sig") as file:
                 columns, metadata, first_line = _table(path, file, required, or_required)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
+    except (EOFError, zlib.error) as error:
+        raise InputError(str(path), f"is not whole: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         hint = f"; `positioner import {path}` says how to read another program's export"
         raise InputError(str(path), f"is not a CSV file of ours: {error}{hint}") from None
@@ -201,6 +210,21 @@ def _read(
         raise InputError(str(path), "holds no samples")
     _require_increasing_time(path, columns["time_s"], first_line, clock_steps)
     return columns, metadata
+
+
+def _moderate(path: Path, packed: TextIO) -> Iterator[str]:
+    """Yield the lines of a compressed file, whose size on the disk says little of what comes out of it.
+
+    Raises:
+        InputError: a line that no recording has, or more than any is.
+    """
+    characters = 0
+    while line := packed.readline(LONGEST_LINE):
+        characters += len(line)
+        if len(line) == LONGEST_LINE or characters > MOST_CHARACTERS:
+            allowed = f"{LONGEST_LINE} characters a line and {MOST_CHARACTERS} in all"
+            raise InputError(str(path), f"holds more than a recording does; allowed are {allowed}")
+        yield line
 
 
 def _require(path: Path, required: tuple[str, ...], names: list[str], where: str, or_required: tuple[str, ...]) -> None:

@@ -2,15 +2,20 @@
 
 The cycle offers rows to a bounded queue and goes on. A thread writes them in whole lines, four times a second in one
 system call, and every second makes sure that they are on the disk: a crash costs that second at the most. A full
-file is followed by a new one, the oldest beyond a number is deleted; which is older, the number at the end of the
-name says, for a clock may be set back. Where no new file can be begun, recording goes on in the old one. A row that
+or an old file is followed by a new one, the oldest beyond a number is deleted; which is older, the number at the end of
+the name says, for a clock may be set back. Where no new file can be begun, recording goes on in the old one. A row that
 finds the queue full is counted, and the column `unrecorded` of the next row says how many are missing before it.
+
+The newest two files are CSV, for those who read the last minutes; those before are compressed by a process of its own
+(`recording_compression`), one after another. At every moment each is there, as the one or the other.
 """
 
 import errno
 import logging
+import math
 import os
 import re
+import time
 from collections import deque
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -19,6 +24,7 @@ from threading import Event, Thread
 
 from config.errors import InputError
 from positioner.daemon.logs import log_event
+from positioner.daemon.recording_compression import Compression, half_done
 
 log = logging.getLogger(__name__)
 
@@ -36,25 +42,47 @@ Row = tuple[float, float, float, float, float, int, int]
 """A row as offered: the columns without the last."""
 
 MOST_WAITING = 20_000
+RETRY_S = 60.0
+"""After a new file could not be begun for the age of the old one."""
 WRITE_EVERY_S = 0.25
 SYNC_EVERY_WRITES = 4
 
 
 class Recorder:
-    """Records rows into a folder from `start` to `stop`."""
+    """Records rows into a folder from `start` to `stop`.
 
-    def __init__(self, folder: Path, name: str, file_bytes: int, keep_files: int) -> None:
+    Args:
+        folder: where.
+        name: of the valve.
+        file_bytes: a file of so many is followed by a new one.
+        keep_files: the oldest beyond so many are deleted.
+        file_s: a file so old is followed by a new one; 0 is never.
+        compress: those before the newest two.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        file_bytes: int,
+        keep_files: int,
+        file_s: float = 0.0,
+        compress: bool = False,
+    ) -> None:
         self.unrecorded = 0
         self._folder = folder
         self._stem = _stem(name)
         self._file_bytes = file_bytes
         self._keep_files = keep_files
+        self._file_s = file_s or math.inf
+        self._compression = Compression() if compress else None
         self._waiting: deque[tuple[Row, int]] = deque()
         self._stopping = Event()
         self._thread = Thread(target=self._work, name="recorder", daemon=True)
         self._valve = " ".join(name.split())
         self._file = -1
         self._room = 0
+        self._begun_s = 0.0
 
     def start(self) -> None:
         """Make the folder and begin to record.
@@ -85,6 +113,8 @@ class Recorder:
         """Write what waits and close the file."""
         self._stopping.set()
         self._thread.join()
+        if self._compression is not None:
+            self._compression.stop()
 
     def _work(self) -> None:
         writes, failed = 0, False
@@ -104,7 +134,8 @@ class Recorder:
         os.close(self._file)
 
     def _write_waiting(self) -> None:
-        if self._room <= 0 and self._waiting:
+        is_old = time.monotonic() - self._begun_s >= self._file_s
+        if (self._room <= 0 or is_old) and self._waiting:
             self._rotate()
         batch = [self._waiting.popleft() for _ in range(len(self._waiting))]
         data = "".join(_line(*each) for each in batch).encode()
@@ -129,6 +160,7 @@ class Recorder:
             self._open_next()
         except OSError as error:
             self._room = max(self._file_bytes // 10, 1)
+            self._begun_s = time.monotonic() - self._file_s + RETRY_S
             log_event(log, logging.ERROR, "no new recording", folder=str(self._folder), reason=error.strerror)
             return
         os.fsync(before)
@@ -150,13 +182,18 @@ class Recorder:
             os.close(file)
             path.unlink(missing_ok=True)
             raise
-        self._file, self._room = file, self._file_bytes - written
+        self._file, self._room, self._begun_s = file, self._file_bytes - written, time.monotonic()
         log_event(log, logging.INFO, "recording", file=str(path))
         for old in others[: max(len(others) + 1 - self._keep_files, 0)]:
             try:
+                half_done(old).unlink(missing_ok=True)
                 old.unlink(missing_ok=True)
             except OSError as error:
                 log_event(log, logging.WARNING, "old recording stays", file=str(old), reason=error.strerror)
+        if self._compression is not None:
+            for path in _compressed_already(self._folder, self._stem):
+                path.unlink(missing_ok=True)
+            self._compression.begin([each for each in _files(self._folder, self._stem)[:-2] if each.suffix == ".csv"])
 
 
 def files_of(folder: Path, name: str) -> list[Path]:
@@ -165,16 +202,25 @@ def files_of(folder: Path, name: str) -> list[Path]:
 
 
 def _files(folder: Path, stem: str) -> list[Path]:
+    found = _all_files(folder, stem) - _compressed_already(folder, stem)
+    return sorted(found, key=lambda each: (_number(each), each))
+
+
+def _all_files(folder: Path, stem: str) -> set[Path]:
     # By its whole name: a valve FV-1 must not take what belongs to a valve FV-1-A.
-    mine = re.compile(re.escape(stem) + r"-\d{8}T\d{6}Z-\d+\.csv")
-    return sorted(
-        (each for each in folder.iterdir() if mine.fullmatch(each.name)), key=lambda each: (_number(each), each)
-    )
+    mine = re.compile(re.escape(stem) + r"-\d{8}T\d{6}Z-\d+\.csv(\.gz)?")
+    return {each for each in folder.iterdir() if mine.fullmatch(each.name)}
+
+
+def _compressed_already(folder: Path, stem: str) -> set[Path]:
+    """Return the plain files whose compressed twin is whole: for a moment, or after a crash, both are there."""
+    found = _all_files(folder, stem)
+    return {each for each in found if each.with_name(f"{each.name}.gz") in found}
 
 
 def _number(file: Path) -> int:
     """Return the running number of a recording."""
-    return int(file.stem.rpartition("-")[2])
+    return int(file.name.partition(".csv")[0].rpartition("-")[2])
 
 
 def _stem(name: str) -> str:

@@ -344,4 +344,5 @@ def _recorder(file: DaemonFile, source: Path) -> Recorder | None:
     if file.recorder is None:
         return None
     folder = source.parent / file.recorder.folder
-    return Recorder(folder, file.valve.name, file.recorder.file_bytes, file.recorder.keep_files)
+    table = file.recorder
+    return Recorder(folder, file.valve.name, table.file_bytes, table.keep_files, table.file_s, table.compress)

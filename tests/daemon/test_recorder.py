@@ -1,18 +1,29 @@
 """The recorder: every row, whole lines, bounded in files and in memory."""
 
 import errno
+import gzip
 import os
+import random
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from config import recording
 from config.errors import InputError
 from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
 from positioner.daemon import recorder as room
+from positioner.daemon import recording_compression
 from positioner.daemon.recorder import Recorder, Row
+from positioner.daemon.recording_compression import compress
+from tests.history.test_history_file import full_above
 from workbench.report import Subject
 
 
@@ -145,3 +156,152 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="recordings cannot be written there: Not a directory"):
         Recorder(tmp_path / "file" / "folder", "v", 100_000, 3).start()
+
+
+# ---- a new file by age, and compressed ones
+
+
+class Hours:
+    """The module time, with hours that pass when the test says."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
+def test_an_old_file_is_followed_by_a_new_one_and_no_row_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hours = Hours()
+    monkeypatch.setattr(room, "time", hours)
+    monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
+    recorder = Recorder(tmp_path, "v", 10_000_000, 10, file_s=3600.0)
+    recorder.start()
+    for hour in range(4):
+        hours.now_s = hour * 3601.0
+        fill(recorder, hour * 50, 50)
+    recorder.stop()
+    files = room.files_of(tmp_path, "v")
+    assert [len(read_recording(path)) for path in files] == [50] * 4
+    times_s = [time_s for path in files for time_s in read_recording(path).time_s]
+    assert times_s == [index * 1e-3 for index in range(200)]
+
+
+def compressing(folder: Path, rows: int, keep_files: int = 10) -> None:
+    recorder = Recorder(folder, "v", 4_000, keep_files, compress=True)
+    recorder.start()
+    fill(recorder, 0, rows)
+    compression = recorder._compression
+    assert compression is not None
+    while plain := [path for path in room.files_of(folder, "v")[:-2] if path.suffix == ".csv"]:
+        compression.begin(plain)  # as the next rotation does
+        if compression._process is not None:
+            compression._process.wait(60)
+    recorder.stop()
+
+
+@pytest.mark.real_time
+def test_closed_files_are_compressed_and_open_as_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
+    compressing(tmp_path, 400)
+    files = room.files_of(tmp_path, "v")
+    assert [path.suffix for path in files[-3:]] == [".gz", ".csv", ".csv"]
+    assert len(files) == len(names(tmp_path)) > 4, "nothing is there twice, and nothing half done"
+    recordings = [read_recording(path) for path in files]
+    assert [each.metadata["valve"] for each in recordings] == ["v"] * len(files)
+    times_s = [time_s for each in recordings for time_s in each.time_s]
+    assert times_s == [index * 1e-3 for index in range(400)], "no row is lost, bit by bit"
+
+
+@pytest.mark.real_time
+def test_compressed_files_count_among_those_that_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
+    compressing(tmp_path, 400)
+    before = len(room.files_of(tmp_path, "v"))
+    compressing(tmp_path, 400, keep_files=3)
+    assert before > 3
+    assert len(room.files_of(tmp_path, "v")) == len(names(tmp_path)) == 3
+
+
+def closed(folder: Path) -> Path:
+    recorded(folder, 500)
+    (path,) = folder.iterdir()
+    return path
+
+
+@pytest.mark.parametrize("failing", ["write", "read back", "rename"])
+def test_a_compression_that_fails_leaves_the_plain_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    path = closed(tmp_path)
+    content = path.read_bytes()
+    with monkeypatch.context() as broken:
+        if failing == "read back":
+            broken.setattr(recording_compression, "_same", lambda *_: False)
+        if failing == "rename":
+            broken.setattr(Path, "replace", fail_with(errno.EIO))
+        with (
+            full_above(1000) if failing == "write" else nullcontext(),
+            pytest.raises(OSError, match=r"read back|large|error"),
+        ):
+            compress(path)
+    assert names(tmp_path) == [path.name]
+    assert path.read_bytes() == content
+    compress(path)
+    assert gzip.decompress((tmp_path / f"{path.name}.gz").read_bytes()) == content
+
+
+def fail_with(number: int) -> Callable[..., object]:
+    def fail(*_: object) -> object:
+        raise OSError(number, os.strerror(number))
+
+    return fail
+
+
+@pytest.mark.real_time
+def test_a_compression_killed_at_any_moment_leaves_the_one_or_the_other_whole(tmp_path: Path) -> None:
+    path = closed(tmp_path)
+    rows = len(read_recording(path))
+    content = path.read_bytes()
+    dice = random.Random(5)
+    for _ in range(8):
+        words = [sys.executable, "-P", "-m", "positioner.daemon.recording_compression", str(path)]
+        path.write_bytes(content)
+        with subprocess.Popen(words) as child:
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(dice.uniform(0.02, 0.35))
+            child.kill()
+        found = room.files_of(tmp_path, "FV 101/a")
+        assert [len(read_recording(each)) for each in found] == [rows]
+        for each in tmp_path.glob("*.gz"):
+            each.unlink()
+
+
+def test_a_plain_file_beside_its_whole_twin_is_deleted_at_the_next_start(tmp_path: Path) -> None:
+    """As a crash between the renaming and the deletion leaves it."""
+    path = closed(tmp_path)
+    content = path.read_bytes()
+    compress(path)
+    path.write_bytes(content)
+    assert [each.suffix for each in room.files_of(tmp_path, "FV 101/a")] == [".gz"]
+    recorder = Recorder(tmp_path, "FV 101/a", 10_000_000, 5, compress=True)
+    recorder.start()
+    recorder.stop()
+    assert [name.partition(".")[2] for name in names(tmp_path)] == ["csv.gz", "csv"]
+
+
+def test_a_torn_or_endless_compressed_file_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = closed(tmp_path)
+    compress(path)
+    packed = tmp_path / f"{path.name}.gz"
+    torn = tmp_path / "torn.csv.gz"
+    torn.write_bytes(packed.read_bytes()[:-20])
+    with pytest.raises(InputError, match="is not whole"):
+        read_recording(torn)
+    with pytest.raises(InputError, match="cannot be read: Not a gzipped file"):
+        read_recording(Path(shutil.copy(__file__, tmp_path / "none.csv.gz")))
+    monkeypatch.setattr(recording, "MOST_CHARACTERS", 1000)
+    with pytest.raises(InputError, match="holds more than a recording does"):
+        read_recording(packed)
