@@ -5,6 +5,7 @@ Its files:
     karnopp, first_order_lag             the equations, and how a step is taken
     quasi_static                         the same without inertia, for samples farther apart than a slide lasts
     effect, effects                      how an effect is written; those that come along
+    own_effect                           the example of one of a person's own, and whether a search may try it
     kernel, kernel_source                the equations with effects in their places, compiled; the text of that
     interpreted                          the same uncompiled, for what asks a single place
     static_inverse                       what a controller must know of a valve file, worked out of its equations

@@ -55,6 +55,7 @@ from itertools import product, zip_longest
 from math import inf
 from pathlib import Path
 from textwrap import dedent
+from traceback import extract_tb
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -372,7 +373,9 @@ def execute(source: str, path: Path, namespace: dict[str, Any]) -> None:
     except SyntaxError as error:
         raise InputError(str(path), f"line {error.lineno}: {error.msg}") from None
     except Exception as error:
-        raise InputError(str(path), f"{type(error).__name__}: {error}") from None
+        lines = [each.lineno for each in extract_tb(error.__traceback__) if each.filename == str(path)]
+        where = f"line {lines[-1]}: " if lines else ""
+        raise InputError(str(path), f"{where}{type(error).__name__}: {error}") from None
 
 
 def _equation(said: str) -> str:

@@ -35,6 +35,14 @@ class Listening:
     port: int | None = None
     password: str = ""
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it is reached from this machine alone."""
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return self.host == "localhost"
+
 
 def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *, opens_browser: bool) -> None:
     """Serve a page until the process is told to end; the first line printed is its address.
@@ -48,7 +56,7 @@ def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *,
     Raises:
         InputError: the address cannot be had, or needs a password and has none.
     """
-    if not where.password and not _is_own(where.host):
+    if not where.password and not where.is_own:
         raise InputError(where.host, "can be reached by others: to listen there needs a password, --password-file FILE")
     bound = _bound(where)
     port = bound.getsockname()[1]
@@ -66,14 +74,6 @@ def serve(title: str, build: Callable[[], Awaitable[None]], where: Listening, *,
         app.on_startup(lambda: webbrowser.open(address))
     config = uvicorn.Config(gate, log_level="warning", lifespan="on", timeout_graceful_shutdown=1)
     uvicorn.Server(config).run([bound])
-
-
-def _is_own(host: str) -> bool:
-    """Whether an address is reached from this machine alone."""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def _bound(where: Listening) -> socket.socket:

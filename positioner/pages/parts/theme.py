@@ -29,6 +29,7 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .said li { margin: 2px 0; }
 .jump { all: unset; vertical-align: top; cursor: pointer; text-align: left; }
 .jump { text-decoration: underline dotted; text-underline-offset: 3px; }
+.blamed { background: rgba(217, 98, 43, 0.25); }
 .jump:hover { text-decoration-style: solid; color: var(--q-primary); }
 .jump:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
 h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; }

@@ -12,5 +12,6 @@ Its files; those up to `search` know no browser:
     columns_panel, export_figure    which column of an export is which; what it would look like, read so
     compare_panel, findings_panel   measured and simulated; what `compare` says, and where it shows
     sliders                         the parameters
+    effect_panel                    an effect of one's own
     search_panel, journal_panel     which effect is missing; what was added, and what is taken home
 """

@@ -5,14 +5,17 @@ A process and not a thread: a search on all processors leaves the page its own, 
 
 import multiprocessing
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Protocol
 
 from config.errors import CommandFailed, InputError
 from config.recording import Recording
 from config.valve_file import ValveFile
+from sim.effect import written_here
+from sim.own_effect import checked
 from workbench.fit.fitting import Fit, fit
 from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.extension import Extension, extend
@@ -75,9 +78,10 @@ class Task(Protocol):
 class Work:
     """A task under way in a process of its own; its arguments and its result must pass between processes."""
 
-    def __init__(self, task: Task, *arguments: Any) -> None:
+    def __init__(self, task: Task, *arguments: Any, own_effects: Path | None = None) -> None:
+        """Begin; `own_effects`: the folder whose effects may be run, written by this page."""
         self._heard, said = FRESH.Pipe(duplex=False)
-        self._process = FRESH.Process(target=_work, args=(said, task, arguments), daemon=True)
+        self._process = FRESH.Process(target=_work, args=(said, own_effects, task, arguments), daemon=True)
         self._process.start()
         said.close()
         self.is_over = False
@@ -110,9 +114,10 @@ class Work:
         self._heard.close()
 
 
-def _work(said: Connection, task: Task, arguments: Sequence[Any]) -> None:
+def _work(said: Connection, own_effects: Path | None, task: Task, arguments: Sequence[Any]) -> None:
     try:
-        end: News = Finished(task(said.send, *arguments))
+        with written_here(own_effects) if own_effects else nullcontext():
+            end: News = Finished(task(said.send, *arguments))
     except (InputError, CommandFailed) as error:
         end = Failed(str(error))
     except Exception as error:  # whatever it is, the page must say that there is no result
@@ -169,3 +174,18 @@ def refitted(tell: Tell, recording: Recording, valve: ValveFile) -> Fit:
         InputError: as `fit`.
     """
     return fit(recording, valve, progress=lambda done: tell(Progressed("fitting the valve as it is", done)))
+
+
+def effect_checked(tell: Tell, valve: ValveFile, path: Path) -> None:
+    """See whether an effect of a person's own may be tried.
+
+    Args:
+        tell: is told what is being done.
+        valve: to which it is added.
+        path: of its file.
+
+    Raises:
+        InputError: as `checked`.
+    """
+    tell(Progressed("compiling", 0.0))
+    checked(path, valve.valve)

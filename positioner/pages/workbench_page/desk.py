@@ -3,10 +3,13 @@
 A desk knows no browser. It stays while its tab is there, so a page that is loaded again finds it as it was.
 """
 
+import os
+import re
 import shlex
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,10 +19,11 @@ from config.recording import Column, Recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from config.writing import valve_toml, write_valve
 from positioner.pages.parts.units import Units
-from positioner.pages.workbench_page.background import Task, Work
+from positioner.pages.workbench_page.background import Task, Work, effect_checked
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
 from positioner.pages.workbench_page.search import Search
+from sim.effect import tried_effects, written_here
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
@@ -30,6 +34,9 @@ from workbench.select.extension_journal import Journal, write_extended
 
 BLIND = "blind"
 """The folder of a blind case on a command line."""
+
+EFFECTS, EFFECT_NAME = "effects", "[a-z][a-z0-9_]{0,39}"
+"""The folder of effects of one's own; what one may be called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +83,14 @@ class Desk:
     """The folder of a blind case,"""
     seed: int = 0
     """and what it was drawn from."""
+    may_write_effects: bool = False
+    """Whether only this machine's user comes here: an effect is a program."""
+    effects: dict[str, Path] = field(default_factory=dict)
+    """Effects of one's own that compile, by name."""
+    checking: Work | None = None
+    """One that is being checked."""
+    _running: ExitStack = field(default_factory=ExitStack)
+    """What lets them be run, as long as this desk is there."""
     units: Units = field(default_factory=lambda: Units(position="mm"))
     """That a person reads it in."""
     _written: int = 0
@@ -119,6 +134,56 @@ class Desk:
         self.compared = self._model().comparison()
         return self.compared
 
+    def effect_path(self, name: str) -> Path:
+        """Return where an effect of one's own lies.
+
+        Raises:
+            InputError: no name of an effect.
+        """
+        if not re.fullmatch(EFFECT_NAME, name):
+            raise InputError("its name", f"must be small letters, digits and _, got {name!r}")
+        return self.folder / EFFECTS / f"{name}.py"
+
+    def write_effect(self, name: str, text: str) -> Path:
+        """Write an effect of one's own; it is not run before it is checked, and not tried before it is kept.
+
+        Raises:
+            InputError: no name of an effect, or nobody may write one here.
+        """
+        if not self.may_write_effects:
+            raise InputError(name, "is a program: it is written only where the page listens to this machine alone")
+        path = self.effect_path(name)
+        path.parent.mkdir(mode=0o700, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        self.effects.pop(name, None)
+        return path
+
+    def check_effect(self, path: Path) -> None:
+        """Begin to see whether an effect may be tried.
+
+        Raises:
+            InputError: there is no valve.
+        """
+        valve = self._model().valve
+        self.stop_checking()
+        self.checking = Work(effect_checked, valve, path, own_effects=path.parent)
+
+    def stop_checking(self) -> None:
+        """Stop to check, if one is checked."""
+        if self.checking is not None:
+            self.checking.cancel()
+        self.checking = None
+
+    def plain(self, said: str) -> str:
+        """Return what is said with effects of one's own as they are named where they are taken home."""
+        return said.replace(f"{self.folder / EFFECTS}{os.sep}", "./")
+
+    def keep_effect(self, name: str) -> None:
+        """Have an effect that was checked tried with the others."""
+        if not self.effects:
+            self._running.enter_context(written_here(self.folder / EFFECTS))
+        self.effects[name] = self.effect_path(name)
+
     def begin(self, what: str, task: Task, *arguments: Any) -> Search:
         """Begin a search on the recording with the valve as it is set; one that is under way is stopped.
 
@@ -128,11 +193,13 @@ class Desk:
         valve = self._model().valve
         self.stop()
         assert self.opened is not None
-        self.search = Search(what, valve, Work(task, self.opened.recording, valve, *arguments))
+        own = self.folder / EFFECTS
+        self.search = Search(what, valve, Work(task, self.opened.recording, valve, *arguments, own_effects=own))
         return self.search
 
     def stop(self) -> None:
-        """Stop the search, if one is under way."""
+        """Stop what is under way."""
+        self.stop_checking()
         if self.search is not None:
             self.search.cancel()
 
@@ -181,7 +248,7 @@ class Desk:
         """
         file = self._model().valve
         remarks = Journal.beside(self.valve.path).remarks if self.valve else ()
-        return "".join(f"# {each}\n" for each in remarks) + valve_toml(file)
+        return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(file))
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -192,18 +259,20 @@ class Desk:
         recording, words = self.opened.name, self.opened.words
         lines: list[tuple[str, ...]] = [("hide", "--seed", str(self.seed), "-o", BLIND)] if self.sealed else []
         lines.append(("compare", recording, "--valve", first.name, *words))
-        lines.append(("diagnose", recording, "--valve", first.name, *words))
+        own = ("--effects", *map(str, self.effects.values()), *tried_effects()) if self.effects else ()
+        lines.append(("diagnose", recording, "--valve", first.name, *words, *own))
         given = first.name
         for i, step in enumerate(self.journal, start=1):
             out = f"better-{i}.toml"
             effects = step.extension.effects
             lines.append(("extend", given, "--effect", *effects, "--fit", recording, *words, "-o", out))
             given = out
-        return tuple(shlex.join(("positioner", *line)) for line in lines)
+        return tuple(self.plain(shlex.join(("positioner", *line))) for line in lines)
 
     def clear(self) -> None:
         """Stop what is under way, and remove what was written for it."""
         self.stop()
+        self._running.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _model(self) -> LiveModel:

@@ -28,7 +28,7 @@ class JournalPanel:
             FigureView(theme, self._drawn, FALL_PX, "how the error fell")
             for number, step in enumerate(desk.journal, start=1):
                 added = ", ".join(step.extension.effects)
-                ui.label(f"{number}. {added}: {step.extension.summary().splitlines()[0]}").props(
+                ui.label(desk.plain(f"{number}. {added}: {step.extension.summary().splitlines()[0]}")).props(
                     'data-testid="journal-step"'
                 )
             back = ui.button("Take the last step back", icon="undo", on_click=self._back)
@@ -49,7 +49,7 @@ class JournalPanel:
         for number, step in enumerate(self._desk.journal, start=1):
             for name, (train_m, test_m) in step.extension.stages.items():
                 if number == 1 or name.startswith("with"):
-                    stages.append((name, train_m, test_m))
+                    stages.append((self._desk.plain(name), train_m, test_m))
         return error_reduction(stages, self._desk.journal[-1].extension.split.floor_m, LENGTH)
 
     async def _back(self) -> None:
@@ -61,6 +61,9 @@ class JournalPanel:
         with errors_told():
             assert self._desk.valve is not None
             ui.download.content(self._desk.toml, self._desk.valve.path.name)
+            for name, path in self._desk.effects.items():
+                if f"./{name}.py" in self._desk.toml:
+                    ui.download.content(path.read_bytes(), path.name)
 
     async def _report(self) -> None:
         with errors_told():

@@ -27,9 +27,11 @@ class Workbench:
     Args:
         files: recordings that are offered; of a single one the page begins with it.
         valve: the valve that the page begins with.
+        only_here: whether this machine alone reaches it.
     """
 
-    def __init__(self, files: Sequence[Path], valve: str | None) -> None:
+    def __init__(self, files: Sequence[Path], valve: str | None, *, only_here: bool) -> None:
+        self._only_here = only_here
         self._files = files
         self._valve = valve
         self._desks: dict[str, Desk] = {}
@@ -41,7 +43,7 @@ class Workbench:
             InputError: that cannot be simulated.
         """
         if tab not in self._desks:
-            desk = self._desks[tab] = Desk()
+            desk = self._desks[tab] = Desk(may_write_effects=self._only_here)
             if self._valve is not None:
                 desk.take_valve(named_valve(self._valve))
             if len(self._files) == 1:
@@ -128,7 +130,7 @@ def serve_workbench(recordings: Sequence[Path], valve: str | None, where: Listen
     Raises:
         InputError: a file is not there or is wrong, or the address cannot be had.
     """
-    workbench = Workbench(files_of(recordings), valve)
+    workbench = Workbench(files_of(recordings), valve, only_here=where.is_own)
     if valve is not None:
         named_valve(valve)
     app.on_shutdown(workbench.clear)

@@ -9,6 +9,7 @@ from positioner.pages.parts.telling import aside, errors_told, heading, tell_err
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.background import diagnosed, extended, refitted
 from positioner.pages.workbench_page.desk import Desk
+from positioner.pages.workbench_page.effect_panel import effect_section
 from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
 from workbench.fit.fitting import Fit
@@ -38,8 +39,9 @@ class SearchPanel:
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
-            names = ui.select(tried_effects(), label="effects tried (all)", multiple=True, clearable=True)
+            names = ui.select(self._tried(), label="effects tried (all)", multiple=True, clearable=True)
             self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
+        effect_section(desk, theme, self._joined)
         with ui.column().classes("w-full") as self._progress:
             self._doing = ui.label().props('data-testid="doing" aria-live="polite"')
             self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
@@ -54,9 +56,17 @@ class SearchPanel:
         if desk.found is not None:
             self._tell(desk.found)
 
+    def _joined(self) -> None:
+        self._names.set_options(self._tried(), value=self._names.value)
+
+    def _tried(self) -> dict[str, str]:
+        """Return what may be tried, and what it is called: one's own effects are named by their paths."""
+        own = {str(path): name for name, path in self._desk.effects.items()}
+        return own | {name: name for name in tried_effects()}
+
     def _diagnose(self) -> None:
         with errors_told():
-            self._desk.begin("diagnose", diagnosed, self._names.value or None)
+            self._desk.begin("diagnose", diagnosed, self._names.value or list(self._tried()))
         self._began()
 
     def _refit(self) -> None:
@@ -113,9 +123,9 @@ class SearchPanel:
         if search is not None:
             self._bar.set_value(search.done)
             self._bar.set_visibility(running)
-            said = f"{search.doing or 'starting'}: {search.done:.0%}" if running else search.failed
+            said = f"{self._desk.plain(search.doing) or 'starting'}: {search.done:.0%}" if running else search.failed
             self._doing.set_text(said)
-            self._preview.set_text(search.previewed)
+            self._preview.set_text(self._desk.plain(search.previewed))
 
     def _show_race(self) -> None:
         """Draw the bars; a step with other candidates is another figure."""
@@ -138,7 +148,8 @@ class SearchPanel:
         race = {} if search is None else dict(sorted(search.race.items(), key=lambda each: -each[1]))
         errors_mm = [1e3 * each for each in race.values()]
         bars = {
-            "type": "bar", "orientation": "h", "x": errors_mm, "y": list(race), "marker": {"color": EXTENDED},
+            "type": "bar", "orientation": "h", "x": errors_mm, "y": [self._desk.plain(each) for each in race],
+            "marker": {"color": EXTENDED},
             "hovertemplate": "%{y}: %{x:.4~g} mm<extra></extra>",
         }  # fmt: skip
         floor_m = compared.floor_m if compared else None
@@ -161,10 +172,11 @@ class SearchPanel:
         may_add = not self._desk.journal
         kind, first = headline(diagnosis.verdict, diagnosis.missing)
         with self._result:
-            ui.label(first).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
-            ui.label(diagnosis.sentence).props('data-testid="found-sentence"')
+            plain = self._desk.plain
+            ui.label(plain(first)).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
+            ui.label(plain(diagnosis.sentence)).props('data-testid="found-sentence"')
             if diagnosis.verdict == "missing" and may_add:
-                named = ", ".join(diagnosis.missing)
+                named = plain(", ".join(diagnosis.missing))
                 ui.button(f"Add {named}", icon="add", on_click=lambda: self._add_found(search)).props(
                     'no-caps data-testid="add"'
                 )
@@ -181,7 +193,8 @@ class SearchPanel:
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         rows = [
             {
-                "effect": each.name,
+                "name": each.name,
+                "effect": self._desk.plain(each.name),
                 "fitted": length(each.model.errors.train_rmse_m).text if each.model else "–",
                 "test": length(each.model.errors.test_rmse_m).text if each.model else "–",
                 "bic": f"{each.gain.bic:.1f}" if each.gain else "–",
@@ -192,7 +205,7 @@ class SearchPanel:
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full")
         if may_add:
-            table.on("row-click", lambda event: self._extend([event.args[1]["effect"]]))
+            table.on("row-click", lambda event: self._extend([event.args[1]["name"]]))
             ui.label("click an effect to add it all the same").classes("quiet")
 
     async def _add_found(self, search: Search) -> None:
