@@ -9,6 +9,7 @@ import pytest
 from config.errors import InputError
 from config.valve_file import valve
 from positioner.pages.workbench_page.background import Finished, News, Progressed, Work
+from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import Desk, NamedValve
 from positioner.pages.workbench_page.opening import Opened
 from sim.effect import FOLDERS_ALLOWED, find_effect
@@ -78,7 +79,7 @@ def test_a_checked_effect_is_run_by_the_desk_that_wrote_it_and_by_nobody_else(
     assert end_of(desk.checking) == Finished(None)
     desk.keep_effect("tight_spot")
     assert find_effect(str(path), "effects").name == "tight_spot"
-    assert re.search(r"diagnose fit\.csv .*--effects \./tight_spot\.py ", desk.commands[1])
+    assert re.search(r"diagnose fit\.csv .*--effects \./tight_spot\.py ", command_lines(desk)[1])
     desk.clear()
     assert not path.exists()
     path.parent.mkdir(parents=True)

@@ -4,9 +4,11 @@ A process and not a thread: a search on all processors leaves the page its own, 
 """
 
 import multiprocessing
+import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from math import inf
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,6 +18,7 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.effect import written_here
 from sim.own_effect import checked
+from workbench.fit.breaking_off import BrokenOff
 from workbench.fit.fitting import Fit, fit
 from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.extension import Extension, extend
@@ -125,44 +128,63 @@ def _work(said: Connection, own_effects: Path | None, task: Task, arguments: Seq
     said.send(end)
 
 
-def diagnosed(tell: Tell, recording: Recording, valve: ValveFile, effects: Sequence[str] | None) -> Diagnosis:
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a search is held to: a recording held out, else the last third of the one; and a time, s."""
+
+    test: Recording | None = None
+    budget_s: float = inf
+
+
+def diagnosed(
+    tell: Tell, recording: Recording, valve: ValveFile, limits: Limits, effects: Sequence[str] | None
+) -> Diagnosis:
     """Diagnose.
 
     Args:
         tell: is told preview, race and progress.
         recording: of the valve.
         valve: where the search begins.
+        limits: after whose time it says what is known then.
         effects: that are tried; None: all that come with the package.
 
     Raises:
         InputError: as `diagnose`.
+        CommandFailed: the time was over before anything was known.
     """
-    return diagnose(
-        recording,
-        valve,
-        effects=effects,
-        on_preview=lambda scores: tell(Previewed(scores)),
-        progress=lambda what, done: tell(Progressed(what, done)),
-        race=lambda step, name, rms_m: tell(Raced(step, name, rms_m)),
-    )
+    end_s = time.monotonic() + limits.budget_s
+    try:
+        return diagnose(
+            recording,
+            valve,
+            test=limits.test,
+            effects=effects,
+            on_preview=lambda scores: tell(Previewed(scores)),
+            progress=lambda what, done: tell(Progressed(what, done)),
+            race=lambda step, name, rms_m: tell(Raced(step, name, rms_m)),
+            over=lambda: time.monotonic() > end_s,
+        )
+    except BrokenOff:
+        raise CommandFailed("the time was over before the valve as it is was fitted: nothing is known") from None
 
 
-def extended(tell: Tell, recording: Recording, valve: ValveFile, effects: Sequence[str]) -> Extension:
+def extended(tell: Tell, recording: Recording, valve: ValveFile, limits: Limits, effects: Sequence[str]) -> Extension:
     """Add effects and refit.
 
     Args:
         tell: is told the progress.
         recording: of the valve.
         valve: that is extended.
+        limits: of which the held-out recording counts.
         effects: that are added together.
 
     Raises:
         InputError: as `extend`.
     """
-    return extend(recording, valve, effects, progress=lambda what, done: tell(Progressed(what, done)))
+    return extend(recording, valve, effects, test=limits.test, progress=lambda what, done: tell(Progressed(what, done)))
 
 
-def refitted(tell: Tell, recording: Recording, valve: ValveFile) -> Fit:
+def refitted(tell: Tell, recording: Recording, valve: ValveFile, _limits: Limits) -> Fit:
     """Fit a valve as it is, with intervals.
 
     Args:

@@ -7,7 +7,7 @@ from nicegui import events, ui
 from positioner.pages.parts.figure_view import Figure, FigureView
 from positioner.pages.parts.telling import aside, errors_told
 from positioner.pages.parts.theme import Theme
-from positioner.pages.workbench_page.desk import Desk
+from positioner.pages.workbench_page.desk import SAVED, Desk
 from positioner.pages.workbench_page.findings_panel import FindingsPanel
 from positioner.pages.workbench_page.force_figures import Seen, force_figure
 from positioner.pages.workbench_page.live_model import LiveModel
@@ -71,6 +71,9 @@ class ComparePanel:
             with ui.column().classes("side"):
                 self._findings = FindingsPanel(self._go_to, stroke_m, desk.units)
                 self._findings.jumps.move(jumps)
+                ui.button("Keep this curve to compare with", icon="bookmark", on_click=self._keep).props(
+                    'outline no-caps dense data-testid="keep"'
+                )
                 Sliders(self._live, desk.fitted, self._moved, self._settled, desk.units)
         self._tell(desk.compared)
 
@@ -90,6 +93,12 @@ class ComparePanel:
         self._figure.show("model", curve.simulated_m)
         self._figure.show_pressure(curve.pressure_pa)
         return curve.rms_m
+
+    def _keep(self) -> None:
+        with errors_told():
+            self._desk.keep_variant()
+            self._figure.show(SAVED, self._desk.variants[SAVED])
+            self._time.redraw()
 
     def _moved(self) -> None:
         """Draw the new curve; nothing else is worked out while a slider moves."""

@@ -5,12 +5,12 @@ A desk knows no browser. It stays while its tab is there, so a page that is load
 
 import os
 import re
-import shlex
 import shutil
 import tempfile
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,11 @@ from config.recording import Column, Recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from config.writing import valve_toml, write_valve
 from positioner.pages.parts.units import Units
-from positioner.pages.workbench_page.background import Task, Work, effect_checked
+from positioner.pages.workbench_page.background import Limits, Task, Work, effect_checked
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
 from positioner.pages.workbench_page.search import Search
-from sim.effect import tried_effects, written_here
+from sim.effect import written_here
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
@@ -32,9 +32,14 @@ from workbench.fit.fitting import Fit
 from workbench.select.extension import Extension
 from workbench.select.extension_journal import Journal, write_extended
 
+SAVED = "saved"
+"""The line of a variant that a person keeps."""
 BLIND = "blind"
 """The folder of a blind case on a command line."""
 
+UNDONE = ("opened", "held_out", "export", "valve", "live", "compared", "fitted", "journal", "found", "sealed", "seed")
+"""What a step back brings again."""
+MOST_UNDONE = 20
 EFFECTS, EFFECT_NAME = "effects", "[a-z][a-z0-9_]{0,39}"
 """The folder of effects of one's own; what one may be called."""
 
@@ -64,6 +69,10 @@ class Desk:
     pages: int = 0
     """How many pages show it: a page that is loaded anew is there before the old one is gone."""
     opened: Opened | None = None
+    held_out: Opened | None = None
+    """Another recording of the same valve, that no fit sees."""
+    budget_s: float = inf
+    """After which a diagnosis says what is known then."""
     export: Export | None = None
     """A file whose columns are not confirmed yet."""
     valve: NamedValve | None = None
@@ -93,6 +102,8 @@ class Desk:
     """What lets them be run, as long as this desk is there."""
     units: Units = field(default_factory=lambda: Units(position="mm"))
     """That a person reads it in."""
+    _before: list[dict[str, Any]] = field(default_factory=list)
+    """What lay here before each of the last steps."""
     _written: int = 0
 
     def take_recording(self, opened: Opened) -> None:
@@ -102,7 +113,25 @@ class Desk:
             InputError: it cannot be simulated, or not with this valve.
         """
         self._held(opened, self.valve)
-        self.export = self.sealed = None
+        self.export = self.sealed = self.held_out = None
+
+    def hold_out(self, opened: Opened | None) -> None:
+        """Take another recording of the same valve, that no fit sees; None: the last third of the one is held out.
+
+        Raises:
+            InputError: it cannot be simulated with the valve.
+        """
+        if opened is not None:
+            LiveModel(opened.recording, self._model().valve)
+        self.held_out = opened
+
+    def keep_variant(self) -> None:
+        """Lay the curve as it is set over what is to come.
+
+        Raises:
+            InputError: there is none.
+        """
+        self.variants[SAVED] = self._model().curve().simulated_m
 
     def take_valve(self, valve: NamedValve) -> None:
         """Put a valve on the desk.
@@ -123,7 +152,7 @@ class Desk:
             seal(folder, hide(seed))
         opened = Opened(f"{BLIND}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"))
         self._held(opened, named_valve(str(folder / "valve.toml"), f"{BLIND}/valve.toml"))
-        self.export, self.sealed, self.seed = None, folder, seed
+        self.export, self.held_out, self.sealed, self.seed = None, None, folder, seed
 
     def compare(self) -> Comparison:
         """Compare the valve as it is set.
@@ -194,7 +223,9 @@ class Desk:
         self.stop()
         assert self.opened is not None
         own = self.folder / EFFECTS
-        self.search = Search(what, valve, Work(task, self.opened.recording, valve, *arguments, own_effects=own))
+        limits = Limits(self.held_out.recording if self.held_out else None, self.budget_s)
+        given = (self.opened.recording, valve, limits, *arguments)
+        self.search = Search(what, valve, len(self.journal), Work(task, *given, own_effects=own))
         return self.search
 
     def stop(self) -> None:
@@ -226,6 +257,23 @@ class Desk:
         self._go_on(NamedValve(path.name, path, extension.valve), extension.extended.parameters)
         self.journal = (*self.journal, JournalStep(before, extension))
 
+    def undo(self) -> bool:
+        """Take back what was done last, a move of a slider or another recording or valve; whether there was anything.
+
+        Raises:
+            InputError: as `compare`.
+        """
+        if self.live is not None and self.live.undo():
+            self.compare()
+            return True
+        if not self._before:
+            return False
+        self.stop()
+        self.search = None
+        for name, value in self._before.pop().items():
+            setattr(self, name, value)
+        return True
+
     def walk_back(self) -> None:
         """Take the last step of the journal back.
 
@@ -250,25 +298,6 @@ class Desk:
         remarks = Journal.beside(self.valve.path).remarks if self.valve else ()
         return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(file))
 
-    @property
-    def commands(self) -> tuple[str, ...]:
-        """What does the same on a command line."""
-        if self.opened is None or self.valve is None:
-            return ()
-        first = self.journal[0].before if self.journal else self.valve
-        recording, words = self.opened.name, self.opened.words
-        lines: list[tuple[str, ...]] = [("hide", "--seed", str(self.seed), "-o", BLIND)] if self.sealed else []
-        lines.append(("compare", recording, "--valve", first.name, *words))
-        own = ("--effects", *map(str, self.effects.values()), *tried_effects()) if self.effects else ()
-        lines.append(("diagnose", recording, "--valve", first.name, *words, *own))
-        given = first.name
-        for i, step in enumerate(self.journal, start=1):
-            out = f"better-{i}.toml"
-            effects = step.extension.effects
-            lines.append(("extend", given, "--effect", *effects, "--fit", recording, *words, "-o", out))
-            given = out
-        return tuple(self.plain(shlex.join(("positioner", *line))) for line in lines)
-
     def clear(self) -> None:
         """Stop what is under way, and remove what was written for it."""
         self.stop()
@@ -285,6 +314,8 @@ class Desk:
         live = LiveModel(opened.recording, valve.file) if opened and valve else None
         compared = live.comparison() if live else None
         self.stop()
+        self._before.append({name: getattr(self, name) for name in UNDONE} | {"variants": dict(self.variants)})
+        del self._before[:-MOST_UNDONE]
         self.opened, self.valve, self.live, self.compared = opened, valve, live, compared
         self.fitted, self.journal, self.search, self.found = {}, (), None, None
         self.variants = {"as opened": live.curve().simulated_m} if live else {}
@@ -292,10 +323,11 @@ class Desk:
     def _go_on(self, valve: NamedValve, fitted: Mapping[str, Fitted]) -> None:
         """Take a valve that was found here: the one before stays laid over it, and the journal stays."""
         kept, before = (self.journal, self.search, self.found), self._model().curve().simulated_m
+        saved = {name: each for name, each in self.variants.items() if name == SAVED}
         self._held(self.opened, valve)
         self.journal, self.search, self.found = kept
         self.fitted = fitted
-        self.variants = {"as opened": before, "fitted": self._model().curve().simulated_m}
+        self.variants = saved | {"as opened": before, "fitted": self._model().curve().simulated_m}
 
     def _path(self, name: str) -> Path:
         self._written += 1

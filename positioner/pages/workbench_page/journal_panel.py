@@ -8,6 +8,7 @@ from nicegui import ui
 from positioner.pages.parts.figure_view import Figure, FigureView
 from positioner.pages.parts.telling import aside, errors_told, heading
 from positioner.pages.parts.theme import Theme
+from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import Desk
 from workbench.blind.sealing import reveal
 from workbench.report import Subject, report_comparison, report_diagnosis
@@ -41,7 +42,7 @@ class JournalPanel:
                 ui.button("Reveal what was hidden", icon="visibility", on_click=self._reveal).props("outline no-caps")
         self._answer = ui.column()
         ui.label("the same on a command line:").classes("quiet")
-        ui.code("\n".join(desk.commands), language="bash").classes("w-full")
+        ui.code("\n".join(command_lines(desk)), language="bash").classes("w-full")
 
     def _drawn(self) -> Figure:
         """Every model on the way, as the report of a journal draws it: fitted, held out, and the floor."""
@@ -78,7 +79,7 @@ class JournalPanel:
         valve = desk.found.valve if desk.found else desk.live.valve
         subject = Subject(valve, (desk.opened.name,), desk.opened.recording.metadata)
         if desk.found is not None:
-            report_diagnosis(desk.found.result, path, subject, desk.commands)
+            report_diagnosis(desk.found.result, path, subject, command_lines(desk))
         else:
             report_comparison(desk.compare(), path, subject)
 

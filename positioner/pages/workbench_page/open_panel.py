@@ -15,7 +15,7 @@ from positioner.pages.parts.telling import aside, errors_told, heading, sentence
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.columns_panel import ColumnsPanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
-from positioner.pages.workbench_page.opening import Export, Opened, opened, wrong_with
+from positioner.pages.workbench_page.opening import Export, Opened, opened, opened_like, wrong_with
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 """Of files that a folder offers."""
@@ -58,6 +58,8 @@ class OpenPanel:
             with errors_told():
                 said = wrong_with(recording, stroke_m)
                 sentences(said or ("nothing in it had to be left out or cut",), "wrong")
+            if desk.live is not None:
+                self._held_out()
             if desk.valve is None:
                 ui.label("now choose a valve").classes("quiet")
 
@@ -79,6 +81,31 @@ class OpenPanel:
         with ui.row().classes("items-center"):
             ui.button("Blind practice", icon="visibility_off", on_click=self._blind).props("outline no-caps")
             ui.label("a recording with a hidden effect, its answer sealed").classes("quiet")
+
+    def _held_out(self) -> None:
+        """Offer to take a second recording for what no fit sees."""
+        held = self._desk.held_out
+        said = f"held out: {held.name}" if held else "held out: the last third of it"
+        with ui.expansion(said, icon="content_cut").classes("w-full").props('data-testid="held-out"'):
+            upload = ui.upload(
+                label="drop another recording of the same valve", on_upload=self._held_dropped, auto_upload=True
+            )
+            upload.classes("w-full").props('flat bordered data-testid="drop-held-out"')
+            if held:
+                ui.button("Hold out the last third again", on_click=lambda: self._hold_out(None)).props(
+                    "outline no-caps"
+                )
+
+    async def _held_dropped(self, event: events.UploadEventArguments) -> None:
+        assert self._desk.opened is not None
+        path = await self._kept(event)
+        event.sender.run_method("reset")
+        with errors_told({str(path): event.file.name, "recording": event.file.name}):
+            await self._hold_out(await aside(opened_like, path, event.file.name, self._desk.opened))
+
+    async def _hold_out(self, held: Opened | None) -> None:
+        await aside(self._desk.hold_out, held)
+        self._changed()
 
     def _valve(self) -> None:
         heading("Valve")

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from config.errors import InputError
 from config.exports.column_mapping import RANGE_PA, ExportOptions, offered_units, read_mapping
 from config.exports.export_preview import ExportPreview, preview
 from config.exports.own_format import own_recording
@@ -15,16 +16,6 @@ from workbench.data.record import ready
 
 OURS = ("time_s", "position_m", "command_pa", "reference_m", "pressure_pa", "load_n")
 """Columns that a file's may be taken for."""
-
-
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """A recording that was read: the name it came by, where it lies, and the words that read it on a command line."""
-
-    name: str
-    path: Path
-    recording: Recording
-    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +37,22 @@ class ColumnChoice:
         if self.time_format:
             words += ["--time-format", self.time_format]
         return (*words, *(["--decimal", self.decimal] if self.decimal else []))
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A recording that was read: the name it came by, and where it lies."""
+
+    name: str
+    path: Path
+    recording: Recording
+    choice: ColumnChoice | None = None
+    """How it was read, of an export."""
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What reads it on a command line, beside its name."""
+        return self.choice.words if self.choice else ()
 
 
 def parted(ours: str, theirs: str) -> tuple[str, str]:
@@ -92,6 +99,20 @@ def _proposed(found: ExportPreview) -> ColumnChoice:
     return ColumnChoice(columns, None, time_format)
 
 
+def opened_like(path: Path, name: str, first: Opened) -> Opened:
+    """Read another recording of the same valve, an export as the first was read.
+
+    Raises:
+        InputError: it is none, or not to be read so.
+    """
+    found = opened(path, name)
+    if isinstance(found, Opened):
+        return found
+    if first.choice is None:
+        raise InputError(name, "is another program's file, and the recording on the desk is not: their columns differ")
+    return mapped(found, first.choice)
+
+
 def mapped(export: Export, by: ColumnChoice) -> Opened:
     """Read an export as a person says.
 
@@ -101,7 +122,7 @@ def mapped(export: Export, by: ColumnChoice) -> Opened:
     chosen = [f"{ours}={theirs}" for ours, theirs in by.columns.items() if theirs]
     options = ExportOptions(by.decimal or None, by.time_format or None)
     recording = read_export(export.path, read_mapping(chosen), by.stroke_m, RANGE_PA, options)
-    return Opened(export.name, export.path, recording, by.words)
+    return Opened(export.name, export.path, recording, by)
 
 
 def wrong_with(recording: Recording, stroke_m: float | None) -> tuple[str, ...]:

@@ -79,6 +79,8 @@ class Workbench:
         shown = TabPage(desk, theme, self._files)
         with choices:
             unit_choice(desk.units, shown.changed)
+            back = ui.button(icon="undo", on_click=shown.undo).tooltip("take back what was done last")
+            back.props('flat round dense color=white aria-label="undo" data-testid="undo-all"')
 
     def _left(self, desk: Desk) -> None:
         """Stop what nobody waits for any more, and forget the desks that were left longest ago."""
@@ -101,6 +103,12 @@ class TabPage:
             self._open = OpenPanel(desk, theme, files, self.changed)
             self._rest = ui.column().classes("w-full")
         self.changed()
+
+    async def undo(self) -> None:
+        """Take back what was done last."""
+        with errors_told():
+            if await aside(self._desk.undo):
+                self.changed()
 
     def changed(self) -> None:
         """Show what goes with the recording and the valve on the desk."""

@@ -16,6 +16,8 @@ class Search:
 
     what: str
     valve: ValveFile
+    journal: int
+    """How many steps the journal had when it began: what it found goes with that valve."""
     work: Work
     doing: str = ""
     done: float = 0.0

@@ -1,8 +1,9 @@
 """Diagnosis in the background: the race of the candidates as it runs, then the verdict, and what may be added."""
 
 from collections.abc import Callable, Sequence
+from math import inf
 
-from nicegui import ui
+from nicegui import events, ui
 
 from positioner.pages.parts.figure_view import Figure, FigureView
 from positioner.pages.parts.telling import aside, errors_told, heading, tell_error
@@ -39,6 +40,9 @@ class SearchPanel:
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
+            ui.number("at most, s", min=1, on_change=self._limited, value=_shown(desk.budget_s)).props(
+                'dense clearable data-testid="budget"'
+            ).style("width: 110px").tooltip("after so long it says what is known then")
             names = ui.select(self._tried(), label="effects tried (all)", multiple=True, clearable=True)
             self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
         effect_section(desk, theme, self._joined)
@@ -55,6 +59,9 @@ class SearchPanel:
         self._show_race()
         if desk.found is not None:
             self._tell(desk.found)
+
+    def _limited(self, event: events.ValueChangeEventArguments[float | None]) -> None:
+        self._desk.budget_s = event.value or inf
 
     def _joined(self) -> None:
         self._names.set_options(self._tried(), value=self._names.value)
@@ -169,7 +176,7 @@ class SearchPanel:
         """Show the verdict and every candidate, each with why it was refused and a button that adds it."""
         diagnosis: Diagnosis = search.result
         self._result.clear()
-        may_add = not self._desk.journal
+        may_add = search.journal == len(self._desk.journal)
         kind, first = headline(diagnosis.verdict, diagnosis.missing)
         with self._result:
             plain = self._desk.plain
@@ -214,3 +221,7 @@ class SearchPanel:
             extension = await aside(extension_of, search.result, search.valve)
             await aside(self._desk.add, extension)
             self._changed()
+
+
+def _shown(budget_s: float) -> float | None:
+    return None if budget_s == inf else budget_s

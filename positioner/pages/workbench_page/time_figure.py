@@ -25,8 +25,8 @@ AROUND_S, AROUND = 2.0, 0.5
 """Before and after what is gone to: so many seconds at the least, and this part of a long stretch."""
 BESIDE = 0.5
 """Of the window, drawn on either side of it: panning finds something there."""
-LINES = ("measured", "as opened", "fitted", "model", "error as opened", "error fitted", "error", "command", "pressure",
-         "model's pressure")  # fmt: skip
+LINES = ("measured", "as opened", "fitted", "saved", "model", "error as opened", "error fitted", "error saved", "error",
+         "command", "pressure", "model's pressure")  # fmt: skip
 BELOW = ("command", "pressure", "model's pressure")
 MARKS = ("missed slip", "spurious slip", "matched slip", "chosen")
 SLIPS = ("missed", "spurious", "matched")
@@ -73,7 +73,7 @@ class TimeFigure:
         return Window(0.0, float(self._along_s[-1]))
 
     def show(self, name: str, position_m: Column | None) -> None:
-        """Draw a model's position, m, (n,) and its error; `name` is as opened, fitted or model."""
+        """Draw a model's position, m, (n,) and its error; `name` is as opened, fitted, saved or model."""
         error = "error" if name == "model" else f"error {name}"
         measured_m = self._lines["measured"]
         self._lines[name] = position_m
@@ -139,7 +139,7 @@ class TimeFigure:
     def _trace(self, name: str, x: list[Any], y: list[Any], ink: Ink) -> Figure:
         y_axis = "y2" if name.startswith("error") else "y3" if name in BELOW else "y"
         steps = {"shape": "hv"} if name == "command" else {}
-        dash = {"dash": "dot"} if "as opened" in name else {}
+        dash = {"dash": "dot"} if "as opened" in name else {"dash": "dash"} if "saved" in name else {}
         unit = self._unit(name).name
         return {
             "type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "yaxis": y_axis,
@@ -176,7 +176,7 @@ def _colour(name: str, ink: Ink) -> str:
         return ink.measured
     if "fitted" in name:
         return ink.better
-    return ink.quiet if "opened" in name or name == "command" else ink.model
+    return ink.quiet if "opened" in name or "saved" in name or name == "command" else ink.model
 
 
 def around(stretch: Stretch) -> Window:
