@@ -1,5 +1,6 @@
 """What lies on a desk: a step back brings it again, and what is shown goes home as words of a command line."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -7,12 +8,16 @@ from pathlib import Path
 import pytest
 
 from config.errors import CommandFailed, InputError
-from config.recording import Recording
+from config.recording import Recording, write_recording
+from config.valve_file import load_valve
+from config.writing import write_valve
 from positioner.pages.workbench_page.background import Limits, News, Raced, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve
+from positioner.pages.workbench_page.notebook import notebook
 from positioner.pages.workbench_page.opening import ColumnChoice, Opened, opened_like
 from workbench.blind.hiding import hide
+from workbench.select.extension import extend
 
 HIDDEN = hide(7, duration_s=5.0)
 FIRST, OTHER = Opened("fit.csv", Path("fit.csv"), HIDDEN.fit), Opened("other.csv", Path("other.csv"), HIDDEN.test)
@@ -90,3 +95,34 @@ def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:
     with pytest.raises(CommandFailed, match="nothing is known"):
         diagnosed(told.append, HIDDEN.fit, HIDDEN.base, Limits(HIDDEN.test, 0.0), ["backlash"])
     assert not any(isinstance(each, Raced) for each in told)
+
+
+def test_the_notebook_run_from_top_to_bottom_comes_to_the_same(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk.valve = replace(VALVE, path=tmp_path / "valve.toml")
+    write_valve(tmp_path / "valve.toml", HIDDEN.base)
+    desk.add(extend(HIDDEN.fit, HIDDEN.base, ["preload"]))
+    written = json.loads(notebook(desk))
+    cells = ["".join(each["source"]) for each in written["cells"] if each["cell_type"] == "code"]
+    write_recording(tmp_path / "fit.csv", HIDDEN.fit)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for cell in cells:
+        if "diagnose" not in cell:  # minutes
+            exec(cell, names)
+    assert desk.valve is not None
+    assert names["valve"] == desk.valve.file
+    assert load_valve(tmp_path / "better.toml") == desk.valve.file
+    assert written["nbformat"] == 4
+    assert "preload" in cells[-2]
+
+
+def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
+    choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:%", "command_pa": "OUT:Pa"}, 0.04, "", ",")
+    assert desk.opened is not None
+    desk.opened = replace(FIRST, choice=choice)
+    text = notebook(desk)
+    assert "from config.historian_export import read_export" in text
+    assert "'position_m=PV:%', 'command_pa=OUT:Pa']), 0.04, (20000.0, 100000.0), Exp" in text
+    assert "ExportOptions(',', None)" in text

@@ -10,6 +10,7 @@ from positioner.pages.parts.telling import aside, errors_told, heading
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import Desk
+from positioner.pages.workbench_page.notebook import notebook
 from workbench.blind.sealing import reveal
 from workbench.report import Subject, report_comparison, report_diagnosis
 from workbench.report.ranking import error_reduction
@@ -38,6 +39,9 @@ class JournalPanel:
         with ui.row():
             ui.button("Valve file", icon="save", on_click=self._save).props('no-caps data-testid="save"')
             ui.button("Report", icon="description", on_click=self._report).props("outline no-caps")
+            ui.button("Notebook", icon="menu_book", on_click=self._notebook).props(
+                'outline no-caps data-testid="notebook"'
+            )
             if desk.sealed is not None:
                 ui.button("Reveal what was hidden", icon="visibility", on_click=self._reveal).props("outline no-caps")
         self._answer = ui.column()
@@ -65,6 +69,10 @@ class JournalPanel:
             for name, path in self._desk.effects.items():
                 if f"./{name}.py" in self._desk.toml:
                     ui.download.content(path.read_bytes(), path.name)
+
+    def _notebook(self) -> None:
+        with errors_told():
+            ui.download.content(notebook(self._desk), "workbench.ipynb", "application/x-ipynb+json")
 
     async def _report(self) -> None:
         with errors_told():

@@ -2,6 +2,7 @@
 
 import secrets
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from pathlib import Path
 
 from nicegui import events, ui
@@ -19,6 +20,8 @@ from positioner.pages.workbench_page.opening import Export, Opened, opened, open
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 """Of files that a folder offers."""
+MOST_BUTTONS = 48
+"""Files that are offered by a button each."""
 MOST_BLIND = 10_000
 OWN_FILE = "a file of mine"
 
@@ -73,14 +76,24 @@ class OpenPanel:
             auto_upload=True,
         )
         upload.classes("w-full").props('flat bordered data-testid="drop"')
-        if files:
-            names = [str(path) for path in files]
-            ui.select(names, label="or one of the folder", on_change=lambda event: self._chosen(event.value)).classes(
-                "w-full"
-            ).props('data-testid="files"')
+        self._offered(files)
         with ui.row().classes("items-center"):
             ui.button("Blind practice", icon="visibility_off", on_click=self._blind).props("outline no-caps")
             ui.label("a recording with a hidden effect, its answer sealed").classes("quiet")
+
+    def _offered(self, files: Sequence[Path]) -> None:
+        """Offer the files of a command line, a line a folder: each is a button, of many folders' a list."""
+        if len(files) > MOST_BUTTONS:
+            names = [str(path) for path in files]
+            listed = ui.select(names, label="or one of the folder", on_change=lambda event: self._chosen(event.value))
+            listed.classes("w-full").props('data-testid="files"')
+            return
+        for folder, group in groupby(files, key=lambda path: path.parent):
+            with ui.row().classes("items-center w-full").style("gap: 4px").props('data-testid="files"'):
+                ui.label(f"{folder.resolve().name}:").classes("quiet")
+                for path in group:
+                    button = ui.button(path.name, on_click=lambda path=path: self._chosen(str(path)))
+                    button.props("outline dense no-caps")
 
     def _held_out(self) -> None:
         """Offer to take a second recording for what no fit sees."""
@@ -205,7 +218,7 @@ class OpenPanel:
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
-    """Return the recordings that a command line named, those of its folders too.
+    """Return the recordings that a command line named, those of its folders and of the folders in these too.
 
     Raises:
         InputError: there is none of that name.
@@ -213,7 +226,8 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            found += sorted(each for each in path.iterdir() if each.suffix.lower() in SUFFIXES)
+            for folder in (path, *sorted(each for each in path.iterdir() if each.is_dir())):
+                found += sorted(each for each in folder.iterdir() if each.suffix.lower() in SUFFIXES)
         elif path.is_file():
             found.append(path)
         else:
