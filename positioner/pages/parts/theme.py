@@ -29,6 +29,8 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .said li { margin: 2px 0; }
 .jump { all: unset; vertical-align: top; cursor: pointer; text-align: left; }
 .jump { text-decoration: underline dotted; text-underline-offset: 3px; }
+.nicegui-row.items-center { align-items: center; }
+.q-notification .q-btn { color: white !important; }
 .blamed { background: rgba(217, 98, 43, 0.25); }
 .jump:hover { text-decoration-style: solid; color: var(--q-primary); }
 .jump:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }

@@ -194,6 +194,8 @@ class OpenPanel:
             return
         with errors_told():
             await self._take_valve(name)
+            return
+        self._show_name(self._desk.valve.name if self._desk.valve else None)
 
     async def _take_valve(self, text: str, name: str = "") -> None:
         await aside(self._desk.take_valve, named_valve(text, name))
@@ -204,8 +206,8 @@ class OpenPanel:
             await aside(self._desk.blind, secrets.randbelow(MOST_BLIND))
             self._changed()
 
-    def _show_name(self, name: str) -> None:
-        if name not in self._names.options:
+    def _show_name(self, name: str | None) -> None:
+        if name is not None and name not in self._names.options:
             self._names.options = [name, *self._names.options]
         self._names.set_value(name)
         self._names.update()
