@@ -194,7 +194,6 @@ class OpenPanel:
             return
         with errors_told():
             await self._take_valve(name)
-            return
         self._show_name(self._desk.valve.name if self._desk.valve else None)
 
     async def _take_valve(self, text: str, name: str = "") -> None:

@@ -74,22 +74,26 @@ class Workbench:
         with errors_told():
             await aside(self.desk, tab)
         desk = self._desks[tab]
-        desk.pages += 1
-        ui.context.client.on_delete(lambda: self._left(desk))
+        self.came(desk)
+        ui.context.client.on_delete(lambda: self.left(desk))
         shown = TabPage(desk, theme, self._files)
         with choices:
             unit_choice(desk.units, shown.changed)
             back = ui.button(icon="undo", on_click=shown.undo).tooltip("take back what was done last")
             back.props('flat round dense color=white aria-label="undo" data-testid="undo-all"')
 
-    def _left(self, desk: Desk) -> None:
+    def came(self, desk: Desk) -> None:
+        """Count a page that shows a desk."""
+        desk.pages += 1
+
+    def left(self, desk: Desk) -> None:
         """Stop what nobody waits for any more, and forget the desks that were left longest ago."""
         desk.pages -= 1
         if desk.pages:
             return
         desk.stop()
         left = [tab for tab, each in self._desks.items() if not each.pages]
-        for tab in left[: len(left) - MOST_LEFT]:
+        for tab in left[:-MOST_LEFT]:
             self._desks.pop(tab).clear()
 
 

@@ -1,0 +1,67 @@
+"""A tab that is closed stops its work and leaves nothing; one that is loaded again finds it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from positioner.pages.workbench_page.background import Progressed, Tell, Work
+from positioner.pages.workbench_page.desk import Desk, NamedValve
+from positioner.pages.workbench_page.opening import Opened
+from positioner.pages.workbench_page.page import MOST_LEFT, Workbench
+from workbench.blind.hiding import hide
+
+pytestmark = pytest.mark.real_time
+HIDDEN = hide(7, duration_s=5.0)
+
+
+def never_ends(tell: Tell, *_: object) -> None:
+    tell(Progressed("begun", 0.0))
+    Event().wait()
+
+
+@pytest.fixture
+def workbench() -> Iterator[Workbench]:
+    workbench = Workbench((), None, only_here=True)
+    yield workbench
+    workbench.clear()
+
+
+def goes_on(work: Work) -> bool:
+    return work.is_alive
+
+
+def busy(desk: Desk) -> Desk:
+    desk.take_valve(NamedValve("valve.toml", Path("valve.toml"), HIDDEN.base))
+    desk.take_recording(Opened("fit.csv", Path("fit.csv"), HIDDEN.fit))
+    search = desk.begin("diagnose", never_ends)
+    while not search.doing:
+        search.look()
+    return desk
+
+
+def test_a_diagnosis_goes_on_while_its_page_is_loaded_again_and_stops_when_it_is_closed(workbench: Workbench) -> None:
+    desk = busy(workbench.desk("a"))
+    assert desk.search is not None
+    work = desk.search.work
+    workbench.came(desk)
+    workbench.came(desk)  # loaded again: the new page is there before the old one is gone
+    workbench.left(desk)
+    assert goes_on(work)
+    assert workbench.desk("a") is desk
+    workbench.left(desk)
+    assert not goes_on(work)
+    assert desk.search.is_running is False
+    assert desk.folder.exists()
+
+
+def test_of_many_closed_tabs_the_oldest_leave_nothing(workbench: Workbench) -> None:
+    desks = [workbench.desk(f"tab {i}") for i in range(MOST_LEFT + 3)]
+    for desk in desks:
+        workbench.came(desk)
+    for desk in desks:
+        workbench.left(desk)
+    assert [desk.folder.exists() for desk in desks] == [False] * 3 + [True] * MOST_LEFT
+    workbench.clear()
+    assert not any(desk.folder.exists() for desk in desks)
