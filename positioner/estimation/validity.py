@@ -10,7 +10,7 @@ intercept those two are.
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -104,5 +104,7 @@ def _refusal_of_each(solution: Solution) -> Refusal:
 
 def _std(solution: Solution, gradient: Array, filters: float = 0.0, *, biased: bool = False) -> float:
     noise = float(gradient @ solution.covariance @ gradient)
+    if not noise >= 0.0:  # θ is so ill known that the rounding of its covariance is more than this variance
+        return inf
     bias = float(gradient @ solution.bias) if biased else 0.0
     return sqrt(noise + bias * bias + filters * filters)
