@@ -215,13 +215,13 @@ class Loop:
         self.cycle.once()
 
     def step_to(self, reference_m: float, longest_s: float) -> float:
-        """Ask for a position until the law has rested for a while; return the farthest excursion, m."""
+        """Ask for a position until the law has rested for longer than a DCS's scan; return the farthest excursion, m."""
         at_m = self.valve.indicated_m
         low_m, high_m = min(at_m, reference_m), max(at_m, reference_m)
         self.ask(reference_m=reference_m, reference_writes=self.cycle.requests.reference_writes + 1)
         farthest_m, last_pa = 0.0, float("nan")
         begin_s = since_s = self.time_s
-        quiet_s = 1.0 + 40 * self._each.period_s + 20 * self._each.lag_s
+        quiet_s = 1.5 + 40 * self._each.period_s + 20 * self._each.lag_s
         while self.time_s - begin_s < longest_s and self.time_s - since_s < quiet_s:
             self.cycle.once()
             x_m = self.valve.indicated_m
