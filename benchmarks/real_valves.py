@@ -215,7 +215,7 @@ class Loop:
         self.cycle.once()
 
     def step_to(self, reference_m: float, longest_s: float) -> float:
-        """Ask for a position until the law has rested for longer than a DCS's scan; return the farthest excursion, m."""
+        """Ask for a position until the law has rested longer than a DCS's scan; return the farthest excursion, m."""
         at_m = self.valve.indicated_m
         low_m, high_m = min(at_m, reference_m), max(at_m, reference_m)
         self.ask(reference_m=reference_m, reference_writes=self.cycle.requests.reference_writes + 1)
