@@ -14,6 +14,7 @@ import numpy as np
 import psutil
 import pytest
 from distributed import KilledWorker
+from distributed.comm import CommClosedError
 from pyarrow import parquet
 
 from config.errors import CommandFailed
@@ -75,7 +76,7 @@ class Straight:
         pass
 
 
-def straight(_client: object, courses: Any, told: Any) -> None:
+def straight(_client: object, courses: Any) -> None:
     for course in courses:
         while (request := course.following()) is not None:
             course.take(examine(request))
@@ -222,14 +223,18 @@ class Future:
     def exception(self) -> Exception | None:
         return self._error
 
+    def result(self) -> None:
+        raise CommClosedError
+
 
 def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_gone_said() -> None:
     died: Any = KilledWorker
     killed = engine._answer(Future("error", died("examine-1", None, 3)))
     assert killed.outcome == "unreadable"
     assert killed.sentence == "the workers that examined it died"
-    with pytest.raises(CommandFailed, match="the same command goes on from there"):
-        engine._answer(Future("cancelled"))
+    for status in ("cancelled", "lost", "finished"):
+        with pytest.raises(CommandFailed, match="the same command goes on from there"), engine._told_when_gone():
+            engine._answer(Future(status))
 
 
 @pytest.mark.real_time

@@ -8,9 +8,11 @@ A cluster of this machine listens on 127.0.0.1 and speaks TLS with certificates 
 sent, it executes.
 """
 
+import logging
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any, Protocol
@@ -46,6 +48,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """
     distributed = needed("distributed", WHO)
     if scheduler is not None:
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that goes is told in one line
         try:
             client = distributed.Client(scheduler, timeout=CONNECT_WITHIN_S)
         except (OSError, ValueError) as error:
@@ -91,8 +94,8 @@ def _require_same_rules(client: Any, scheduler: str) -> None:
         raise InputError(scheduler, f"has {there}; allowed are workers with positioner {own_version()}")
 
 
-def work(client: Any, courses: Sequence[Course], told: Callable[[], None]) -> None:
-    """Carry all courses to their ends, `told` after each answer.
+def work(client: Any, courses: Sequence[Course]) -> None:
+    """Carry all courses to their ends.
 
     Raises:
         CommandFailed: the scheduler is gone.
@@ -108,13 +111,26 @@ def work(client: Any, courses: Sequence[Course], told: Callable[[], None]) -> No
             under_way[future.key] = course
             answers.add(future)
 
-    for course in courses:
-        go_on(course)
-    for future in answers:
-        course = under_way[future.key]
-        course.take(_answer(future))
-        told()
-        go_on(course)
+    with _told_when_gone():
+        for course in courses:
+            go_on(course)
+        for future in answers:
+            course = under_way[future.key]
+            course.take(_answer(future))
+            go_on(course)
+
+
+@contextmanager
+def _told_when_gone() -> Iterator[None]:
+    """Say so in one line where the connection to the scheduler ends, at whatever it is asked.
+
+    Raises:
+        CommandFailed: it does.
+    """
+    try:
+        yield
+    except (OSError, CancelledError):  # Dask's own errors of a closed connection are among the first
+        raise CommandFailed(GONE) from None
 
 
 def _answer(future: Any) -> Examination:
@@ -122,7 +138,7 @@ def _answer(future: Any) -> Examination:
         found: Examination = future.result()
         return found
     if future.status in {"cancelled", "lost"}:
-        raise CommandFailed(GONE)
+        raise CancelledError
     error = future.exception()
     if type(error).__name__ == "KilledWorker":
         return unreadable("the workers that examined it died")

@@ -112,7 +112,7 @@ def fleet(
     waiting = [each for each in running if not each.is_through()]
     if waiting:
         with cluster(scheduler, workers) as client:
-            work(client, waiting, lambda: None)
+            work(client, waiting)
     courses = tuple(sorted((each.course for each in running), key=ValveCourse.order))
     return Fleet(courses, sum(each.examined for each in running), read.count)
 
