@@ -14,7 +14,7 @@ import numpy as np
 import psutil
 import pytest
 from distributed import KilledWorker
-from distributed.comm import CommClosedError
+from distributed.comm.core import CommClosedError
 from pyarrow import parquet
 
 from config.errors import CommandFailed
