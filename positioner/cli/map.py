@@ -1,6 +1,7 @@
 """`positioner map`: the supervisory register map."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,15 +18,35 @@ COLUMNS = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--format", choices=("md", "csv", "json"), default="md")
+    parser.add_argument("--format", choices=("md", "csv", "json", "telegraf"), default="md")
+    parser.add_argument(
+        "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file that --format telegraf is for"
+    )
     parser.add_argument("--reasons", action="store_true", help="print what the numbers in *_reason mean instead")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the map, or the reasons."""
+    """Print the map, or the reasons.
+
+    Raises:
+        InputError: a configuration for another program, and no daemon's file to say where; or a fault in it.
+    """
+    if arguments.format == "telegraf":
+        _telegraf(arguments.config)
+        return 0
     rows = _reasons() if arguments.reasons else _map()
     {"md": _markdown, "csv": _csv, "json": _json}[arguments.format](rows)
     return 0
+
+
+def _telegraf(config: Path | None) -> None:
+    from config.daemon_file import load_valves
+    from config.errors import InputError
+    from positioner.cli.parts.telegraf import telegraf
+
+    if config is None:
+        raise InputError("--format telegraf", "needs --config, the daemon's file that says where the registers are")
+    print(telegraf(load_valves(config), str(config)), end="")
 
 
 def _map() -> list[dict[str, object]]:

@@ -5,8 +5,10 @@ import io
 import json
 import os
 import socket
+import struct
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -156,6 +158,39 @@ def test_the_map_is_complete_in_every_format(capsys: Capture) -> None:
     assert len(list(csv.DictReader(io.StringIO(capsys.readouterr().out)))) == len(rows)
     main(["map"])
     assert len(capsys.readouterr().out.splitlines()) == len(rows) + 2
+
+
+def test_telegraf_reads_each_value_where_it_stands_of_every_valve(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "fleet.toml"
+    path.write_text(
+        "".join(
+            f"[[valve]]\nname = 'FV-{n}'\nunit = {n}\nstroke_m = 0.1\n[valve.device]\nport = 50{n}\n" for n in (3, 4)
+        )
+        + "[supervisory]\nport = 5511\n"
+    )
+    assert main(["map", "--format", "telegraf", "--config", str(path)]) == 0
+    inputs = tomllib.loads(capsys.readouterr().out)["inputs"]["modbus"]
+    assert [each["name"] for each in inputs] == ["FV-3", "FV-4"]
+    for unit, each in zip((3, 4), inputs, strict=True):
+        assert each["controller"] == "tcp://127.0.0.1:5511"
+        (request,) = each["request"]
+        assert (request["slave_id"], request["tags"]) == (unit, {"valve": f"FV-{unit}"})
+        assert (request["byte_order"], request["register"]) == ("ABCD", "input")
+        for field, register in zip(request["fields"], REGISTERS, strict=True):
+            letter = {"FLOAT32": "f", "UINT16": "H", "INT16": "h", "UINT32": "I", "UINT64": "Q"}[field["type"]]
+            words = register.format.encode(1.0)
+            assert (field["name"], field["address"]) == (register.name, register.address)
+            assert struct.unpack(f">{letter}", struct.pack(f">{len(words)}H", *words)) == (1.0,)
+
+
+def test_telegraf_needs_to_know_where_and_speaks_no_tls(tmp_path: Path, capsys: Capture) -> None:
+    assert main(["map", "--format", "telegraf"]) == 2
+    assert "needs --config" in one_line(capsys)
+    path = tmp_path / "daemon.toml"
+    tls = "authority = 'a.pem'\ncertificate = 'c.pem'\nkey = 'k.pem'\n"
+    path.write_text(DAEMON.format(port=5020) + f"[supervisory.tls]\n{tls}")
+    assert main(["map", "--format", "telegraf", "--config", str(path)]) == 2
+    assert "Telegraf speaks no Modbus/TCP Security" in one_line(capsys)
 
 
 def test_simulate_holds_each_pressure_until_the_next_time(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ A command imports from here what it needs when it runs.
     extended_valves                             `[law] valve` of a daemon's file, worked out
     page_address                                where a page listens
     output_files                                what `--out` and `--json` ask for
+    telegraf                                    the register map as Telegraf's configuration
     sampling                                    when a device samples, for `doctor --nudge-pa`
     authority, progress                         a test certificate authority; progress on a terminal
     breaking_off                                Ctrl-C during long work: what is known is said
