@@ -5,6 +5,7 @@ From the file to the recording:
     raw_table                               rows of cells before anything is understood; which kind of file it is
     text_table                              encodings, separators, quotation marks
     typed_tables                            Excel workbooks, MATLAB files, Parquet
+    line_protocol                           InfluxDB's line protocol
     export_units                            units, by all the names people give them
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read
     header_search                           the line that names the columns, and the units about it

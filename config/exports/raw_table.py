@@ -11,6 +11,8 @@ from pathlib import Path
 from config.errors import InputError
 
 Cell = str | float
+BEGIN_BYTES = 4096
+"""By which the kind of a file is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +48,13 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
     """
     try:
         with path.open("rb") as file:
-            begin = file.read(128)
+            begin = file.read(BEGIN_BYTES)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     for magic, problem in REFUSED.items():
         if begin.startswith(magic):
             raise InputError(str(path), problem)
-    from config.exports import text_table, typed_tables
+    from config.exports import line_protocol, text_table, typed_tables
 
     if begin.startswith(b"PK\x03\x04"):
         return typed_tables.workbook(path, sheet)
@@ -62,6 +64,8 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
         return typed_tables.matlab(path)
     if begin.startswith(b"PAR1"):
         return typed_tables.parquet(path)
+    if line_protocol.is_line_protocol(begin):
+        return line_protocol.line_protocol(path)
     return text_table.text_tables(path)
 
 

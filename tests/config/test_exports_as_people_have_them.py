@@ -457,12 +457,32 @@ def write_savemat_struct(path: Path) -> None:
     savemat(path, {"log": {"t": T, "signals": {"PV": PV, "OUT": OUT}}}, do_compression=True)
 
 
+def write_line_protocol(path: Path) -> None:
+    """As Telegraf writes two valves and a temperature into a file: a series a valve, not in the order of time."""
+    begin_ns = 1_700_000_000_000_000_000
+    lines = [
+        f'positioner,host=gateway\\ 1,valve=FV-{valve} position={x / valve!r},command={u / valve!r},mode=2i,why="a, b" '
+        f"{begin_ns + round(t * 1e9)}"
+        for valve in (2, 1)
+        for t, x, u in zip(T.tolist(), PV.tolist(), OUT.tolist(), strict=True)
+    ]
+    path.write_text("\n".join([*lines, f"room temperature=21.5 {begin_ns}", ""]))
+
+
+LINE_PROTOCOL_WORDS = (
+    "time_s=time",
+    "position_m=positioner,host=gateway 1,valve=FV-1.position:%",
+    "command_pa=positioner,host=gateway 1,valve=FV-1.command:bar",
+)
+
+
 OTHERS: dict[str, tuple[Callable[[Path], None], str, tuple[str, ...]]] = {
     "pandas.to_csv": (write_pandas_csv, "a.csv", WORDS),
     "pandas.to_excel": (write_pandas_excel, "a.xlsx", WORDS),
     "pandas.to_parquet": (write_pandas_parquet, "a.parquet", WORDS),
     "csv, excel-tab, UTF-16": (write_excel_dialect, "a.txt", WORDS),
     "openpyxl": (write_openpyxl, "a.xlsx", ("time_s=t", "position_m=PV", "command_pa=OUT")),
+    "line protocol": (write_line_protocol, "a.lp", LINE_PROTOCOL_WORDS),
     "scipy.io.savemat": (write_savemat, "a.mat", WORDS),
     "scipy.io.savemat, a struct": (
         write_savemat_struct,
@@ -480,6 +500,24 @@ def test_what_other_programs_write_is_read(program: str, tmp_path: Path) -> None
     np.testing.assert_allclose(recording.time_s, T, atol=1e-6)
     np.testing.assert_allclose(recording.position_m, STROKE_M * PV / 100)
     np.testing.assert_allclose(recording.command_pa, 1e5 * OUT)
+
+
+def test_line_protocol_tells_when_it_was_recorded_in_whatever_unit(tmp_path: Path) -> None:
+    path = tmp_path / "a.lp"
+    words = read_mapping(("time_s=time", "position_m=x:m", "command_pa=valve.u:bar"))
+    for digits in (1, 1_000, 1_000_000, 1_000_000_000):
+        points = [f"valve x={0.01 * i},u=1.{i} {(1_700_000_000 + i) * digits}\n" for i in range(4)]
+        path.write_text("".join([*points, f"other u=1 {1_700_000_000 * digits}\n"]))
+        recording = read_export(path, words, STROKE_M)
+        np.testing.assert_allclose(recording.time_s, [0.0, 1.0, 2.0, 3.0])
+        assert recording.metadata["recorded"] == "2023-11-14T22:13:20+00:00"
+
+
+def test_a_line_of_line_protocol_that_is_no_point_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.lp"
+    path.write_text("valve position=1.0 1700000000000\nvalve position= 1700000000100\n")
+    with pytest.raises(InputError, match="line 2: is no point with a time stamp: 'valve position= 17"):
+        read_export(path, read_mapping(("time_s=time", "position_m=position", "command_pa=command")), STROKE_M)
 
 
 def test_sheets_that_both_have_the_columns_are_named_and_one_can_be_said(tmp_path: Path) -> None:

@@ -277,7 +277,7 @@ def workers_of(pid: int) -> list[psutil.Process]:
 
 
 def until(holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 120.0
+    end_s = time.monotonic() + 250.0
     while not holds():
         assert time.monotonic() < end_s
         time.sleep(0.02)
