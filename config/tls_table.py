@@ -9,4 +9,6 @@ class Tls(Schema):
     authority: NearFile
     certificate: NearFile
     key: NearFile
+    revoked: NearFile | None = None
+    """The authority's list of certificates that it has taken back (CRL, PEM); an outdated list lets nobody in."""
     handshake_timeout_s: Positive = 0.5

@@ -34,6 +34,25 @@ def folder() -> Path:
     return made
 
 
+def revoke(path: Path, *names: str, days: float = 30.0) -> None:
+    """Write the authority's list of certificates that it has taken back."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    now = datetime.now(UTC)
+    key = serialization.load_pem_private_key((folder() / "authority.key").read_bytes(), None)
+    assert isinstance(key, ec.EllipticCurvePrivateKey)
+    issuer = x509.load_pem_x509_certificate((folder() / "authority.pem").read_bytes()).subject
+    built = x509.CertificateRevocationListBuilder().issuer_name(issuer)
+    built = built.last_update(now - timedelta(days=60)).next_update(now + timedelta(days=days))
+    for name in names:
+        number = x509.load_pem_x509_certificate((folder() / f"{name}.pem").read_bytes()).serial_number
+        one = x509.RevokedCertificateBuilder().serial_number(number).revocation_date(now)
+        built = built.add_revoked_certificate(one.build())
+    path.write_bytes(built.sign(key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM))
+
+
 def tls(name: str, authority: str = "authority", handshake_timeout_s: float = 5.0) -> Tls:
     """Return the table of an end that shows a certificate and trusts an authority."""
     made = folder()

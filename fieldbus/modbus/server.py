@@ -139,8 +139,8 @@ class RegisterServer(RegisterAnswers):
     def _permitted(self, guard: Guard, unit: RegisterAnswers, pdu: bytes, peer: str) -> bytes:
         """Answer what the client's role permits; refuse the rest, as Modbus/TCP Security has it."""
         identity = self._listener.identities[peer] if self._listener else NOBODY
-        if identity.until_s < time.time():
-            log.warning("%s at %s: its certificate has ended, and its session with it", identity, peer)
+        if why := guard.ending(identity):
+            log.warning("%s at %s: %s, and its session with it", identity, peer, why)
             raise ConnectionAbortedError
         try:
             guard.authorize(identity, pdu)

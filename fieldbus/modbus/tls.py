@@ -4,12 +4,18 @@ Both ends show a certificate that the other's authority has signed; the client a
 for the host it called. TLS 1.2 or newer, by the standard library. The client's certificate names its role in the
 extension 1.3.6.1.4.1.50316.802.1 (a UTF8String: observer, operator or engineer). What the role does not permit is
 refused with exception 1, as the protocol has it, and one line in the log.
+
+A server reads its files anew when they change: certificates are replaced, and revoked, without a restart. A session
+ends with its certificate, and when that is revoked. Of files that do not fit the log tells, and those before stay.
 """
 
+import logging
 import math
+import re
 import socket
 import ssl
 import struct
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
@@ -19,8 +25,13 @@ from config.errors import InputError
 from config.roles import Role
 from config.tls_table import Tls
 
+log = logging.getLogger(__name__)
+
 ROLE_OID = "1.3.6.1.4.1.50316.802.1"
 _UTF8_STRING = 0x0C
+LOOK_EVERY_S = 1.0
+"""How often a server looks whether its files have changed, while somebody asks for something."""
+PEM_LIST = re.compile(rb"-----BEGIN X509 CRL-----.*?-----END X509 CRL-----\n?", re.DOTALL)
 MOST_WRITTEN = 123
 """Registers that one request may write."""
 
@@ -36,6 +47,8 @@ class Identity:
     role: Role
     until_s: float = math.inf
     """When the certificate ends, s since 1970."""
+    serial: int = 0
+    """Its number, by which it may be revoked."""
 
     def __str__(self) -> str:
         return f"{self.name} ({self.role.name.lower()})"
@@ -67,7 +80,7 @@ def failure_reason(error: OSError) -> str:
 
 
 def expiry(tls: Tls) -> datetime:
-    """Return when the first of an end's certificate and its authority's ends.
+    """Return when the first of an end's certificate, its authority's and its list of revoked ones ends.
 
     Raises:
         InputError: a file that is not there or does not fit, or the package `cryptography` is missing.
@@ -77,9 +90,10 @@ def expiry(tls: Tls) -> datetime:
 
     client_context(tls)
     files = (tls.authority, tls.certificate)
-    return min(
-        each.not_valid_after_utc for file in files for each in x509.load_pem_x509_certificates(file.read_bytes())
-    )
+    ends = [each.not_valid_after_utc for file in files for each in x509.load_pem_x509_certificates(file.read_bytes())]
+    lists = () if tls.revoked is None else PEM_LIST.findall(tls.revoked.read_bytes())
+    ends += [end for one in lists if (end := x509.load_pem_x509_crl(one).next_update_utc) is not None]
+    return min(ends)
 
 
 class NotAuthorized(Exception):
@@ -99,14 +113,15 @@ class Guard:
 
     def __init__(self, tls: Tls, writers: Writers) -> None:
         _require_cryptography(tls)
-        self._context = _context(tls, ssl.PROTOCOL_TLS_SERVER)
-        self._context.verify_mode = ssl.CERT_REQUIRED
-        self._context.num_tickets = 0  # every connection shows its certificate
-        self._timeout_s = tls.handshake_timeout_s
+        self._tls = tls
         self._writers = writers
+        self._stamps = _stamps(tls)
+        self._looked_s = time.monotonic()
+        self._context, self._revoked = _server_context(tls), _revoked_numbers(tls)
 
     def wrap(self, connection: socket.socket) -> ssl.SSLSocket:
         """Return an accepted connection as a TLS socket, before its `handshake`."""
+        self._look_for_changes()
         return self._context.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
 
     def handshake(self, connection: ssl.SSLSocket) -> Identity:
@@ -115,11 +130,34 @@ class Guard:
         Raises:
             OSError: no handshake; `failure_reason` puts it in words.
         """
-        connection.settimeout(self._timeout_s)
+        connection.settimeout(self._tls.handshake_timeout_s)
         connection.do_handshake()
         certificate = connection.getpeercert(binary_form=True)
         assert certificate is not None  # CERT_REQUIRED
         return identity_in(certificate)
+
+    def ending(self, identity: Identity) -> str | None:
+        """Return why a session is over, None while it may go on."""
+        self._look_for_changes()
+        if identity.until_s < time.time():
+            return "its certificate has ended"
+        return "its certificate is revoked" if identity.serial in self._revoked else None
+
+    def _look_for_changes(self) -> None:
+        """Read the files anew if one has changed. What is read is replaced whole: any thread may look."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s < LOOK_EVERY_S:
+            return
+        self._looked_s = now_s
+        if (stamps := _stamps(self._tls)) == self._stamps:
+            return
+        self._stamps = stamps
+        try:
+            self._context, self._revoked = _server_context(self._tls), _revoked_numbers(self._tls)
+        except InputError as error:
+            log.error("certificates have changed, those before stay in use: %s", error)
+            return
+        log.info("certificates have changed and are in use")
 
     def authorize(self, identity: Identity, pdu: bytes) -> None:
         """Check that a client's role permits a request (MODBUS/TCP Security Protocol Specification, section 8.3).
@@ -143,8 +181,8 @@ def identity_in(certificate: bytes) -> Identity:
     until_s = parsed.not_valid_after_utc.timestamp()
     for extension in parsed.extensions:
         if extension.oid.dotted_string == ROLE_OID and isinstance(extension.value, x509.UnrecognizedExtension):
-            return Identity(name, _role(extension.value.value), until_s)
-    return Identity(name, Role.NONE, until_s)
+            return Identity(name, _role(extension.value.value), until_s, parsed.serial_number)
+    return Identity(name, Role.NONE, until_s, parsed.serial_number)
 
 
 def role_extension(role: Role) -> bytes:
@@ -171,15 +209,64 @@ def _written_range(pdu: bytes) -> tuple[int, int]:
     return address, min(count, MOST_WRITTEN)
 
 
+def _server_context(tls: Tls) -> ssl.SSLContext:
+    context = _context(tls, ssl.PROTOCOL_TLS_SERVER)
+    context.verify_mode = ssl.CERT_REQUIRED
+    context.num_tickets = 0  # every connection shows its certificate
+    return context
+
+
+def _files(tls: Tls) -> list[Path]:
+    return [tls.authority, tls.certificate, tls.key, *([] if tls.revoked is None else [tls.revoked])]
+
+
+def _stamps(tls: Tls) -> list[tuple[int, int, int] | None]:
+    """Return by what a change of the files shows; None of one that is not there."""
+    return [_stamp(file) for file in _files(tls)]
+
+
+def _stamp(file: Path) -> tuple[int, int, int] | None:
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+def _revoked_numbers(tls: Tls) -> frozenset[int]:
+    """Return the numbers of the certificates that the list names; none without a list.
+
+    Raises:
+        InputError: it holds no list.
+    """
+    if tls.revoked is None:
+        return frozenset()
+    from cryptography import x509
+
+    lists = PEM_LIST.findall(tls.revoked.read_bytes())
+    try:
+        return frozenset(each.serial_number for one in lists for each in x509.load_pem_x509_crl(one))
+    except ValueError:
+        raise InputError(str(tls.revoked), "holds no list of revoked certificates in PEM form") from None
+
+
 def _context(tls: Tls, protocol: int) -> ssl.SSLContext:
     context = ssl.SSLContext(protocol)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
-    for file in (tls.authority, tls.certificate, tls.key):
+    for file in _files(tls):
         _require_readable(file)
     try:
         context.load_verify_locations(tls.authority)
     except ssl.SSLError:
         raise InputError(str(tls.authority), "holds no certificate in PEM form") from None
+    if tls.revoked is not None:
+        if not PEM_LIST.search(tls.revoked.read_bytes()):
+            raise InputError(str(tls.revoked), "holds no list of revoked certificates in PEM form")
+        try:
+            context.load_verify_locations(tls.revoked)
+        except ssl.SSLError:
+            raise InputError(str(tls.revoked), "holds no list of revoked certificates in PEM form") from None
+        context.verify_flags |= ssl.VERIFY_CRL_CHECK_LEAF
     try:
         # The password is never asked for on a terminal: a gateway starts without anybody there.
         context.load_cert_chain(tls.certificate, tls.key, password=b"")

@@ -197,8 +197,10 @@ def compressing(folder: Path, rows: int, keep_files: int = 10) -> None:
     assert compression is not None
     while plain := [path for path in room.files_of(folder, "v")[:-2] if path.suffix == ".csv"]:
         compression.begin(plain)  # as the next rotation does
-        if compression._process is not None:
-            compression._process.wait(60)
+        assert compression._process is not None
+        compression._process.wait(60)
+    if compression._process is not None:
+        compression._process.wait(60)  # its last file may be there as both still
     recorder.stop()
 
 

@@ -2,6 +2,7 @@
 
 import logging
 import re
+import shutil
 import socket
 import ssl
 import time
@@ -22,6 +23,7 @@ from config.valve_file import shipped_valve
 from drivers.boundary import DriverError, NoConnection, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import server as server_module
+from fieldbus.modbus import tls as tls_module
 from fieldbus.modbus.admission import ServerLimits
 from fieldbus.modbus.server import RegisterServer
 from fieldbus.modbus.tls import Guard, Identity, NotAuthorized, client_context, identity_in
@@ -29,7 +31,7 @@ from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
-from tests.certificates import folder, tls
+from tests.certificates import folder, revoke, tls
 from tests.drivers import test_driver_contract as contract
 
 pytestmark = pytest.mark.real_time
@@ -350,11 +352,85 @@ def test_a_session_ends_with_its_certificate(caplog: pytest.LogCaptureFixture, m
         now_s = time.time()
         with monkeypatch.context() as later:
             clock = SimpleNamespace(time=lambda: now_s + 40 * 86400.0, monotonic=time.monotonic)
-            later.setattr(server_module, "time", clock)
+            later.setattr(tls_module, "time", clock)
             with pytest.raises(NoConnection):
                 driver.exchange(2 * PUSH_PA)
         assert device.command_pa == PUSH_PA
         assert "its certificate has ended, and its session with it" in caplog.text
+        driver.close()
+
+
+def revocable(revoked: Path) -> Guard:
+    return Guard(tls("device").model_copy(update={"revoked": revoked}), lambda _: Role.OPERATOR)
+
+
+def test_a_revoked_certificate_ends_its_session_and_does_not_get_in_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(tls_module, "LOOK_EVERY_S", 0.0)
+    revoke(tmp_path / "revoked.pem")
+    with device_with(revocable(tmp_path / "revoked.pem")) as (_, server):
+        daemon, other = driver_to(server, tls("daemon")), driver_to(server, tls("elsewhere"))
+        for driver in (daemon, other):
+            driver.open()
+            driver.exchange(PUSH_PA)
+        revoke(tmp_path / "revoked.pem", "daemon")
+        with pytest.raises(DriverError):
+            daemon.exchange(PUSH_PA)
+        assert "its certificate is revoked, and its session with it" in caplog.text
+        other.exchange(PUSH_PA)
+        assert "revoked" in turned_away(server, tls("daemon"))
+        daemon.close()
+        other.close()
+
+
+def test_a_list_that_does_not_fit_leaves_the_one_before_in_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(tls_module, "LOOK_EVERY_S", 0.0)
+    path = tmp_path / "revoked.pem"
+    revoke(path, "daemon")
+    with device_with(revocable(path)) as (_, server):
+        path.write_text("half written")
+        assert "revoked" in turned_away(server, tls("daemon"))
+        driver = driver_to(server, tls("elsewhere"))
+        driver.open()
+        driver.exchange(PUSH_PA)
+        driver.close()
+    said = [each.getMessage() for each in caplog.records if "stay in use" in each.getMessage()]
+    problem = "holds no list of revoked certificates in PEM form"
+    assert said == [f"certificates have changed, those before stay in use: {path}: {problem}"]
+    with pytest.raises(InputError, match=problem):
+        revocable(path)
+
+
+def test_an_outdated_list_lets_nobody_in(tmp_path: Path) -> None:
+    revoke(tmp_path / "revoked.pem", days=-1.0)
+    with device_with(revocable(tmp_path / "revoked.pem")) as (_, server):
+        assert turned_away(server, tls("daemon"))
+
+
+def test_a_device_whose_certificate_is_revoked_is_not_trusted(tmp_path: Path) -> None:
+    revoke(tmp_path / "revoked.pem", "device")
+    with device_with(guarded()) as (_, server):
+        table = tls("daemon").model_copy(update={"revoked": tmp_path / "revoked.pem"})
+        assert "revoked" in turned_away(server, table)
+
+
+def test_a_certificate_that_is_replaced_is_shown_without_a_restart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tls_module, "LOOK_EVERY_S", 0.0)
+    for name in ("certificate", "key"):
+        shutil.copy(getattr(tls("outdated"), name), tmp_path / name)
+    table = tls("device").model_copy(update={name: tmp_path / name for name in ("certificate", "key")})
+    with device_with(Guard(table, lambda _: Role.OPERATOR)) as (_, server):
+        assert turned_away(server, tls("daemon"))
+        for name in ("certificate", "key"):
+            shutil.copy(getattr(tls("device"), name), tmp_path / name)
+        driver = driver_to(server, tls("daemon"))
+        driver.open()
+        driver.exchange(PUSH_PA)
         driver.close()
 
 
