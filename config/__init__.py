@@ -8,7 +8,7 @@ Its files:
     loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all
     whole_file                                    replaces a file so that a crash leaves the old one or the new one
     device, canopen_device                        table [device], on Modbus and on CANopen
-    supervision_table                             tables [safety] and [supervision]
+    supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
     hosts, serial_port, tls_table                 where it is, and how it is secured
     bus_plugins, extras                           buses of other packages; which package is not installed
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words

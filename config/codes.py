@@ -243,6 +243,8 @@ class EventKind(Code):
     HISTORY_GAP = 16, "the history has a gap"
     HISTORY_ANEW = 17, "the history was unreadable, set aside and begun anew"
     CLOCK_SET = 18, "the gateway's clock was set"
+    LOCKED_OUT = 19, "the local switch locks out whoever writes from afar"
+    LET_IN = 20, "the local switch lets writes in again"
 
 
 CAUSES: dict[EventKind, type[Code]] = {

@@ -19,6 +19,7 @@ from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
 from config.loading import FolderName, Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
+from config.record_tables import HistoryTable, RecorderTable
 from config.supervision_table import SafetyTable, SupervisionTable
 from config.tls_table import Tls
 
@@ -172,20 +173,12 @@ class SupervisoryTable(Schema):
     """Addresses of the DCS: where all places are taken, another's is made free for them."""
     requests_per_s: NonNegative = 1000.0
     """Of one host; more wait. 0 is no limit."""
+    idle_s: NonNegative = 0.0
+    """A client that asks for nothing for so long is disconnected; 0 is never."""
+    local_switch: NearFile | None = None
+    """While this file is there and does not begin with 0, all writes but heartbeats are refused."""
     tls: Tls | None = None
     """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
-
-
-class RecorderTable(Schema):
-    """Table `[recorder]`: recordings in a folder, a new file at a size or an age; the oldest are deleted."""
-
-    folder: FolderName
-    file_bytes: Annotated[int, Field(ge=10_000)] = 50_000_000
-    file_s: NonNegative = 86_400.0
-    """A file older than this is followed by a new one; 0: only a full one is."""
-    compress: bool = True
-    """Those before the newest two are compressed, by a process of its own."""
-    keep_files: Annotated[int, Field(ge=1)] = 20
 
 
 class HealthTable(Schema):
@@ -220,14 +213,6 @@ class MemoryTable(Schema):
 
     folder: FolderName | None = None
     """One small file for each valve there; without it each start knows nothing of the last."""
-
-
-class HistoryTable(Schema):
-    """Table `[history]`: what has happened, kept in a SQLite file for as long and as large as is said here."""
-
-    folder: FolderName
-    keep_days: Annotated[float, Field(gt=0, le=36_500)] = 400.0
-    limit_mb: Annotated[int, Field(ge=4, le=100_000)] = 100
 
 
 class LogTable(Schema):

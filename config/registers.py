@@ -126,6 +126,7 @@ STATUS = (
     Register("restored", 122, "uint16", "1", f"what was known before the daemon was started: {listed(Restored)}"),
     Register("emergency", 124, "uint16", "1", "CANopen: error code of the device's last EMCY, 0 when it is over"),
     Register("service", 125, "uint16", "1", f"what the service does: {listed(ServiceState)}"),
+    Register("locked_out", 126, "uint16", "1", "1: the local switch locks out all writes but the heartbeat"),
     Register("restored_agreed", 123, "uint16", "1", "landings since then that agree with it"),
 )
 

@@ -28,6 +28,8 @@ class ServerLimits:
     reserved_hosts: frozenset[str] = frozenset()
     requests_per_s: float = 0.0
     """0: no limit."""
+    idle_s: float = 0.0
+    """A client that asks for nothing for so long is disconnected; 0 is never."""
 
 
 class Allowance:

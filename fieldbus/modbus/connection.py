@@ -29,6 +29,9 @@ SEND_TIMEOUT_S = 1.0
 class Host(Protocol):
     """What a connection asks of the server that accepted it."""
 
+    idle_s: float
+    """For how long a client may ask for nothing; 0: for ever."""
+
     def answer(self, unit: int, pdu: bytes, peer: str) -> bytes:
         """Return the PDU that answers one."""
         ...
@@ -76,12 +79,14 @@ class Connection(BaseRequestHandler):
             stream = stream[end:]
 
     def _more(self) -> bytes:
-        """Return what comes next; b"" when the client has no more to say."""
+        """Return what comes next; b"" when the client has no more to say, or says nothing for too long."""
+        since_s = time.monotonic()
         while True:
             try:
                 return self.request.recv(CHUNK)
-            except TimeoutError:  # that one is for sending: a client may be silent for as long as it likes
-                continue
+            except TimeoutError:  # that one is for sending: how long a client may be silent is another matter
+                if 0.0 < self.server.idle_s < time.monotonic() - since_s:
+                    return b""
 
 
 def endpoint(address: tuple[object, ...]) -> str:

@@ -174,6 +174,7 @@ class _Listener(ThreadingTCPServer):
         """Who is at the other end of each secured connection, by its `host:port`."""
         self._guard = guard
         self._witness = witness
+        self.idle_s = limits.idle_s
         self._connections: dict[Any, str] = {}
         self._places = Places(limits)
         self._sayable = Allowance(REFUSALS_SAID_PER_S, REFUSALS_SAID)

@@ -9,6 +9,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     snapshot                      what a cycle leaves for the others
     supervisory_registers         what the DCS reads and writes
     experiment_registers          the same of a played experiment
+    site_registers, local_switch  the same of events, requests and the switch that locks out; that switch
     service_manager               what systemd is told
     service_state                 what the service does for a valve: states and transitions
     refinement_process            fits in a process of its own

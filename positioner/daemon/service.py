@@ -5,7 +5,7 @@ or a thread that died): stop serving, leave each valve in its configured safe st
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +13,7 @@ from pathlib import Path
 from threading import Event, Thread
 
 from config.codes import EventKind
-from config.daemon_file import DaemonFile
+from config.daemon_file import DaemonFile, SupervisoryTable
 from config.errors import InputError
 from config.extended_valve import ExtendedValve
 from config.registers import WRITER_AT
@@ -35,6 +35,7 @@ from positioner.daemon.history import HistoryKeeper, ValveHistory
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
 from positioner.daemon.link import Link, LinkSettings
+from positioner.daemon.local_switch import locks_out
 from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
 from positioner.daemon.memory.conditions import conditions_of
@@ -65,6 +66,8 @@ class ServedValve:
     """Of its health, and of what is known of it."""
     unreachable_reason: str | None
     """Why its device could not be reached at the start; the cycle goes on asking."""
+    locked: Callable[[], bool]
+    """Whether the local switch locks out."""
 
     @property
     def name(self) -> str:
@@ -76,7 +79,14 @@ class ServedValve:
         settings = self.settings
         state = partial(service_state, limits=settings.limits, shadow=self.file.cycle.shadow)
         return SupervisoryRegisters(
-            self.cycle, settings.limits.stroke_m, settings.minimum_pa, settings.maximum_pa, self.name, state, requests
+            self.cycle,
+            settings.limits.stroke_m,
+            settings.minimum_pa,
+            settings.maximum_pa,
+            self.name,
+            state,
+            requests,
+            self.locked,
         )
 
     def leave(self) -> None:
@@ -183,6 +193,7 @@ def _assembled(
         happened = history.valve(file, health.settings.monitor_classes)
         cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health, happened)
     happened.look = partial(_look, cycle, health)
+    locked = happened.locked = locks_out(file.supervisory.local_switch)
     keepers: list[HealthKeeper | MemoryKeeper] = [
         HealthKeeper(
             health, lambda: cycle.snapshot.decision, file.valve.name, stored, partial(_tell_of_health, happened)
@@ -190,7 +201,7 @@ def _assembled(
     ]
     if memory is not None:
         keepers.append(_memory_keeper(memory, file.valve.name, controller, cycle))
-    return ServedValve(file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason)
+    return ServedValve(file, settings, link, controller, cycle, recorder, tuple(keepers), unreachable_reason, locked)
 
 
 def _memory(file: DaemonFile, extended: ExtendedValve | None, source: Path) -> StoredMemory | None:
@@ -304,10 +315,15 @@ def _server(valves: Sequence[ServedValve], history: HistoryKeeper) -> RegisterSe
         where.unit,
         _guard(first.file),
         {valve.file.supervisory.unit: valve.served(requests) for valve in others},
-        ServerLimits(where.most_clients, where.clients_per_host, frozenset(where.reserved_hosts), where.requests_per_s),
+        _server_limits(where),
         history.session,
         requests,
     )
+
+
+def _server_limits(table: SupervisoryTable) -> ServerLimits:
+    reserved = frozenset(table.reserved_hosts)
+    return ServerLimits(table.most_clients, table.clients_per_host, reserved, table.requests_per_s, table.idle_s)
 
 
 def _guard(file: DaemonFile) -> Guard | None:

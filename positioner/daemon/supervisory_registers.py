@@ -5,7 +5,7 @@ Modbus exception and one line in the log, and changes nothing:
 
     2  no such register, a read-only one, or a part of a value
     3  a value outside its range
-    6  a value that cannot be taken now (a fault is latched)
+    6  a value that cannot be taken now (a fault is latched), or the local switch locks out
 
 The cycle thread is never waited for, nor made to wait: it reads `Cycle.requests` once a cycle, and every write
 replaces that snapshot whole.
@@ -44,11 +44,12 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.cycle_statistics import CycleStatistics
 from positioner.daemon.experiment_registers import WriteRejected, experiment_asked, experiment_getters
 from positioner.daemon.health import Health, ne107_condition
+from positioner.daemon.local_switch import require_let_in
 from positioner.daemon.logs import log_event, logging_valve
 from positioner.daemon.service_state import state_by_mode
+from positioner.daemon.site_registers import event_getters, site_getters
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.estimates import Estimate
-from positioner.history.entries import Event
 
 log = logging.getLogger(__name__)
 
@@ -73,6 +74,7 @@ class SupervisoryRegisters:
         valve: str | None = None,
         state: Callable[[Decision], ServiceState] = state_by_mode,
         requests: RequestCounts | None = None,
+        locked: Callable[[], bool] = lambda: False,
     ) -> None:
         self._cycle = cycle
         self._valve = valve
@@ -82,7 +84,8 @@ class SupervisoryRegisters:
         self._heartbeat = 0
         self._lines = LinesPerPeer()
         self._values = _getters(cycle, stroke_m) | {"service": lambda s, _: state(s.decision)}
-        self._values |= _request_getters(requests or RequestCounts())
+        self._values |= site_getters(requests or RequestCounts(), locked)
+        self._locked = locked
 
     def read(self, table: Table, address: int, count: int) -> Sequence[int]:  # noqa: ARG002 - both tables are the same
         """Return words of one snapshot; addresses between registers read 0.
@@ -110,6 +113,7 @@ class SupervisoryRegisters:
         with logging_valve(self._valve):
             try:
                 values = self._decoded(address, words)
+                require_let_in(values, self._locked)
                 self._cycle.requests = self._requested(values)
             except WriteRejected as rejected:
                 self._say(logging.WARNING, "write refused", peer, address=address, reason=rejected.reason)
@@ -233,9 +237,9 @@ def _getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         **_identity_getters(),
         **_health_getters(cycle, stroke_m),
         **experiment_getters(),
-        **_event_getters(cycle),
+        **event_getters(cycle),
     }
-    of_others = {"heartbeat", "service", *(f"requests_{each}" for each in REQUESTERS)}
+    of_others = {"heartbeat", "service", "locked_out", *(f"requests_{each}" for each in REQUESTERS)}
     assert getters.keys() == BY_NAME.keys() - of_others, getters.keys() ^ BY_NAME.keys()
     return getters
 
@@ -341,13 +345,6 @@ def _periods_within(statistics: CycleStatistics, bound: int) -> Getter:
     return lambda _s, _r: statistics.periods_within(bound)
 
 
-def _request_getters(requests: RequestCounts) -> dict[str, Getter]:
-    def of(requester: str) -> Getter:
-        return lambda _s, _r: requests.of(requester)
-
-    return {f"requests_{each}": of(each) for each in REQUESTERS}
-
-
 def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
     health = cycle.health or Health.idle(stroke_m)
     return {
@@ -364,20 +361,6 @@ def _health_getters(cycle: Cycle, stroke_m: float) -> dict[str, Getter]:
         "reversals": lambda _s, _r: health.record.reversals,
         "stiction_index": lambda _s, _r: health.record.stiction_index,
         "moves_judged": lambda _s, _r: health.record.moves_judged,
-    }
-
-
-def _event_getters(cycle: Cycle) -> dict[str, Getter]:
-    def newest(of: Callable[[Event], float]) -> Getter:
-        return lambda s, _: 0 if s.event is None else of(s.event)
-
-    return {
-        "event_number": newest(lambda event: event.number),
-        "event": newest(lambda event: event.kind),
-        "event_class": newest(lambda event: event.ne107),
-        "event_cause": newest(lambda event: event.cause),
-        "event_time": newest(lambda event: int(event.time_s)),
-        "history_lost": lambda _s, _r: 0 if cycle.history is None else cycle.history.lost(),
     }
 
 

@@ -301,7 +301,7 @@ def test_a_host_that_takes_its_places_leaves_those_of_others(bank: Bank) -> None
 
 def test_a_client_that_asks_without_end_is_made_to_wait(bank: Bank, monkeypatch: pytest.MonkeyPatch) -> None:
     waits: list[float] = []
-    monkeypatch.setattr(connection_module, "time", SimpleNamespace(sleep=waits.append))
+    monkeypatch.setattr(connection_module, "time", SimpleNamespace(sleep=waits.append, monotonic=time.monotonic))
     server = RegisterServer(bank, "127.0.0.1", 0, 7, limits=ServerLimits(requests_per_s=10.0))
     server.start()
     try:
@@ -341,3 +341,25 @@ def test_out_of_descriptors_it_waits_before_it_accepts_again(
         server.stop()
     assert waits == [server_module.SCARCE_WAIT_S] * 5
     assert "Too many open files" in caplog.text
+
+
+def test_a_client_that_asks_for_nothing_for_too_long_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection_module, "SEND_TIMEOUT_S", 0.02)
+    server = RegisterServer(Bank(), "127.0.0.1", 0, 7, limits=ServerLimits(idle_s=0.5))
+    server.start()
+    with connection(server) as silent, connection(server) as busy:
+        asked = 0
+        silent.settimeout(0.05)
+        while True:
+            busy.sendall(frame(bytes.fromhex("03 0000 0001")))
+            reply(busy)
+            asked += 1
+            try:
+                assert silent.recv(1) == b""
+                break
+            except TimeoutError:
+                assert asked < 1000
+        assert asked > 3, "at once"
+        busy.sendall(frame(bytes.fromhex("03 0000 0001")))
+        assert reply(busy)
+    server.stop()

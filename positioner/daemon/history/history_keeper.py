@@ -20,7 +20,8 @@ from threading import Event as Flag
 from threading import Lock, Thread
 
 from config.codes import EventKind, Ne107Status
-from config.daemon_file import DaemonFile, HistoryTable
+from config.daemon_file import DaemonFile
+from config.record_tables import HistoryTable
 from positioner.daemon.history.audited_writes import AuditedWrites, Told
 from positioner.daemon.history.configuration_changes import changes, in_words, settings_of
 from positioner.daemon.history.decision_events import Classes, Happened
@@ -173,6 +174,8 @@ class HistoryKeeper:
         events = [each for each in waiting if isinstance(each, Found)]
         for valve in self._valves:
             events += valve.changes()
+            if (happened := valve.switched()) is not None:
+                events.append(Found(time.monotonic(), valve, happened))
         for at_s, valve, happened, identification in sorted(events, key=lambda each: each.time_s):
             self._enter(valve, at_s + self._ahead_s, happened)
             if identification is not None:

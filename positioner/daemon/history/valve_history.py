@@ -56,6 +56,9 @@ class ValveHistory:
         """Returns the valve's health now; called by the keeper's thread."""
         self.lost: Callable[[], int] = lambda: 0
         """Returns how many entries were lost since the start, of all valves."""
+        self.locked: Callable[[], bool] = lambda: False
+        """Returns whether the local switch locks out; called by the keeper's thread."""
+        self._was_locked = False
         self._classes = classes
         self._queue = queue
         self._changes: deque[tuple[float, Decision, Decision]] = deque()
@@ -80,6 +83,15 @@ class ValveHistory:
     def refused(self, peer: str, reason: str) -> None:
         """Take a client's write that was refused."""
         self._queue.offer(Told(time.monotonic(), self.valve, "refused", peer, reason))
+
+    def switched(self) -> Happened | None:
+        """Return what the local switch has done since the last call. In the keeper's thread."""
+        before, self._was_locked = self._was_locked, self.locked()
+        if before == self._was_locked:
+            return None
+        if before:
+            return Happened(EventKind.LET_IN)
+        return Happened(EventKind.LOCKED_OUT, Ne107Status.FUNCTION_CHECK)
 
     def changes(self) -> list[Found]:
         """Return what has happened in the cycle since the last call. In the keeper's thread."""

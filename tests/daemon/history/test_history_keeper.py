@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from config.codes import EventKind, Fault, Mode, Ne107Cause, Ne107Status, Quality, Refusal
-from config.daemon_file import DaemonFile, HistoryTable
+from config.daemon_file import DaemonFile
+from config.record_tables import HistoryTable
 from positioner.control.controller_memory import Decision
 from positioner.daemon.health import HealthSettings, StoredHealth
 from positioner.daemon.history import HistoryKeeper, history_keeper
