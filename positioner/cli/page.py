@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set-password", choices=("operator", "engineer"), help="ask for this role's password, keep it in --roles, end"
     )
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep what is seen of friction over restarts")
     parser.add_argument("--listen-host", default="127.0.0.1", help="where the page listens (127.0.0.1)")
     parser.add_argument("--listen-port", type=_port, metavar="N", help="at which port (8765, or another free one)")
     parser.add_argument(
@@ -61,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.set_password is not None:
         return _set_password(arguments.roles, arguments.set_password)
-    places = list(_places(arguments))
+    places = [replace(each, keep=arguments.keep) for each in _places(arguments)]
     sign_in = None if arguments.roles is None else SignIn(read_passwords(arguments.roles))
     where = listening(
         argparse.Namespace(

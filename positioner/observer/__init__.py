@@ -5,6 +5,7 @@
     valve_view                      what is known of one valve, and what has changed
     freshness                       whether what was read last is still so
     trends                          the last minutes, with their gaps, and the states as bands
+    friction_file                   friction against its baseline, kept over restarts
     words                           codes, causes and estimates in words
     poller                          reads a daemon in a thread of its own
     last_moves                      the last minutes as a recording, and the response figures of their steps

@@ -6,12 +6,13 @@ One thread reads, others ask.
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 
 from config.recording import Column
 from positioner.observer.freshness import Freshness, FreshnessMemory, after_failure, after_reading, freshness
+from positioner.observer.friction_file import FrictionRow
 from positioner.observer.trends import Trend
 from positioner.observer.words import code_text
 
@@ -63,16 +64,27 @@ class ValveView:
         name: of the valve.
         stroke_m: travel of 1 p.u.; None where nobody said: the positions in p.u. and in m tell.
         poll_s: how far readings are apart.
+        seen: rows of friction that were seen before, by the clock of the readings.
+        keep: is given each new one.
     """
 
-    def __init__(self, name: str, stroke_m: float | None, poll_s: float) -> None:
+    def __init__(
+        self,
+        name: str,
+        stroke_m: float | None,
+        poll_s: float,
+        *,
+        seen: Iterable[FrictionRow] = (),
+        keep: Callable[[FrictionRow], None] | None = None,
+    ) -> None:
         self.name = name
         self.poll_s = poll_s
         self._stroke_m = stroke_m
         self._memory = FreshnessMemory()
         self._values: Mapping[str, float] = {}
         self._trend = Trend(round(TREND_S / poll_s))
-        self._friction: deque[tuple[float, float, float]] = deque(maxlen=FRICTION_KEPT)
+        self._friction: deque[FrictionRow] = deque(seen, maxlen=FRICTION_KEPT)
+        self._keep = keep
         self._events: deque[SeenEvent] = deque(maxlen=MOST_EVENTS)
         self._lock = Lock()
 
@@ -89,6 +101,8 @@ class ValveView:
                 self._enter(time_s, freshness(memory, time_s))
             if "friction" in values and time_s >= self._friction_due_s:
                 self._friction.append((time_s, values["friction"], values["friction_baseline"]))
+                if self._keep is not None:
+                    self._keep(self._friction[-1])
 
     def lose(self, time_s: float, why: str) -> None:
         """Take it that a request was not answered, and why."""
@@ -112,8 +126,8 @@ class ValveView:
             return self._trend.since(begin_s)
 
     @property
-    def friction(self) -> tuple[tuple[float, float, float], ...]:
-        """Time, s, friction and its baseline, Pa, a row a minute since this began to look."""
+    def friction(self) -> tuple[FrictionRow, ...]:
+        """A row a minute since this began to look, and what was seen before."""
         with self._lock:
             return tuple(self._friction)
 

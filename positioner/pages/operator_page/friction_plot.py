@@ -1,4 +1,4 @@
-"""Friction against its baseline since this page looks: a row a minute, for a month at the most."""
+"""Friction against its baseline since this page looks, and before if it was kept: a row a minute, for a month."""
 
 import time
 from typing import Any

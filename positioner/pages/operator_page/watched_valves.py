@@ -9,9 +9,10 @@ from pathlib import Path
 from config.roles import Role
 from config.tls_table import Tls
 from positioner.dcs import Dcs, DcsError
+from positioner.observer.friction_file import FrictionFile
 from positioner.observer.poller import POLL_S, REPLY_WITHIN_S, Poller
 from positioner.observer.valve_commands import ValveCommands
-from positioner.observer.valve_view import ValvePicture, ValveView
+from positioner.observer.valve_view import FRICTION_KEPT, ValvePicture, ValveView
 
 WRITE_WITHIN_S = 2.0
 
@@ -30,6 +31,8 @@ class Place:
     """Of an observer."""
     tls_of: Mapping[Role, Tls] = field(default_factory=dict)
     """Of those who may write, where the daemon asks for certificates."""
+    keep: Path | None = None
+    """The folder that keeps what the page has seen of friction."""
 
     def connection(self, role: Role) -> Dcs:
         """Return a closed connection for a role.
@@ -50,7 +53,7 @@ class WatchedValve:
 
     def __init__(self, place: Place) -> None:
         self.place = place
-        self.view = ValveView(place.name, place.stroke_m, POLL_S)
+        self.view = _view(place)
         self.commands = ValveCommands(place.connection, self.picture)
         self._poller = Poller(self.view, lambda: place.connection(Role.OBSERVER))
 
@@ -67,12 +70,32 @@ class WatchedValve:
         self._poller.stop()
 
 
+def _view(place: Place) -> ValveView:
+    """Return the view of a valve, with what was kept of its friction; in the file stands the time of day.
+
+    Raises:
+        InputError: it cannot be kept.
+    """
+    if place.keep is None:
+        return ValveView(place.name, place.stroke_m, POLL_S)
+    file = FrictionFile(place.keep, place.name, FRICTION_KEPT)
+    now_s = time.time()  # rows of a clock that ran ahead would keep new ones out
+    off_s = now_s - time.monotonic()
+    return ValveView(
+        place.name,
+        place.stroke_m,
+        POLL_S,
+        seen=[(row[0] - off_s, *row[1:]) for row in file.rows if row[0] <= now_s],
+        keep=lambda row: file.append((row[0] + off_s, *row[1:])),
+    )
+
+
 @contextmanager
 def watching(places: Sequence[Place]) -> Iterator[list[WatchedValve]]:
     """Poll these valves as long as the context lasts.
 
     Raises:
-        InputError: a file of a certificate that is not there or does not fit.
+        InputError: a file of a certificate that is not there or does not fit; friction that cannot be kept.
     """
     for place in places:
         for role in (Role.OBSERVER, *place.tls_of):
