@@ -103,7 +103,7 @@ class ComparePanel:
     def _moved(self) -> None:
         """Draw the new curve; nothing else is worked out while a slider moves."""
         rms_m = self._show_curve()
-        self._time.restyle(self._figure.data(MOVED, MOVING), MOVED_LINES)
+        self._time.move(self._figure.data(MOVED, MOVING), MOVED_LINES)
         self._error.set_text(self._unit.fine(rms_m))
 
     async def _settled(self) -> None:
