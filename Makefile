@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint browser bench campaign soak blind docs clean
+.PHONY: venv demo test suite lint browser bench campaign soak blind journey docs clean
 
 venv: $(READY)
 
@@ -44,6 +44,9 @@ soak: $(READY)          ## ten minutes of a polled, recording daemon: does its m
 
 blind: $(READY)         ## hours, can be broken off: what is missing of the blind campaign, and its tables
 	$(BIN)/python -m benchmarks.blind
+
+journey: $(READY) browser ## minutes: a dropped recording with a hidden effect, the whole library, to the error at the floor, in a browser
+	$(BIN)/python -m benchmarks.workbench_journey
 
 docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner reproduce --out docs/img

@@ -46,17 +46,17 @@ def main() -> None:
         seal(Path(folder, "case"), hide(SEED, duration_s=SLIDER_S, period_s=PERIOD_S))
         case = Path(folder, "case", "fit.csv")
         valve = str(Path(folder, "case", "valve.toml"))
-        with _served(str(case), "--valve", valve) as (address, process, started_s):
+        with served(str(case), "--valve", valve) as (address, process, started_s):
             print(f"start-up: {started_s:.1f} s until the address is printed")
             print(f"server alone: {_resident_mb(process):.0f} MB")
-            with _page(address) as page:
+            with page_at(address) as page:
                 print(f"first visit: {_first_visit_s(page):.1f} s until the curves stand")
                 moves = list(_moved_ms(page))
                 print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}")
                 print(f"server with one tab: {_resident_mb(process):.0f} MB")
         long = Path(folder, "long.csv")
         _repeated(Recording.read(case), LONG_SAMPLES).write(long)
-        with _served(str(long), "--valve", valve) as (address, process, _), _page(address) as page:
+        with served(str(long), "--valve", valve) as (address, process, _), page_at(address) as page:
             print(f"{LONG_SAMPLES} samples, first visit: {_first_visit_s(page):.1f} s")
             whole_s = LONG_SAMPLES * PERIOD_S
             windows = [[0.1 * whole_s + 5.0 * i, 0.1 * whole_s + 5.0 * i + 60.0] for i in range(MOVES)]
@@ -94,7 +94,8 @@ def _repeated(recording: Recording, count: int) -> Recording:
 
 
 @contextmanager
-def _served(*words: str) -> Iterator[tuple[str, "subprocess.Popen[str]", float]]:
+def served(*words: str) -> Iterator[tuple[str, "subprocess.Popen[str]", float]]:
+    """Run the command, and give its address, its process, and how long the address took, s."""
     begin_s = time.monotonic()
     command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
@@ -107,7 +108,8 @@ def _served(*words: str) -> Iterator[tuple[str, "subprocess.Popen[str]", float]]
 
 
 @contextmanager
-def _page(address: str) -> Iterator[Page]:
+def page_at(address: str) -> Iterator[Page]:
+    """Open an address in a browser of its own."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1400, "height": 900})
