@@ -22,6 +22,7 @@ from positioner.cli.main import main
 from positioner.cli.parts.authority import Authority, Owner
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
+from positioner.pages.operator_page.watched_valves import Place, watching
 from tests.children import ended, running
 from tests.cli.test_daemon_process import LAW, until
 
@@ -226,3 +227,19 @@ def test_a_missing_certificate_is_one_line(tmp_path: Path) -> None:
         done = ended(command, tmp_path / name)
         assert (done.status, done.log.count("\n")) == (2, 1), done.log
         assert f"{tmp_path / 'a.pem'}: cannot be read: No such file" in done.log
+
+
+def test_the_operators_page_reads_as_an_observer_and_writes_with_the_certificate_of_the_role(site: Site) -> None:
+    tls_of = {Role.OPERATOR: site.tls("operator"), Role.ENGINEER: site.tls("observer")}
+    place = Place("FV-101", "127.0.0.1", site.port, 1, 0.1016, None, site.tls("observer"), tls_of)
+    with watching([place]) as (valve,):
+        until(lambda: valve.picture().freshness.live, "a live picture")
+        known = len(site.refusals())
+        done = valve.commands.set_reference(Role.OPERATOR, 0.31)
+        assert done.done, done.text
+        until(lambda: valve.picture().value("reference") == pytest.approx(0.31), "the reference")
+        # The page grants what it may; the daemon asks the certificate, and this one is not an engineer's.
+        refused = valve.commands.set_mode(Role.ENGINEER, Mode.HOLD)
+        assert not refused.done
+        assert "illegal function" in refused.text
+        until(lambda: len(site.refusals()) == known + 1, "the line")

@@ -29,6 +29,7 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .said li { margin: 2px 0; }
 .jump { all: unset; vertical-align: top; cursor: pointer; text-align: left; }
 .jump { text-decoration: underline dotted; text-underline-offset: 3px; }
+.nicegui-error-popup { bottom: 5rem !important; }
 .nicegui-row.items-center { align-items: center; }
 .q-notification .q-btn { color: white !important; }
 .blamed { background: rgba(217, 98, 43, 0.25); }
