@@ -24,6 +24,8 @@ SEED = 7
 PERIOD_S = 0.01
 SLIDER_S, LONG_SAMPLES = 60.0, 500_000
 MOVES = 30
+ROUNDS, DRAGS, RELOADS = 3, 5, 5
+"""Of long use."""
 LONGEST_MS = 120_000
 TIME_PLOT = "position, error and pressure over time"
 WATCHED = """name => {
@@ -54,6 +56,7 @@ def main() -> None:
                 moves = list(_moved_ms(page))
                 print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}")
                 print(f"server with one tab: {_resident_mb(process):.0f} MB")
+                _used_for_long(page, process)
         long = Path(folder, "long.csv")
         _repeated(Recording.read(case), LONG_SAMPLES).write(long)
         with served(str(long), "--valve", valve) as (address, process, _), page_at(address) as page:
@@ -79,6 +82,17 @@ def _moved_ms(page: Page) -> Iterator[float]:
         page.mouse.move(middle[0] + 2 * i + 2, middle[1])
         yield float(page.wait_for_function(TOOK).json_value())
     page.mouse.up()
+
+
+def _used_for_long(page: Page, process: "subprocess.Popen[str]") -> None:
+    """Print what the server takes as one works on: an hour's worth of drags, and the page loaded again and again."""
+    for round_ in range(ROUNDS):
+        moves = [each for _ in range(DRAGS) for each in _moved_ms(page)]
+        for _ in range(RELOADS):
+            page.reload()
+            page.locator(".scatterlayer .trace").first.wait_for()
+        used = f"{len(moves)} moves and {RELOADS} visits"
+        print(f"server after {used} more, round {round_ + 1}: {_resident_mb(process):.0f} MB", flush=True)
 
 
 def _panned_ms(page: Page, begin_s: float, end_s: float) -> float:

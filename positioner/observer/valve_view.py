@@ -22,8 +22,16 @@ FRICTION_KEPT = 43_200
 """A month of minutes."""
 MOST_EVENTS = 200
 
-WATCHED = ("mode", "fault", "ne107", "ne107_cause", "experiment_state", "restored", "service")
-"""Codes whose change is an event."""
+WATCHED = {
+    "mode": "mode",
+    "fault": "fault",
+    "ne107": "NE 107",
+    "ne107_cause": "cause of NE 107",
+    "experiment_state": "experiment",
+    "restored": "knowledge from before",
+    "service": "service",
+}
+"""Codes whose change is an event, and what they are called."""
 COUNTED = {"identifications": "an identification was applied", "refusals": "an identification was refused"}
 """Counts whose change is one."""
 
@@ -162,5 +170,5 @@ def _changes(before: Mapping[str, float], after: Mapping[str, float]) -> list[st
     """Return in words what has changed between two readings."""
     both = before.keys() & after.keys()
     codes = [name for name in WATCHED if name in both and before[name] != after[name]]
-    said = [f"{name}: {code_text(name, before[name])} -> {code_text(name, after[name])}" for name in codes]
+    said = [f"{WATCHED[name]}: {code_text(name, before[name])} -> {code_text(name, after[name])}" for name in codes]
     return said + [text for name, text in COUNTED.items() if name in both and before[name] != after[name]]

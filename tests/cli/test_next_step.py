@@ -11,6 +11,7 @@ import pytest
 from positioner.cli import discover, extend
 from positioner.cli.diagnose import add_arguments
 from positioner.cli.parts.next_step import discover_command, extend_commands, not_written
+from workbench.select.diagnosis import Diagnosis
 
 EXPORT = ["--column", "position_m=PV 1:%", "--column", "command_pa=OUT:bar", "--range-pa", "20000", "100000"]
 MORE = ["--stroke-m", "0.04", "--decimal", ",", "--status", "Quality=Good", "--sheet", "Sheet 2"]
@@ -26,7 +27,10 @@ def diagnosed(verdict: str, *steps: tuple[str, ...]) -> Any:
         )
         for names in steps
     ]
-    return SimpleNamespace(verdict=verdict, steps=named, missing=tuple(names[0] for names in steps))
+    found: Any = SimpleNamespace(verdict=verdict, steps=named, missing=tuple(names[0] for names in steps))
+    choices: Any = Diagnosis.choices
+    found.choices = choices.fget(found)
+    return found
 
 
 def asked(*words: str) -> argparse.Namespace:

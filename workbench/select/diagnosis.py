@@ -56,6 +56,20 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         return tuple(each.name for each in self.steps[-1].suspected)
 
     @property
+    def choices(self) -> tuple[tuple[str, ...], ...]:
+        """The sets of effects that may be added: what was found first, then one a rival; none where nothing helps."""
+        added = self.missing
+        if self.verdict not in ("missing", "one_of") or not added:
+            return ()
+        rivals = [
+            (*added[:i], each.name, *added[i + 1 :])
+            for i, step in enumerate(step for step in self.steps if step.added)
+            for each in step.indistinguishable
+            if each.name != added[i]
+        ]
+        return (added, *rivals)
+
+    @property
     def verdict_line(self) -> str:
         """The verdict and its sentence."""
         return verdict_line(self.verdict, self.sentence)

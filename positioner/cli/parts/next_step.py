@@ -21,15 +21,7 @@ def extend_commands(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> li
         diagnosis: with its verdict.
         arguments: of `positioner diagnose`.
     """
-    added = diagnosis.missing
-    if diagnosis.verdict not in ("missing", "one_of") or not added:
-        return []
-    choices = [added]
-    for i, step in enumerate(step for step in diagnosis.steps if step.added):
-        choices += [
-            (*added[:i], each.name, *added[i + 1 :]) for each in step.indistinguishable if each.name != added[i]
-        ]
-    return [extend_command(effects, arguments) for effects in choices]
+    return [extend_command(effects, arguments) for effects in diagnosis.choices]
 
 
 def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str:

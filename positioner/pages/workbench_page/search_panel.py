@@ -182,11 +182,12 @@ class SearchPanel:
             plain = self._desk.plain
             ui.label(plain(first)).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
             ui.label(plain(diagnosis.sentence)).props('data-testid="found-sentence"')
-            if diagnosis.verdict == "missing" and may_add:
-                named = plain(", ".join(diagnosis.missing))
-                ui.button(f"Add {named}", icon="add", on_click=lambda: self._add_found(search)).props(
-                    'no-caps data-testid="add"'
-                )
+            with ui.row():
+                for effects in diagnosis.choices if may_add else ():
+                    named = plain(", ".join(effects))
+                    button = ui.button(f"Add {named}", icon="add")
+                    button.on_click(lambda effects=effects: self._add(search, effects))
+                    button.props('no-caps data-testid="add"')
             if diagnosis.experiment is not None:
                 ui.label(f"An experiment would tell them apart: {diagnosis.experiment.name}.")
             for number, step in enumerate(diagnosis.steps, start=1):
@@ -215,8 +216,11 @@ class SearchPanel:
             table.on("row-click", lambda event: self._extend([event.args[1]["name"]]))
             ui.label("click an effect to add it all the same").classes("quiet")
 
-    async def _add_found(self, search: Search) -> None:
-        """Add what the diagnosis is sure of; nothing is fitted again."""
+    async def _add(self, search: Search, effects: Sequence[str]) -> None:
+        """Add what was found: what is sure is not fitted again, one of several is."""
+        if search.result.verdict != "missing":
+            self._extend(effects)
+            return
         with errors_told():
             extension = await aside(extension_of, search.result, search.valve)
             await aside(self._desk.add, extension)
