@@ -37,11 +37,17 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .jump:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
 h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; }
 *:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
-@media (max-width: 599px) { body.body--dark { --q-primary: #3f92d0 !important; }
-.q-header { background: #1b5e8a !important; align-items: center; }
-.nicegui-code pre { white-space: pre-wrap; }
-.panel { padding: 8px 8px 24px; } }
+@media (max-width: 599px) { .panel { padding: 8px 8px 24px; } }
 """
+HIDDEN_PLOTS = """
+<script>
+addEventListener("unhandledrejection", (event) => {
+  const said = String(event.reason?.message ?? event.reason);
+  if (said.startsWith("Resize must be passed a displayed plot")) event.preventDefault();
+});
+</script>
+"""
+"""A plot that is hidden or taken away is told its new size all the same, and complains; it needs none."""
 DARK_QUERY = 'matchMedia("(prefers-color-scheme: dark)").matches'
 
 
@@ -67,6 +73,7 @@ class Theme:
 
     def __init__(self) -> None:
         ui.add_css(STYLE)
+        ui.add_head_html(HIDDEN_PLOTS)
         ui.colors(primary="#1b5e8a", dark_page="#12161b", dark="#1a2027")
         self._mode = ui.dark_mode(None)
         self._listeners: list[Callable[[], None]] = []
