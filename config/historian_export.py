@@ -78,7 +78,7 @@ def read_export(
     units = {each.name: _unit(path, each, export) for each in sources}
     metadata["imported"] = ", ".join(f"{each.name} from {each.theirs} in {units[each.name]}" for each in sources)
     (clock,) = (each for each in sources if each.name == "time_s")
-    time_s, stamped, local = _time(path, export, clock, units["time_s"], decimal, options)
+    time_s, stamped, local_from_s = _time(path, export, clock, units["time_s"], decimal, options)
     good = _good(path, export, options, metadata)
     values: dict[str, Column] = {}
     for count, source in enumerate(each for each in sources if each.name != "time_s"):
@@ -86,8 +86,10 @@ def read_export(
         raw = _numbers(path, export, source, decimal, metadata)
         si = _in_si(raw, source, units[source.name], stroke_m, range_pa)
         values[source.name] = np.where(good, si, np.nan)
-    daily = local and not has_date(options.time_format)
-    time_s, rows, said = in_order(path, time_s, list(values.values()), export.lines, local=local, daily=daily)
+    daily = local_from_s is not None and not has_date(options.time_format)
+    time_s, rows, said = in_order(
+        path, time_s, list(values.values()), export.lines, local_from_s=local_from_s, daily=daily
+    )
     columns = {"time_s": time_s - time_s[0] if stamped else time_s} | {
         name: column[rows] for name, column in values.items()
     }
@@ -294,8 +296,8 @@ def _numbers(path: Path, export: _Export, source: Source, decimal: str, metadata
 
 def _time(
     path: Path, export: _Export, source: Source, unit: str, decimal: str, options: ExportOptions
-) -> tuple[Column, bool, bool]:
-    """Return the time, s, of each row, without a footer's, whether it is from stamps, and whether local."""
+) -> tuple[Column, bool, float | None]:
+    """Return the time, s, of each row, without a footer's, whether it is from stamps, and where local ones begin."""
     cells = export.cells[source.theirs]
     while cells and not begins_number(cells[-1]) and len(export.lines) - len(cells) < FOOTER:
         if len(cells) == 1 or not _number_above(cells):
@@ -306,8 +308,8 @@ def _time(
     stamped = unit == "iso" or options.time_format is not None or (isinstance(first, str) and not is_numeral(first))
     if stamped and all(isinstance(cell, str) for cell in cells):
         texts = [str(cell) for cell in cells]
-        seconds, local = seconds_of(path, texts, export.lines, options.time_format)
-        return seconds, True, local
+        seconds, local_from_s = seconds_of(path, texts, export.lines, options.time_format)
+        return seconds, True, local_from_s
     seconds = np.array([cell if isinstance(cell, float) else _second(cell, decimal) for cell in cells])
     if np.isnan(seconds).any():
         row = int(np.isnan(seconds).argmax())
@@ -315,7 +317,7 @@ def _time(
             str(path),
             f"sample {row + 1} (line {export.lines[row]}): {cells[row]!r} is neither seconds nor an ISO time stamp",
         )
-    return seconds * UNITS["_s"][unit], False, False
+    return seconds * UNITS["_s"][unit], False, None
 
 
 def _number_above(cells: Sequence[Cell]) -> bool:

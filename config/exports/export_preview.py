@@ -22,8 +22,9 @@ FIRST = 3
 WIDEST = 24
 COMMON = {
     "time_s": r"time|zeit|stamp|date|datum|^ts?$|uhr",
-    "position_m": r"position|^pos|travel|stroke|hub|lift|stem|\bpv\b|ist|zt|feedback|^x$|_pv$|\.pv$|rückm",
-    "command_pa": r"command|^cmd|\bout\b|\bop\b|\bmv\b|output|stell|signal|demand|^u$|drive|pressure|druck|soll|\bsp\b",
+    "position_m": r"position|^pos|_pos$|travel|stroke|hub|lift|stem|\bpv\b|ist|zt|feedback|^x$|_pv$|\.pv$|rückm",
+    "command_pa": r"command|^cmd|_cmd$|\bout\b|\bop\b|\bmv\b|output|stell|signal|demand|^u$|drive|pressure|druck|soll|"
+    r"\bsp\b",
 }
 """What columns are called, by ours."""
 STAMP = r"\d{4}-\d\d-\d\d"
@@ -165,7 +166,9 @@ def _most_are(cells: Sequence[Cell], pattern: str) -> bool:
 
 
 def _looks_like(ours: str, column: ColumnPreview) -> bool:
-    if not re.search(COMMON[ours], column.name, re.IGNORECASE) or _STATUS.search(column.name):
+    # Of a structure's field, log.t, the field's own name counts as well.
+    names = (column.name, column.name.rpartition(".")[2])
+    if not any(re.search(COMMON[ours], each, re.IGNORECASE) for each in names) or _STATUS.search(column.name):
         return False
     if ours == "time_s":
         return any(begins_number(cell) and cell != "" for cell in column.cells)

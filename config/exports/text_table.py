@@ -15,6 +15,10 @@ from config.exports.raw_table import Cell, RawTable
 from config.plain_file import MOST_COLUMNS
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma"}
+ANNOTATIONS = ("#group", "#datatype", "#default")
+"""Lines in which InfluxDB says what the columns of a CSV file are, before the one that names them."""
+LONG = frozenset({"_time", "_value", "_field"})
+TURNED = '|> pivot(rowKey: ["_time"], columnKey: ["_field"], valueColumn: "_value")'
 MARKS = {
     b"\xef\xbb\xbf": "utf-8-sig",
     b"\xff\xfe\x00\x00": "utf-32",
@@ -34,6 +38,7 @@ def text_tables(path: Path) -> list[RawTable]:
     text, encoding = decoded(path)
     if not text.strip():
         raise InputError(str(path), "holds no samples: it is empty")
+    text = _without_annotations(path, text)
     notes = () if encoding.startswith("utf-8") else (("encoding", encoding),)
     ended = text.endswith(("\n", "\r"))
     length = text.count("\n") or text.count("\r")
@@ -50,6 +55,21 @@ def text_tables(path: Path) -> list[RawTable]:
         )
         for each in found
     ]
+
+
+def _without_annotations(path: Path, text: str) -> str:
+    """Return an annotated CSV file of InfluxDB with its annotations empty; the numbers of lines stay.
+
+    Raises:
+        InputError: it has a row for each value of each field, in place of a column for each field.
+    """
+    if not text.startswith(ANNOTATIONS):
+        return text
+    lines = text.splitlines(keepends=True)
+    named = next((each for each in lines if not each.startswith(ANNOTATIONS)), "")
+    if set(named.strip().split(",")) >= LONG:
+        raise InputError(str(path), f"is InfluxDB's, with a row a value: let the query end in {TURNED}")
+    return "".join("\n" if each.startswith(ANNOTATIONS) else each for each in lines)
 
 
 def decoded(path: Path) -> tuple[str, str]:

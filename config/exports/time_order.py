@@ -5,7 +5,7 @@ What can be told is put right and told; what cannot is refused:
 - most steps go back: the file is newest first, and is turned round;
 - times of day without a date that fall by more than half a day: midnight;
 - local times that fall by an hour less a sample, once: the clock went back at the end of summer time, and the hour
-  stands twice; from there on an hour is added;
+  stands twice; from there on an hour is added; by less than an hour, in a night to a Sunday: the same, and a pause;
 - rows that are the same in time and all values: kept once;
 - rows out of order that fall into place: sorted. They do when no two then lie closer than half of what rows in order
   do;
@@ -15,6 +15,7 @@ What can be told is put right and told; what cannot is refused:
 """
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.intp]
 HOUR_S = 3600.0
 DAY_S = 86400.0
+SUNDAY, CHANGED_BEFORE_H = 6, 4
+"""Clocks are set back on a Sunday, before this hour of theirs."""
 SHUFFLED = 0.3
 """Share of steps back from which on rows are in no order at all."""
 SET_BACK_TOLERATED = 0.01
@@ -33,7 +36,7 @@ SET_BACK_TOLERATED = 0.01
 
 
 def in_order(
-    path: Path, time_s: Array, values: Sequence[Array], lines: Sequence[int], *, local: bool, daily: bool
+    path: Path, time_s: Array, values: Sequence[Array], lines: Sequence[int], *, local_from_s: float | None, daily: bool
 ) -> tuple[Array, Rows, dict[str, str]]:
     """Return the time of the rows that are kept, which rows these are, and what was done, by key.
 
@@ -42,7 +45,8 @@ def in_order(
         time_s: (n,), as read.
         values: columns of n, NaN where missing.
         lines: (n,), where each row stands in the file.
-        local: whether the times are local ones, which a clock change repeats.
+        local_from_s: the first, s from 1970 as the clock shows it, of local times, which a clock change repeats; None:
+            they are not.
         daily: whether they are times of day.
 
     Raises:
@@ -57,8 +61,8 @@ def in_order(
     t = time_s[rows]
     if daily:
         t = _over_midnight(t, said)
-    elif local:
-        t = _over_the_hour_twice(t, said)
+    elif local_from_s is not None:
+        t = _over_the_hour_twice(t, local_from_s - time_s[0], said)
     once = _first_of_repeated(t, values, rows)
     if dropped := int((~once).sum()):
         said["repeated rows"] = f"{dropped} left out"
@@ -75,8 +79,8 @@ def _over_midnight(t: Array, said: dict[str, str]) -> Array:
     return t + DAY_S * days
 
 
-def _over_the_hour_twice(t: Array, said: dict[str, str]) -> Array:
-    """Return local times with an hour more from where, once, the clock went back by one."""
+def _over_the_hour_twice(t: Array, begin_s: float, said: dict[str, str]) -> Array:
+    """Return local times, from `begin_s` on the clock, with an hour more from where, once, it went back by one."""
     steps = np.diff(t)
     back = np.flatnonzero(steps < 0)
     forward = steps[steps > 0]
@@ -84,7 +88,9 @@ def _over_the_hour_twice(t: Array, said: dict[str, str]) -> Array:
         return t
     at = int(back[0])
     rest_s = steps[at] + HOUR_S
-    if not 0 <= rest_s <= 3.0 * float(np.median(forward)):
+    begun = datetime.fromtimestamp(begin_s + t[at], UTC)
+    at_night = begun.weekday() == SUNDAY and begun.hour < CHANGED_BEFORE_H
+    if rest_s < 0 or (rest_s > 3.0 * float(np.median(forward)) and not at_night):
         return t
     said["clock change"] = f"the end of summer time: from sample {at + 2} on an hour is added"
     return t + HOUR_S * (np.arange(len(t)) > at)

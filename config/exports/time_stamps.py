@@ -53,8 +53,10 @@ def has_date(time_format: str | None) -> bool:
     return time_format is None or re.search("%[djyYcxGs]", time_format) is not None
 
 
-def seconds_of(path: Path, texts: Sequence[str], lines: Sequence[int], time_format: str | None) -> tuple[Array, bool]:
-    """Return the seconds, (n,), from the first of n stamps, and whether these are local times.
+def seconds_of(
+    path: Path, texts: Sequence[str], lines: Sequence[int], time_format: str | None
+) -> tuple[Array, float | None]:
+    """Return the seconds, (n,), from the first of n stamps, and where these are local times, the first from 1970, s.
 
     Raises:
         InputError: a stamp that cannot be read; names it and its line and what would read it.
@@ -67,7 +69,7 @@ def seconds_of(path: Path, texts: Sequence[str], lines: Sequence[int], time_form
             raise _unreadable(path, texts, row, lines[row], time_format)
         naive = naive or stamp.tzinfo is None
         stamps[row] = (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
-    return stamps - stamps[0], naive
+    return stamps - stamps[0], float(stamps[0]) if naive else None
 
 
 def _stamp(text: str, time_format: str | None) -> datetime | None:

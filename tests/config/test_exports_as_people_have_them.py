@@ -15,6 +15,7 @@ import pytest
 
 from config.errors import InputError
 from config.exports.column_mapping import ExportOptions, Status, read_mapping
+from config.exports.export_preview import preview
 from config.historian_export import PLAIN, read_export
 from config.recording import Recording
 
@@ -219,6 +220,18 @@ READ = {
     "the repeated hour, newest first": Good(
         text(shuffled(rows(time=REPEATED), list(range(N))[::-1])), said="clock change"
     ),
+    "annotations of InfluxDB, a column a field": Good(
+        text(
+            [
+                "#group,false,false,true,true,false",
+                "#datatype,string,long,dateTime:RFC3339,double,double",
+                "#default,_result,,,,",
+                ",result,table,_time,PV,OUT",
+                *(f",,0,{stamp}Z,{x:.2f},{u:.3f}" for stamp, x, u in zip(ISO, PV, OUT, strict=True)),
+            ]
+        ),
+        ("time_s=_time", "position_m=PV:%", "command_pa=OUT:bar"),
+    ),
     "a header again in the middle": Good(text([*rows()[:30], rows()[0], *rows()[30:]]), said="header lines again: 1"),
     "averages under it": Good(
         text([*rows(), "Average,50.00,0.600", "Maximum,71.37,0.800"]), said="rows without a time at the end"
@@ -345,6 +358,18 @@ REFUSED = {
         text(rows(time=day(datetime.datetime(2026, 1, 31, 12), "%d/%m/%Y %H:%M:%S.%f"))),
         'is not as --time-format .* says; it can be read with --time-format "%d/%m/%Y',
         options=ExportOptions(time_format=GERMAN),
+    ),
+    "InfluxDB with a row a value": Bad(
+        text(
+            [
+                "#group,false,false,false,false,true",
+                "#datatype,string,long,dateTime:RFC3339,double,string",
+                "#default,_result,,,,",
+                ",result,table,_time,_value,_field",
+                *(f",,0,{stamp}Z,{x:.2f},PV" for stamp, x in zip(ISO, PV, strict=True)),
+            ]
+        ),
+        r'with a row a value: let the query end in .> pivot.rowKey: ."_time".',
     ),
     "a word for a time": Bad(
         text(rows(time=["now", *(f"{t:.1f}" for t in T[1:])])),
@@ -545,6 +570,27 @@ def test_few_rows_are_read(count: int, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(text(rows(time=ISO)[: count + 1]))
     assert len(read_export(path, read_mapping(WORDS), STROKE_M)) == count
+
+
+@pytest.mark.parametrize("pause_s", [600, 3000])
+def test_the_end_of_summer_time_in_a_pause_does_not_turn_the_rows_round(pause_s: int, tmp_path: Path) -> None:
+    clock = [
+        (AUTUMN + datetime.timedelta(seconds=0.5 * i + (pause_s - 3600 if i >= 30 else 0))).isoformat(sep=" ")
+        for i in range(N)
+    ]
+    (tmp_path / "export.csv").write_bytes(text(rows(time=clock)))
+    recording = read_export(tmp_path / "export.csv", read_mapping(WORDS), STROKE_M)
+    np.testing.assert_allclose(recording.time_s, T + np.where(np.arange(N) >= 30, pause_s, 0.0))
+    np.testing.assert_allclose(recording.position_m, STROKE_M * PV / 100)
+    assert "from sample 31 on an hour is added" in recording.metadata["clock change"]
+
+
+def test_the_fields_of_a_structure_are_proposed_by_their_own_names(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"logsout": {"t": T, "p_cmd": OUT, "pos": PV}})
+    words = [word for word in preview(tmp_path / "a.mat").words if "=" in word]
+    assert words == ["time_s=logsout.t", "position_m=logsout.pos:%", "command_pa=logsout.p_cmd:%"]
 
 
 def test_rows_of_one_time_and_a_step_back_are_refused(tmp_path: Path) -> None:
