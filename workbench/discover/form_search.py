@@ -74,8 +74,12 @@ class FormSearch:
 
     def run(self, base: EvaluatedModel, on_proposal: Callable[[tuple[str, ...]], None]) -> SearchedForms:
         """Rank and fit the forms, the likeliest first, until one explains all."""
-        self.tell("ranking the forms", 0.0)
-        order = proposed(base.fit, self.split, self.forms, self.effects, self.workers)
+
+        def ranking(done: float) -> None:
+            self.tell("ranking the forms", done)
+
+        ranking(0.0)
+        order = proposed(base.fit, self.split, self.forms, self.effects, self.workers, ranking)
         on_proposal(tuple(self.forms[each.name].name for each in order))
         models: dict[str, EvaluatedModel | str] = {}
         here = _Tried(judged_step(base, models, 1, self.effects), dict(self.forms), dict(self.effects))

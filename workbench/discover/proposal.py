@@ -13,7 +13,7 @@ At every strength c, with every value of a shape's own parameters from which a f
 Forms are taken by turns of the two; the fit of each begins at the best point of either.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, zip_longest
 
@@ -55,7 +55,12 @@ class Proposal:
 
 
 def proposed(
-    base: Fit, split: Split, forms: Mapping[str, Form], effects: Mapping[str, Effect], workers: int | None = None
+    base: Fit,
+    split: Split,
+    forms: Mapping[str, Form],
+    effects: Mapping[str, Effect],
+    workers: int | None = None,
+    tell: Callable[[float], None] = lambda _: None,
 ) -> tuple[Proposal, ...]:
     """Return the forms with where to begin, the likeliest first.
 
@@ -65,10 +70,16 @@ def proposed(
         forms: by the names of their files.
         effects: the same as effects.
         workers: threads, by default one a core.
+        tell: called with the fraction done.
     """
     tangents = _Tangents(base, split)
     names = tuple(effects)
-    scores = dict(zip(names, on_threads(lambda name: tangents.scores(effects[name]), names, workers), strict=True))
+    scores: dict[str, list[float]] = {}
+    for name, found_here in zip(
+        names, on_threads(lambda name: tangents.scores(effects[name]), names, workers), strict=True
+    ):
+        scores[name] = found_here
+        tell(len(scores) / len(names))
     points = {name: effects[name].strengths(base.valve.valve)[:MOST_GRID] for name in names}
     by_tangent = sorted(names, key=lambda name: -max(scores[name]))
     found = landings(base, split)
