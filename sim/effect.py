@@ -310,7 +310,9 @@ def allowed_folders() -> list[Path]:
 
 @cache
 def _say_aloud(path: Path, source: str) -> None:
-    log.warning("%s names an effect by its path: %s is run as a program", source, path)
+    here = Path.cwd()
+    shown = path.relative_to(here) if path.is_relative_to(here) else path
+    log.warning("%s names an effect by its path: %s is run as a program", source, shown)
 
 
 def read_effect(path: Path) -> Effect:
