@@ -210,3 +210,10 @@ def test_recordings_one_after_another_begin_anew_and_keep_what_all_have() -> Non
 def test_too_little_to_hold_some_out_is_said() -> None:
     with pytest.raises(InputError, match="33 samples held out are too few"):
         split([moving(100)])
+
+
+def test_what_the_arithmetic_leaves_has_no_structure() -> None:
+    record = ready(moving())
+    left_m = 1e-4 * NOISE_M * np.sin(1.3 * record.time_s)
+    assert structure(record, left_m) > STRUCTURED
+    assert structure(record, left_m, 0.1 * NOISE_M) < STRUCTURED

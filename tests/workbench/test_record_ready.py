@@ -173,3 +173,11 @@ def test_a_motion_that_no_command_of_the_record_began_is_not_judged() -> None:
     assert ready(Recording(later)).segments == ((0, 1000 - first),), "what begins at rest is judged from there"
     known = dict(recording.columns) | {"pressure_pa": recording.columns["command_pa"]}
     assert ready(Recording(known)).segments[0][0] == 0, "its cause is measured"
+
+
+def test_a_recording_without_noise_is_judged_as_finely_as_a_model_is_simulated() -> None:
+    columns = plain()
+    columns["position_m"] = np.repeat(np.append([0.02, 0.08], np.random.default_rng(4).uniform(0.02, 0.08, 38)), 25)
+    record = ready(Recording(columns))
+    assert record.noise_m == pytest.approx(6e-7)
+    assert any("hardly has noise" in each and "--noise-m" in each for each in record.notes)

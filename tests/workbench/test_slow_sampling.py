@@ -23,7 +23,7 @@ EVERY, COUNT = 5, 400
 Capture = pytest.CaptureFixture[str]
 
 
-def seen(every: int = EVERY, *, seed: int = 1, from_row: int = 0) -> Recording:
+def seen(every: int = EVERY, *, seed: int = 1, from_row: int = 0, noise_m: float = NOISE_M) -> Recording:
     """Steps of the command in open loop, seen at 1 s; `from_row` leaves out how it begins."""
     generator = np.random.default_rng(seed)
     valve = SEED.valve
@@ -32,7 +32,7 @@ def seen(every: int = EVERY, *, seed: int = 1, from_row: int = 0) -> Recording:
     command_pa: Column = np.concatenate([np.full(EVERY, middle_pa), np.repeat(levels_pa, every)])[:COUNT]
     composition = Composition.from_file(ASYMMETRIC)
     response = respond(composition, composition.theta, command_pa[:-1], 1.0, step_s=0.05)
-    position_m = response.indicated_m + NOISE_M * generator.standard_normal(COUNT)
+    position_m = response.indicated_m + noise_m * generator.standard_normal(COUNT)
     time_s: Column = np.arange(float(COUNT))
     rows = slice(from_row, None)
     return Recording({"time_s": time_s[rows], "command_pa": command_pa[rows], "position_m": position_m[rows]})
@@ -66,6 +66,13 @@ def test_a_record_that_begins_with_a_step_is_judged_from_where_the_stem_rests(nu
     compared = compare(recording, ASYMMETRIC)
     assert compared.adequate, compared.sentences
     assert any("about to move: simulated and judged from sample 2 on" in each for each in compared.notes)
+
+
+def test_a_recording_without_noise_has_a_verdict(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "exact.csv"
+    write_recording(path, seen(noise_m=0.0))
+    assert main(["diagnose", str(path), "--valve", "seed", "--effects", "asymmetric_friction"]) == 1
+    assert "missing: asymmetric_friction" in capsys.readouterr().out
 
 
 def test_where_nothing_rests_the_noise_is_unknown_and_nothing_is_judged(capsys: Capture, tmp_path: Path) -> None:

@@ -35,6 +35,8 @@ LIKELY_SPIKE = 8.0
 """Times the least scatter that a spike stands off at least."""
 UNSEEN = 1e-3
 """Of what the stem sweeps: where the noise is unknown, what differs by less counts as none."""
+FINEST = 1e-5
+"""Of what the stem sweeps: a free run is off by so much (`FINE`, 1 um), and nothing is judged more finely than that."""
 LATEST_REST = 1.0 / 3.0
 """Of a segment that begins in motion: by then it must have come to rest, or is simulated from where it begins."""
 MOST_WORK, SLIP_ROWS = 1_000_000, 20
@@ -118,9 +120,16 @@ def ready(recording: Recording) -> Record:
     longest = slice(*max(segments, key=lambda each: each[1] - each[0]))
     repeated_m = repeatability_m(command_pa[longest], seen_m[longest]) if _is_even(time_s[longest]) else None
     quantum = quantum_m(position_m[valid])
+    finest_m = FINEST * float(np.ptp(position_m[valid]))
     noise_m = said_noise_m(recording)
     if noise_m is None:
         noise_m = not_repeating_m(noise_std_m(seen_m[longest], command_pa[longest]), repeated_m, quantum)
+    if noise_m is not None and noise_m < finest_m:
+        notes.append(
+            f"position_m hardly has noise: it is judged to {finest_m:.2g} m, as finely as a model is simulated; if "
+            "something holds small changes back, a dead band or a historian's compression, say how much, --noise-m M"
+        )
+        noise_m = finest_m
     if quantum:
         notes.append(f"position_m is rounded to {quantum:.3g} m")
     if noise_m is None and repeated_m is None:

@@ -104,7 +104,9 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         test_block_m=float(np.exp(np.median(logs))),
         logs=logs,
         all_logs=np.concatenate([fitted_logs, logs]),
-        structure=max(structure(train.record, fitted_m), structure(test.record, held_out_m)),
+        structure=max(
+            structure(train.record, fitted_m, negligible_m), structure(test.record, held_out_m, negligible_m)
+        ),
         independent_share=independent_share(fitted_m),
         knife_edges=(),
         test_rest_rmse_m=test_rmse_m,

@@ -1,7 +1,8 @@
 """How much of a residual hangs on the state: a meter of what is unexplained. It never names a cause.
 
     e ~ (x, v, d, u, du/dt, t), their squares and products;   d direction of the last motion
-    R^2 = 1 - sum (e - e_hat)^2 / sum (e - mean)^2            e_hat from ridge regression on the other four fifths
+    R^2 = (sum (e - mean)^2 - sum (e - e_hat)^2) / sum ((e - mean)^2 + n^2)
+                                                     e_hat from ridge regression on the other four fifths, n negligible
 
 The fifths are whole stretches of time. The residual is clipped at 5 of its robust deviations, so that one missed slip
 is not the whole of it. On noise R^2 is 0 or less.
@@ -27,8 +28,11 @@ FEWEST = 100
 Matrix = npt.NDArray[np.float64]
 
 
-def structure(record: Record, residual_m: Column) -> float:
-    """Return the cross-validated R^2 of a residual, m, (n,), NaN where it does not count; 0 of under 100 samples."""
+def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> float:
+    """Return the cross-validated R^2 of a residual, m, (n,), NaN where it does not count; 0 of under 100 samples.
+
+    What is far below the negligible, m, has none: of a recording without noise what is left is the arithmetic's.
+    """
     rows = np.flatnonzero(np.isfinite(residual_m))
     if rows.size < FEWEST:
         return 0.0
@@ -42,8 +46,8 @@ def structure(record: Record, residual_m: Column) -> float:
         mean = error[others].mean()
         left[here] = error[here] - mean - matrix[here] @ _ridge(matrix[others], error[others] - mean)
         spread[here] = error[here] - mean
-    total = float(np.sum(spread**2))
-    return 1.0 - float(np.sum(left**2)) / total if total > 0.0 else 0.0
+    total = float(np.sum(spread**2)) + rows.size * negligible_m**2
+    return float(np.sum(spread**2) - np.sum(left**2)) / total if total > 0.0 else 0.0
 
 
 def clipped(error_m: Column) -> Column:
