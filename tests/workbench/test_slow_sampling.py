@@ -72,7 +72,9 @@ def test_a_recording_without_noise_has_a_verdict(tmp_path: Path, capsys: Capture
     path = tmp_path / "exact.csv"
     write_recording(path, seen(noise_m=0.0))
     assert main(["diagnose", str(path), "--valve", "seed", "--effects", "asymmetric_friction"]) == 1
-    assert "missing: asymmetric_friction" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "missing: asymmetric_friction" in said
+    assert "recording: position_m hardly has noise" in said
 
 
 def test_where_nothing_rests_the_noise_is_unknown_and_nothing_is_judged(capsys: Capture, tmp_path: Path) -> None:

@@ -14,8 +14,9 @@ from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import find_effect, tried_effects
+from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
-from workbench.data.noise_floor import told_mm
+from workbench.data.noise_floor import UNKNOWN, told_mm
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
@@ -79,6 +80,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         said: list[Block] = [self.verdict_line]
         if self.best.fit.by.slow:
             said.append(self.best.fit.by.sentence)
+        noted = dict.fromkeys(note for each in (self.split.train, self.split.test) for note in each.record.notes)
+        said += [f"recording: {note}" for note in shortened([note for note in noted if note != UNKNOWN])]
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         if self.positioner:
             said.append(self.positioner.sentence)
