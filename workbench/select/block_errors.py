@@ -24,11 +24,13 @@ from workbench.select.knife_edges import KnifeEdge, knife_edges, rms_without
 from workbench.select.residual_structure import clipped, structure
 
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
-AT_FLOOR, RARELY_OFF = 1.4, 1.75
+AT_FLOOR, RARELY_OFF = 1.6, 1.75
 """A model reaches the floor if its block error, and its plain error fitted and held out, are within these of it.
 
-1.4: friction that is smooth where the model's is not leaves some 1.3 times the noise, which is known to 20 %.
+1.6: friction that is smooth where the model's is not (LuGre's) leaves 1.5 times the noise.
 """
+NOISE_KNOWN_TO = 1.2
+"""A factor: what leaves no more than so many floors leaves nothing that can be told from them."""
 NOTHING_LEFT = 1.1
 """The same, where no other effect need be sought: one that adds half the floor to it, in squares, leaves 1.12."""
 MOST_LEFT = 0.1
@@ -76,6 +78,10 @@ class BlockErrors(Brief):
             return False
         mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
         return mostly and max(self.train_rmse_m, self.test_rest_rmse_m) <= RARELY_OFF * floor_m
+
+    def floors_left(self, floor_m: float) -> float:
+        """Return a typical second's error, fitted or held out, whichever is more, in floors."""
+        return max(self.train_block_m, self.test_block_m) / floor_m
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""

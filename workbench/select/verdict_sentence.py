@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
-from workbench.select.block_errors import BlockErrors
+from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.verdict import Verdict
@@ -40,7 +40,7 @@ def verdict_sentence(
         return said + knife_edges_sentence(best.errors) + _suspicion(steps[0].suspected) + _scatter(parts)
     if verdict == "missing":
         suspicion = _suspicion(steps[-1].suspected) if steps[-1].added is None else ""
-        said = f"Missing: {names}; {fell}, and nothing is left to explain."
+        said = f"Missing: {names}; {fell}, and {_left(best.errors, parts)}."
         return said + knife_edges_sentence(best.errors) + suspicion
     if verdict == "one_of":
         rivals = (tuple(each.name for each in step.indistinguishable) for step in steps)
@@ -52,6 +52,14 @@ def verdict_sentence(
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
     return _unproved(verdict, steps, library) + begun
+
+
+def _left(errors: BlockErrors, parts: Split) -> str:
+    """Say what an explained record leaves."""
+    floors = errors.floors_left(parts.floor_m) if parts.floor_m else 1.0
+    if floors <= NOISE_KNOWN_TO:
+        return "nothing is left to explain"
+    return f"what is left, {floors:.2g} floors, no other effect here explains"
 
 
 def _unproved(verdict: Verdict, steps: Sequence[EffectStep], library: Mapping[str, Effect]) -> str:
