@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint browser bench campaign soak blind journey docs clean
+.PHONY: venv demo test suite lint browser bench campaign fuzz kills soak blind journey docs clean
 
 venv: $(READY)
 
@@ -38,6 +38,13 @@ bench: $(READY)         ## figures that depend on the machine, as ratios in one 
 
 campaign: $(READY)      ## every fault in every state on each bus: some twenty minutes, prints the table
 	$(BIN)/python -m benchmarks.campaign --document docs/reliability.md
+
+fuzz: $(READY)          ## every parser on ten million inputs, guided by coverage: some hours, prints the table
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	$(BIN)/python -m benchmarks.fuzz --inputs 10000000
+
+kills: $(READY)         ## kill -9 at random instants, 300 times: some twenty minutes, prints the table
+	$(BIN)/python -m benchmarks.kills --times 300
 
 soak: $(READY)          ## ten minutes of a polled, recording daemon: does its memory stay flat?
 	$(BIN)/python -m benchmarks.memory --minutes 10

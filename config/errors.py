@@ -1,4 +1,19 @@
-"""Errors for people: each is a single line."""
+"""Errors for people: each is a single line, of bounded length, whatever it quotes of a file or a library."""
+
+LONGEST = 2000
+"""Characters of a problem; what stands in its middle beyond that is left out."""
+
+
+def one_line(text: str) -> str:
+    """Return a text as one line: what would break it is a blank, what cannot be printed is escaped.
+
+    >>> one_line("two\\nlines, a bell\\a and \\x1b")
+    'two lines, a bell\\\\x07 and \\\\x1b'
+    """
+    if not text.isprintable():
+        said = " ".join(text.splitlines())
+        text = "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in said)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} .. {text[-LONGEST // 2 :]}"
 
 
 class InputError(Exception):
@@ -8,9 +23,9 @@ class InputError(Exception):
     """
 
     def __init__(self, source: str, problem: str) -> None:
-        super().__init__(f"{source}: {problem}")
-        self.source = source
-        self.problem = problem
+        self.source = one_line(source)
+        self.problem = one_line(problem)
+        super().__init__(f"{self.source}: {self.problem}")
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[str, str]]:
         """Pass between processes, as what a worker could not do is told by another."""

@@ -302,7 +302,7 @@ def _rows(path: Path, reader: Iterator[list[str]], names: list[str], header_line
 
 def _is_number(cell: str) -> bool:
     try:
-        float(cell.strip() or "nan")
+        float(cell if cell.strip() else "nan")  # `strip` takes away signs that `float` does not pass over
     except ValueError:
         return False
     return True

@@ -17,7 +17,8 @@ Each also carries which end sent it, the number of the last frame sent to that e
 Nothing is lost between ends that read: a sender waits for the end that has `WINDOW` frames it has not taken, and that
 many from every other end fit into the receive buffer that Linux grants by default. An end that does not read for
 `DEAF_S` is left out until it speaks again, so that a stopped process does not hold up the bus; what it missed it counts
-and logs. What is not a datagram of this bus, or comes from elsewhere, is dropped. Classical CAN only.
+and logs. What is not a datagram of this bus, or was not sent from the port of the end that it names, is dropped: who
+is not an end can say nothing for one. Classical CAN only.
 """
 
 import errno
@@ -66,12 +67,11 @@ ID_BITS = ERROR - 1
 class _Peer:
     """Another end: what went to it and came from it."""
 
-    __slots__ = ("acked", "deaf", "filters", "line", "port", "received", "sent", "told", "wanted")
+    __slots__ = ("acked", "address", "deaf", "filters", "port", "received", "sent", "told", "wanted")
 
     def __init__(self, port: int) -> None:
         self.port = port
-        self.line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.line.connect((HOST, port))
+        self.address = (HOST, port)
         self.sent = self.acked = self.received = self.told = 0
         self.deaf = False
         self.filters: tuple[tuple[int, int], ...] = ()
@@ -156,8 +156,6 @@ class LoopbackBus(can.BusABC):
                     self._tell(peer, BYE)
         super().shutdown()
         self._socket.close()
-        for peer in self._peers.values():
-            peer.line.close()
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """Return the next frame, None after the time-out: as python-can's own, without its detours.
@@ -215,13 +213,7 @@ class LoopbackBus(can.BusABC):
 
     def _put(self, peer: _Peer, datagram: bytes) -> None:
         try:
-            peer.line.send(datagram)
-        except ConnectionRefusedError:  # of an earlier datagram: the end was killed, and perhaps is there anew
-            if not _taken(peer.port):
-                self._forget(peer)
-                return
-            with suppress(OSError):
-                peer.line.send(datagram)
+            self._socket.sendto(datagram, peer.address)
         except OSError as error:
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}") from None
 
@@ -248,14 +240,16 @@ class LoopbackBus(can.BusABC):
             if wait_s:
                 self._await(wait_s)
         try:
-            datagram = self._socket.recv(LONGEST + 1, flags)
+            datagram, sender = self._socket.recvfrom(LONGEST + 1, flags)
         except BlockingIOError:
             return False
         except OSError as error:
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}") from None
         if HEAD.size <= len(datagram) <= LONGEST:
             magic, kind, end, number, taken = HEAD.unpack_from(datagram)
-            if end == self._end:
+            if sender != (HOST, self._base + end):
+                pass
+            elif end == self._end:
                 if magic == MAGIC and kind == WAKE and number == self._wakes:
                     self._woken.set()
             elif magic == MAGIC and end < ENDS:
@@ -285,7 +279,6 @@ class LoopbackBus(can.BusABC):
 
     def _forget(self, gone: _Peer) -> None:
         self._peers = {port: peer for port, peer in self._peers.items() if peer is not gone}
-        gone.line.close()
 
     def _receive(self, peer: _Peer, number: int, datagram: bytes) -> None:
         missed = number - peer.received - 1
@@ -312,9 +305,12 @@ class LoopbackBus(can.BusABC):
         )
 
     def _has_room(self, peer: _Peer) -> bool:
-        """Wait until an end has taken some of what it got; return whether it did."""
+        """Wait until an end has taken some of what it got; return whether it did. One that was killed is forgotten."""
         end_s = time.monotonic() + DEAF_S
         port = peer.port
+        if not _taken(port):
+            self._forget(peer)
+            return False
         while True:
             self._take_all()
             if peer.sent - peer.acked < WINDOW:

@@ -9,11 +9,13 @@ A server reads its files anew when they change: certificates are replaced, and r
 ends with its certificate, and when that is revoked. Of files that do not fit the log tells, and those before stay.
 """
 
+import errno
 import logging
 import math
 import re
 import socket
 import ssl
+import stat
 import struct
 import time
 from collections.abc import Callable
@@ -172,7 +174,22 @@ class Guard:
 
 
 def identity_in(certificate: bytes) -> Identity:
-    """Return who a certificate (DER) says its owner is."""
+    """Return who a certificate (DER) says its owner is.
+
+    Raises:
+        ConnectionAbortedError: it cannot be read, though an authority has signed it.
+    """
+    from cryptography import x509
+    from cryptography.exceptions import UnsupportedAlgorithm
+
+    unreadable = (ValueError, UnsupportedAlgorithm, x509.InvalidVersion, x509.DuplicateExtension)
+    try:
+        return _identity_in(certificate)
+    except (*unreadable, x509.UnsupportedGeneralNameType):
+        raise ConnectionAbortedError(errno.ECONNABORTED, "its certificate cannot be read") from None
+
+
+def _identity_in(certificate: bytes) -> Identity:
     from cryptography import x509
 
     parsed = x509.load_der_x509_certificate(certificate)
@@ -255,6 +272,8 @@ def _context(tls: Tls, protocol: int) -> ssl.SSLContext:
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     for file in _files(tls):
         _require_readable(file)
+    if tls.key.stat().st_mode & stat.S_IROTH:
+        log.warning("%s: everybody on this machine may read the key; chmod 600 it, and have it made anew", tls.key)
     try:
         context.load_verify_locations(tls.authority)
     except ssl.SSLError:

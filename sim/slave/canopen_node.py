@@ -47,6 +47,8 @@ class Nmt(IntEnum):
     PRE_OPERATIONAL = 127
 
 
+NO_TRANSFER = struct.pack("<BHBI", 0x80, 0, 0, 0x05040001)
+"""SDO abort: command specifier not valid."""
 START, STOP, ENTER_PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 1, 2, 128, 129, 130
 
 
@@ -191,7 +193,10 @@ class CanopenNode:
 
     def _serve(self, request: bytes) -> None:
         before = self._dictionary.writes
-        self._sdo.on_request(0x600 + self.number, request, 0.0)
+        try:
+            self._sdo.on_request(0x600 + self.number, request, 0.0)
+        except struct.error:  # a segment of a transfer that nobody began: canopen aborts it by the object's number
+            self._send(0x580 + self.number, NO_TRANSFER)
         if self._dictionary.writes != before:
             self._compose()
 

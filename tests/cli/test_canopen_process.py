@@ -16,6 +16,7 @@ from positioner.cli import doctor
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs, DcsError
+from sim.slave import canopen_slave
 from tests.children import Child, child, running
 from tests.cli.test_daemon_process import LAW, until
 
@@ -145,8 +146,9 @@ def test_probe_and_doctor_watch_a_node_that_a_daemon_drives(
 
 
 def test_a_taken_node_id_and_bad_files_are_one_line_and_status_2(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(canopen_slave, "LISTEN_S", 100.0)  # the first answers when a busy machine lets it
     channel = free_channel()
     first = slave_file(tmp_path, channel)
     (tmp_path / "sheet.eds").write_text("not a data sheet")

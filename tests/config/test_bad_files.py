@@ -4,11 +4,12 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from config import plain_file
 from config.daemon_file import load_valves
-from config.errors import InputError
+from config.errors import LONGEST, InputError
 from config.exports.raw_table import raw_tables
 from config.exports.text_table import text_tables
 from config.plain_file import MOST_BYTES, MOST_COLUMNS, MOST_VALUES
@@ -16,6 +17,7 @@ from config.recording import Recording
 from fieldbus.canopen.eds import read_eds
 from positioner.cli.main import main
 from positioner.daemon.health.health_file import HealthRecord, read_record
+from positioner.pages.operator_page.role_passwords import read_passwords
 
 DIGITS = "9" * 5000
 VALVE = "[valve]\nstroke_m = 0.1\n"
@@ -99,6 +101,14 @@ def test_a_field_of_a_million_characters_is_one_line(tmp_path: Path) -> None:
             Recording.read(path)
 
 
+def test_a_number_behind_a_sign_that_nobody_sees_is_one_line(tmp_path: Path) -> None:
+    """Found by fuzzing: a unit separator is a blank for `str.strip`, and none for `float`."""
+    path = tmp_path / "rec.csv"
+    path.write_text(f"{HEADER}\n0,1,0.01\n1,1,\x1f0.1\n")
+    with pytest.raises(InputError, match=r"line 3: .* is not a number"):
+        Recording.read(path)
+
+
 def test_a_hundred_thousand_columns_are_refused_at_once(tmp_path: Path) -> None:
     path = tmp_path / "rec.csv"
     names = ",".join(f"c{n}" for n in range(100_000))
@@ -135,6 +145,32 @@ def test_an_output_to_nowhere_is_one_line(out: str, tmp_path: Path, capsys: pyte
     assert printed.count("\n") == 1
     with pytest.raises(InputError, match="cannot be written: "):
         Recording({}).write(path)
+
+
+def test_what_a_library_says_in_lines_or_at_length_is_one_line_of_bounded_length(tmp_path: Path) -> None:
+    """Found by fuzzing: a data sheet, a cell and a Parquet file whose reader's complaint went through as it was."""
+    sheet = tmp_path / "node.eds"
+    sheet.write_text("[DeviceInfo]\n" + "x" * 30_000 + "\n")
+    table = tmp_path / "rec.csv"
+    table.write_text(f"{HEADER}\n0,{'x' * 30_000},0\n")
+    broken = tmp_path / "rec.parquet"
+    Recording({name: np.linspace(0.0, 1.0, 100) for name in HEADER.split(",")}).write(broken)
+    data = bytearray(broken.read_bytes())
+    data[4:40] = bytes(36)
+    broken.write_bytes(data)
+    for path, read in ((sheet, lambda each: read_eds(each, 1)), (table, Recording.read), (broken, Recording.read)):
+        with pytest.raises(InputError) as caught:
+            read(path)
+        assert str(caught.value).startswith(f"{path}: ")
+        assert str(caught.value).isprintable()
+        assert len(str(caught.value)) < LONGEST + len(str(path)) + 10
+
+
+def test_a_file_of_passwords_nested_without_end_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "roles.json"
+    path.write_text("[" * 100_000)
+    with pytest.raises(InputError, match="is no file of passwords"):
+        read_passwords(path)
 
 
 def test_a_health_file_with_a_number_beyond_all_is_put_aside(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from fieldbus.modbus import server as server_module
 from fieldbus.modbus import tls as tls_module
 from fieldbus.modbus.admission import ServerLimits
 from fieldbus.modbus.server import RegisterServer
-from fieldbus.modbus.tls import Guard, Identity, NotAuthorized, client_context, identity_in
+from fieldbus.modbus.tls import Guard, Identity, NotAuthorized, client_context, failure_reason, identity_in
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
@@ -163,6 +163,29 @@ def test_a_client_without_certificate_is_turned_away(caplog: pytest.LogCaptureFi
         assert refusals(caplog) == ["TLS: peer did not return a certificate"]
         context.load_cert_chain(folder() / "observer.pem", folder() / "observer.key")
         assert raw(server, context) == bytes.fromhex("0001 0000 0005 01 03 02 0000"), "it was the certificate"
+
+
+def test_a_key_that_everybody_may_read_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    table = tls("device")
+    key = tmp_path / "device.key"
+    key.write_bytes(table.key.read_bytes())
+    said = []
+    for mode in (0o600, 0o640, 0o644):
+        key.chmod(mode)
+        caplog.clear()
+        Guard(table.model_copy(update={"key": key}), lambda _: Role.OPERATOR)
+        said.append([each.getMessage() for each in caplog.records])
+    assert said == [[], [], [f"{key}: everybody on this machine may read the key; chmod 600 it, and have it made anew"]]
+
+
+def test_a_certificate_that_cannot_be_read_ends_the_connection_with_a_reason() -> None:
+    """Found by fuzzing: of version 6, or with an extension twice, it ended the connection's thread with a traceback."""
+    good = ssl.PEM_cert_to_DER_cert((folder() / "operator.pem").read_text())
+    assert identity_in(good).role is Role.OPERATOR
+    for bad in (good.replace(bytes.fromhex("a003020102"), bytes.fromhex("a003020105")), good[:-1], b""):
+        with pytest.raises(ConnectionAbortedError) as caught:
+            identity_in(bad)
+        assert failure_reason(caught.value) == "its certificate cannot be read"
 
 
 def test_tls_1_1_is_too_old(caplog: pytest.LogCaptureFixture) -> None:

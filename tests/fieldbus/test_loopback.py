@@ -12,7 +12,7 @@ import can
 import pytest
 
 from fieldbus.canopen import loopback as can_bus
-from fieldbus.canopen.loopback import ENDS, HOST, WINDOW, LoopbackBus, free_channel
+from fieldbus.canopen.loopback import ENDS, HOST, MAGIC, WINDOW, LoopbackBus, free_channel
 
 pytestmark = pytest.mark.real_time
 
@@ -187,6 +187,29 @@ def test_garbage_strangers_and_torn_datagrams_are_dropped(join: Join) -> None:
     second.send(frame(7))
     assert received(first, 1) == [7]
     assert received_now(first) == []
+
+
+def test_who_is_not_an_end_can_say_nothing_for_one(join: Join) -> None:
+    """Datagrams right to the last byte, but sent from elsewhere: frames, a hello, an acknowledgement, a farewell."""
+    first, second = join(), join()
+    second.send(frame(1))
+    assert received(first, 1) == [1]
+    before = dict(first._peers)
+    peer = before[second.port]
+    state = (peer.sent, peer.acked, peer.received, peer.filters)
+    forged = [can_bus.FRAME.pack(MAGIC, can_bus.DATA, end, 2, 0, 0x205) + bytes(8) for end in (second._end, 5)]
+    forged += [can_bus.HEAD.pack(MAGIC, kind, second._end, 9, 0) for kind in (can_bus.HELLO, can_bus.ACK, can_bus.BYE)]
+    for host, port in ((HOST, 0), ("127.0.0.2", second.port)):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.bind((host, port))
+            for datagram in forged:
+                stranger.sendto(datagram, (HOST, first.port))
+    assert received_now(first) == []
+    assert first._peers == before
+    assert (peer.sent, peer.acked, peer.received, peer.filters) == state
+    second.send(frame(7))
+    assert received(first, 1) == [7]
+    assert first.lost_frames == 0
 
 
 def test_it_is_on_the_loopback_only(join: Join) -> None:

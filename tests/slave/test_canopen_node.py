@@ -12,7 +12,7 @@ from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
 from fieldbus.canopen.eds import PRODUCT, VENDOR, read_eds
 from fieldbus.canopen.objects import ACTIVATE, Control, NodeState
-from sim.slave.canopen_node import CanopenNode, DeviceStateMachine, Nmt
+from sim.slave.canopen_node import NO_TRANSFER, CanopenNode, DeviceStateMachine, Nmt
 from sim.slave.clocks import Clock, Lockstep, RealTime
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
@@ -87,6 +87,13 @@ def timed() -> Bench:
 
 def nmt(command: int, node: int = NODE) -> Frame:
     return 0, bytes((command, node))
+
+
+@pytest.mark.parametrize("specifier", [0x00, 0x10, 0x60, 0x70])
+def test_a_segment_of_a_transfer_that_nobody_began_is_aborted(bench: Bench, specifier: int) -> None:
+    """Found by fuzzing: it ended the node's thread."""
+    assert bench.takes((0x600 + NODE, bytes((specifier,)) + bytes(7))) == [(0x580 + NODE, NO_TRANSFER)]
+    assert bench.uploaded(0x1000) == bytes(4)
 
 
 def command(pressure_pa: float, control: int = ACTIVATE) -> Frame:

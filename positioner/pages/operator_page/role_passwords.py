@@ -28,7 +28,7 @@ def read_passwords(file: Path) -> dict[str, Password]:
         }
     except OSError as error:
         raise InputError(str(file), f"cannot be read: {error.strerror}") from None
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         made = "positioner page --set-password operator --roles FILE"
         raise InputError(str(file), f"is no file of passwords; {made} makes one") from None
     allowed = [role.name.lower() for role in ROLES]

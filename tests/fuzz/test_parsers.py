@@ -1,0 +1,66 @@
+"""Whatever bytes come: a right answer, or one refusal in one line, soon and in bounded memory.
+
+The inputs are the same each time (derandomised). `make fuzz` tries millions, guided by what they reach.
+"""
+
+import logging
+import resource
+import time
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+
+from tests.fuzz.bus_parsers import bus_parsers
+from tests.fuzz.file_parsers import file_parsers
+from tests.fuzz.inputs import near
+from tests.fuzz.parser import Parser
+
+PARSERS = {**bus_parsers(), **file_parsers()}
+FEWEST, MOST = 30, 3000
+LONGEST_S = 0.2
+"""Of work for one input."""
+MOST_MEMORY_KB = 300_000
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    logging.disable()
+    yield
+    logging.disable(logging.NOTSET)
+
+
+def worked_s(parser: Parser, data: bytes) -> float:
+    """Return how long a parser works on an input."""
+    start_s = time.thread_time()
+    parser.parse(data)
+    return time.thread_time() - start_s
+
+
+def inputs(parser: Parser) -> int:
+    """Return how many inputs a parser gets: by its share, which says how fast it is."""
+    return max(FEWEST, min(MOST, round(100 * parser.share)))
+
+
+@pytest.mark.parametrize("name", PARSERS)
+def test_whatever_comes_is_answered_or_refused_in_one_line(name: str) -> None:
+    parser = PARSERS[name]
+    for good in parser.good:
+        parser.parse(good)
+    held_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    @settings(
+        max_examples=inputs(parser),
+        derandomize=True,
+        database=None,
+        deadline=None,
+        phases=(Phase.explicit, Phase.generate),
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(data=near(parser.good, text=parser.text))
+    def each(data: bytes) -> None:
+        if worked_s(parser, data) > LONGEST_S:
+            assert min(worked_s(parser, data) for _ in range(3)) < LONGEST_S, f"too long for {len(data)} bytes"
+
+    each()
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - held_kb < MOST_MEMORY_KB
