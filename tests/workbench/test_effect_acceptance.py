@@ -73,8 +73,8 @@ def test_a_slip_met_by_luck_is_no_gain() -> None:
         (1.0, 1.0, 1.0, 1.0, True),
         (2.0, 1.0, 1.0, 1.0, False),
         (1.0, 2.0, 1.0, 1.0, False),
-        (1.0, 1.0, 1.5, 1.0, False),
-        (1.0, 1.0, 1.0, 1.5, False),
+        (1.0, 1.0, 1.7, 1.0, False),
+        (1.0, 1.0, 1.0, 1.7, False),
     ],
 )
 def test_the_floor_is_missed_by_many_blocks_or_by_far_in_a_few(
