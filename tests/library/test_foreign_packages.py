@@ -89,7 +89,7 @@ def test_doctor_names_a_distribution_that_installed_over_ours(
     metadata = tmp_path / "settings_for_all-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: settings-for-all\nVersion: 1.0\n")
-    (metadata / "RECORD").write_text("config/__init__.py,,\n")
+    (metadata / "top_level.txt").write_text("config\n")
     monkeypatch.syspath_prepend(tmp_path)
     assert not doctor._passes("packages", "", doctor._packages)
     line = capsys.readouterr().out
