@@ -1,7 +1,8 @@
-"""How `make test` shares the suite out over workers: a file is one group, all that happens in real time is another.
+"""How `make test` shares the suite out over workers: a file is one group, all that happens in real time is another, all
+that waits for other programs a third.
 
-A group runs on one worker, in order. So a file's valves, fits and processes are made once, and no two tests that wait
-for a clock, a process or a wire ever wait for each other. The others give way to these. See tests/README.md.
+A group runs on one worker, in order. So a file's valves, fits and processes are made once, and no two tests that are
+held to a clock ever wait for each other. The others give way to these. See tests/README.md.
 """
 
 import gc
@@ -18,7 +19,9 @@ from xdist.scheduler import LoadScopeScheduling
 
 ROOT = Path(__file__).parents[1]
 REAL_TIME = "pytest.mark.real_time"
-"""In a file: it waits for a clock, a process or a wire."""
+"""In a file: it is held to a clock, by a process or a wire."""
+PATIENT = "pytest.mark.patient"
+"""In a file: it waits for other programs, a browser or workers, and is held to no clock."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
 GIVES_WAY = 3
@@ -42,12 +45,17 @@ class Groups(LoadScopeScheduling):  # type: ignore[misc]
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.partition("::")[0]
-        return REAL_TIME if _is_real_time(ROOT / file) else file
+        return _mark(ROOT / file) or file
 
 
 @cache
+def _mark(path: Path) -> str:
+    text = path.read_text(encoding="utf-8")
+    return next((each for each in (REAL_TIME, PATIENT) if each in text), "")
+
+
 def _is_real_time(path: Path) -> bool:
-    return REAL_TIME in path.read_text(encoding="utf-8")
+    return _mark(path) == REAL_TIME
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Groups:
@@ -57,13 +65,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Groups:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Of `-n auto`: one worker more than processors, as the one with the tests in real time mostly waits."""
-    return min(os.cpu_count() or 1, MOST_PROCESSORS) + 1
+    """Of `-n auto`: two workers more than processors, as those of the two groups that wait mostly do."""
+    return min(os.cpu_count() or 1, MOST_PROCESSORS) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put what happens in real time first: it takes the longest however many the processors."""
-    items.sort(key=lambda item: not _is_real_time(item.path))
+    """Put what waits first, in real time before all: it takes the longest however many the processors."""
+    items.sort(key=lambda item: (REAL_TIME, PATIENT, "").index(_mark(item.path)))
 
 
 def pytest_collection_finish() -> None:

@@ -15,7 +15,7 @@ from positioner.estimation.batch import BatchSettings
 from positioner.estimation.refiner import RefinementJob
 from tests.estimation.stem import NOISE, TRUTH, grid, run, swing
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.patient
 
 
 def job() -> RefinementJob:

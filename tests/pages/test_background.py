@@ -7,7 +7,7 @@ import pytest
 from config.errors import InputError
 from positioner.pages.workbench_page.background import Failed, News, Progressed, Tell, Work
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.patient
 LONGEST_S = 60.0
 
 

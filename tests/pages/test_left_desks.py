@@ -12,7 +12,7 @@ from positioner.pages.workbench_page.opening import Opened
 from positioner.pages.workbench_page.page import MOST_LEFT, Workbench
 from workbench.blind.hiding import hide
 
-pytestmark = pytest.mark.real_time
+pytestmark = pytest.mark.patient
 HIDDEN = hide(7, duration_s=5.0)
 
 

@@ -66,7 +66,7 @@ def end_of(work: Work) -> News:
                 return each
 
 
-@pytest.mark.real_time
+@pytest.mark.patient
 def test_a_checked_effect_is_run_by_the_desk_that_wrote_it_and_by_nobody_else(
     desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -88,7 +88,7 @@ def test_a_checked_effect_is_run_by_the_desk_that_wrote_it_and_by_nobody_else(
         find_effect(str(path), "effects")
 
 
-@pytest.mark.real_time
+@pytest.mark.patient
 def test_an_effect_that_never_ends_is_stopped_with_its_tab(desk: Desk) -> None:
     desk.check_effect(desk.write_effect("endless", "while True: pass\n"))
     work = desk.checking

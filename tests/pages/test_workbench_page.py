@@ -11,7 +11,7 @@ from tests.pages.browser import needs_chromium, opened, served
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 
-pytestmark = [pytest.mark.real_time, needs_chromium]
+pytestmark = [pytest.mark.patient, needs_chromium]
 
 SEED = 7
 """Hides a preload."""

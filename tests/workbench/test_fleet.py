@@ -237,7 +237,7 @@ def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_go
             engine._answer(Future(status))
 
 
-@pytest.mark.real_time
+@pytest.mark.patient
 def test_no_scheduler_is_one_line(
     site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -247,7 +247,7 @@ def test_no_scheduler_is_one_line(
     assert err.splitlines()[-1].startswith("positioner fleet: tcp://127.0.0.1:1: no scheduler answers there")
 
 
-@pytest.mark.real_time
+@pytest.mark.patient
 def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_path: Path, without_dask: None) -> None:
     out, small = tmp_path / "out", site.with_name("small.csv")
     words = [sys.executable, "-m", "positioner.cli", "fleet", str(small), "--out", str(out), "--workers", "1"]
