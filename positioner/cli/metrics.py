@@ -22,8 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.errors import InputError
     from config.extras import needed
-    from config.tls_table import Tls
-    from positioner.cli.parts.daemon_address import HANDSHAKE_TIMEOUT_S
+    from positioner.cli.parts.daemon_address import client_tls
 
     needed("prometheus_client", "positioner metrics")
     from config.daemon_file import load_valves
@@ -32,10 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if not 0 <= arguments.listen_port <= 65535:
         raise InputError("--listen-port", f"must lie between 0 (any free one) and 65535, got {arguments.listen_port}")
-    tls = None
-    if arguments.tls is not None:
-        authority, certificate, key = arguments.tls
-        tls = Tls(authority=authority, certificate=certificate, key=key, handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
+    tls = None if arguments.tls is None else client_tls(*arguments.tls)
     valves: dict[str, ScrapedValve] = {}
     for path in arguments.config:
         for file in load_valves(path):

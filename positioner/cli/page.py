@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.daemon_address import HANDSHAKE_TIMEOUT_S
+from positioner.cli.parts.daemon_address import client_tls
 from positioner.cli.parts.page_address import MOST_PORT
 
 if TYPE_CHECKING:
@@ -111,7 +111,6 @@ def _certificates(arguments: argparse.Namespace) -> "tuple[Tls | None, dict[Role
     import ssl
 
     from config.errors import InputError
-    from config.tls_table import Tls
     from fieldbus.modbus.tls import identity_in
 
     if arguments.tls is None:
@@ -119,18 +118,14 @@ def _certificates(arguments: argparse.Namespace) -> "tuple[Tls | None, dict[Role
             raise InputError("--write-tls", "needs --tls, who signed for the daemon, too")
         return None, {}
     authority, certificate, key = arguments.tls
-
-    def tls(certificate: Path, key: Path) -> Tls:
-        return Tls(authority=authority, certificate=certificate, key=key, handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
-
     of: dict[Role, Tls] = {}
     for certificate_of, key_of in arguments.write_tls:
         try:
             der = ssl.PEM_cert_to_DER_cert(certificate_of.read_text(encoding="ascii"))
         except (OSError, ValueError) as error:
             raise InputError(str(certificate_of), f"is no certificate in PEM form: {error}") from None
-        of[identity_in(der).role] = tls(certificate_of, key_of)
-    return tls(certificate, key), of
+        of[identity_in(der).role] = client_tls(authority, certificate_of, key_of)
+    return client_tls(authority, certificate, key), of
 
 
 def _set_password(file: Path | None, role: str) -> int:

@@ -6,11 +6,11 @@ the running integrals of the identification. It reads no clock.
 
 from dataclasses import replace
 
-from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, Fault, InhibitReason, Mode, Refusal, Restored, State
+from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode, Refusal, Restored, State
 from config.extended_valve import ExtendedValve, Inverse
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
-from positioner.control.excitation import ActiveExcitation, climbed, excitation_after
+from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
 from positioner.control.law_memory import held_pa as held_by_law_pa
@@ -23,7 +23,7 @@ from positioner.control.restoration import Restoration
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.states import Situation, law_inhibit_reason, state_in
-from positioner.control.supervision import SupervisionMemory, supervise, usable
+from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
 from positioner.control.valve_knowledge import ValveKnowledge, known, with_learnt
 from positioner.estimation.acceptance import Applied
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -31,7 +31,6 @@ from positioner.estimation.landings.static_identification import StaticIdentific
 from positioner.estimation.online import Identification
 from positioner.estimation.refiner import Refiner
 
-NO_FAULT, NOTHING = Fault.NONE, InhibitReason.NOTHING
 FOLLOWING = (S1, S2)
 """The states in which the law commands."""
 

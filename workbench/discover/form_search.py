@@ -23,11 +23,10 @@ from workbench.discover.form_file import write_forms
 from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import Form
 from workbench.discover.proposal import Proposal, proposed
-from workbench.fit.fitting import BegunFit, Fit, begun_fit, profiled
+from workbench.fit.fitting import BegunFit, begun_fit, profiled
 from workbench.fit.threads import on_threads
-from workbench.select.block_errors import block_errors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel, judged_step
-from workbench.select.effect_search import BETTER, OUT_OF_RACE, EffectSearch, Progress
+from workbench.select.effect_search import BETTER, OUT_OF_RACE, EffectSearch, Progress, evaluated
 
 FIRST, MOST = 5, 15
 """Forms fitted in the first turn, and in both."""
@@ -237,8 +236,3 @@ def _explains(step: EffectStep) -> bool:
     """Whether what a step would add passes the rule and leaves nothing to explain."""
     return step.added is not None and step.added.model is not None and step.added.model.explained
 
-
-def evaluated(fit: Fit, split: Split) -> EvaluatedModel:
-    """Return a fit with how it does on what was held out."""
-    errors = block_errors(fit, split)
-    return EvaluatedModel(fit, errors, errors.at_floor(split.floor_m))

@@ -74,13 +74,13 @@ def proposed(
     """
     tangents = _Tangents(base, split)
     names = tuple(effects)
+    points = {name: effects[name].strengths(base.valve.valve)[:MOST_GRID] for name in names}
     scores: dict[str, list[float]] = {}
     for name, found_here in zip(
-        names, on_threads(lambda name: tangents.scores(effects[name]), names, workers), strict=True
+        names, on_threads(lambda name: tangents.scores(effects[name], points[name]), names, workers), strict=True
     ):
         scores[name] = found_here
         tell(len(scores) / len(names))
-    points = {name: effects[name].strengths(base.valve.valve)[:MOST_GRID] for name in names}
     by_tangent = sorted(names, key=lambda name: -max(scores[name]))
     found = landings(base, split)
     left: dict[str, list[float]] = {}
@@ -127,12 +127,12 @@ class _Tangents:
         self._rows = np.flatnonzero(run.judged & self._record.valid)
         self._left = self._without(self._weights * residual)
 
-    def scores(self, effect: Effect) -> list[float]:
-        """Return the share of the residual's energy, 0 to 1, that each of a form's points explains."""
+    def scores(self, effect: Effect, points: Sequence[Point]) -> list[float]:
+        """Return the share of the residual's energy, 0 to 1, that a form explains at each point."""
         found = []
         extended = _with_form(self._base.valve, effect)
         run = FreeRun(extended, self._record, from_pressure=self._base.from_pressure, accuracy=ROUGH, by=self._base.by)
-        for values in effect.strengths(self._base.valve.valve)[:MOST_GRID]:
+        for values in points:
             theta = np.concatenate([extended.theta[: -len(values)], values])
             change_m = np.nan_to_num(run.position_m(theta) - self._bare_m)[self._rows]
             t = self._without(self._weights * change_m)

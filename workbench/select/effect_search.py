@@ -364,8 +364,13 @@ class EffectSearch:
         return found
 
     def _evaluated(self, found: Fit) -> EvaluatedModel:
-        errors = block_errors(found, self._split)
-        return EvaluatedModel(found, errors, errors.at_floor(self._split.floor_m))
+        return evaluated(found, self._split)
+
+
+def evaluated(fit: Fit, split: Split) -> EvaluatedModel:
+    """Return a fit with how it does on what was held out."""
+    errors = block_errors(fit, split)
+    return EvaluatedModel(fit, errors, errors.at_floor(split.floor_m))
 
 
 def _parted(racers: Mapping[str, BegunFit]) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:

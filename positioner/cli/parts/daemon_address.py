@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from config.tls_table import Tls
     from positioner.dcs import Dcs
 
 HANDSHAKE_TIMEOUT_S = 2.0
@@ -47,7 +48,6 @@ def connected(arguments: argparse.Namespace) -> "Dcs":
     """
     from config.daemon_file import SupervisoryTable, load_daemon
     from config.errors import InputError
-    from config.tls_table import Tls
     from positioner.dcs import Dcs
 
     if arguments.valve is not None and arguments.config is None:
@@ -56,8 +56,11 @@ def connected(arguments: argparse.Namespace) -> "Dcs":
     host, port, unit = (
         getattr(where, key) if (said := getattr(arguments, key)) is None else said for key in ("host", "port", "unit")
     )
-    if arguments.tls is None:
-        return Dcs(host, port, unit)
-    authority, certificate, key = arguments.tls
-    tls = Tls(authority=authority, certificate=certificate, key=key, handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
-    return Dcs(host, port, unit, tls=tls)
+    return Dcs(host, port, unit, tls=None if arguments.tls is None else client_tls(*arguments.tls))
+
+
+def client_tls(authority: Path, certificate: Path, key: Path) -> "Tls":
+    """Return what a client of a daemon shows, and by whom the daemon's own certificate is signed."""
+    from config.tls_table import Tls
+
+    return Tls(authority=authority, certificate=certificate, key=key, handshake_timeout_s=HANDSHAKE_TIMEOUT_S)

@@ -10,11 +10,10 @@ what was restored is judged anew                  good, M where a landing contra
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from config.codes import EventKind, ExperimentState, Fault, Mode, Ne107Cause, Ne107Status, Restored, State
+from config.codes import S3, EventKind, Fault, Mode, Ne107Cause, Ne107Status, Restored
 from positioner.control.controller_memory import Decision
 from positioner.daemon.health.ne107 import CLASS, MONITORED
 
-NOT_FOLLOWING = (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
 Classes = Mapping[Ne107Cause, Ne107Status]
 """Of what monitors find, by the daemon's file."""
 
@@ -35,7 +34,7 @@ def noted(decision: Decision) -> tuple[object, ...]:
         decision.mode,
         decision.applied,
         decision.alarms,
-        decision.state is State.S3_IDENTIFY,
+        decision.state is S3,
         decision.restoration.trust,
         decision.experiment.state,
     )
@@ -60,7 +59,7 @@ def events_between(before: Decision, after: Decision, classes: Classes) -> Itera
         status = Ne107Status.MAINTENANCE_REQUIRED if trust is Restored.DROPPED else Ne107Status.GOOD
         yield Happened(EventKind.RESTORED, status, trust)
     if (played := after.experiment.state) is not before.experiment.state:
-        yield Happened(EventKind.EXPERIMENT, _check(played in NOT_FOLLOWING), played)
+        yield Happened(EventKind.EXPERIMENT, _check(after.experiment.commands), played)
 
 
 def class_of(fault: Fault, classes: Classes) -> Ne107Status:
@@ -78,7 +77,7 @@ def _alarms(before: Decision, after: Decision, classes: Classes) -> Iterator[Hap
 
 
 def _excitation(before: Decision, after: Decision) -> Iterator[Happened]:
-    was, now = (each.state is State.S3_IDENTIFY for each in (before, after))
+    was, now = (each.state is S3 for each in (before, after))
     if now and not was:
         yield Happened(EventKind.EXCITED, Ne107Status.FUNCTION_CHECK)
     if was and not now:
