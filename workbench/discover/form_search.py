@@ -235,4 +235,3 @@ def _parted(racers: Mapping[str, BegunFit], least: float) -> tuple[dict[str, Beg
 def _explains(step: EffectStep) -> bool:
     """Whether what a step would add passes the rule and leaves nothing to explain."""
     return step.added is not None and step.added.model is not None and step.added.model.explained
-
