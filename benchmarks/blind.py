@@ -15,18 +15,15 @@ the library's own declarations makes the same effect counts as that effect: no r
 """
 
 import argparse
-import json
-import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.kept_lines import Line, kept, run
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.effect import shipped_effect, tried_effects
@@ -49,9 +46,8 @@ SEEDS: Mapping[str, range] = {
 APART = 100
 """Seeds farther from each other are told as another span."""
 FOLDER = Path("docs/blind")
-"""Where the lines are kept."""
-
-Line = Mapping[str, Any]
+KEPT = "cases.jsonl"
+"""Where the lines are kept, and in which file there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,12 +235,6 @@ def share(what: str, holds: Sequence[bool]) -> str:
     return f"  {what:<52}{sum(holds)} of {len(holds)}" + (f" ({sum(holds) / len(holds):.1%})" if holds else "")
 
 
-def kept(folder: Path) -> list[Line]:
-    """Read the lines that are there."""
-    file = folder / "cases.jsonl"
-    return [json.loads(each) for each in file.read_text().splitlines()] if file.is_file() else []
-
-
 def missing(families: Sequence[str], lines: Sequence[Line]) -> list[tuple[str, int]]:
     """Return the planned cases that are not there, in turn through the families, so that all grow together."""
     there = {each["seed"] for each in lines}
@@ -261,15 +251,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=FOLDER, help="where a line a case is kept")
     parser.add_argument("--table", action="store_true", help="run nothing, print the tables")
     arguments = parser.parse_args()
-    lines = kept(arguments.out)
+    file = arguments.out / KEPT
+    lines = kept(file)
     todo = [] if arguments.table else missing(arguments.family, lines)[: arguments.cases]
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(os.cpu_count()) as pool, (arguments.out / "cases.jsonl").open("a") as file:
-        for done in as_completed([pool.submit(line, *each) for each in todo]):
-            each = done.result()
-            lines.append(each)
-            print(json.dumps(each), file=file, flush=True)
-            print(_told(each), flush=True)
+    for each in run(file, line, todo, None):
+        lines.append(each)
+        print(_told(each), flush=True)
     print(*report(lines), sep="\n")
 
 

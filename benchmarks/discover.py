@@ -11,16 +11,14 @@ can be broken off and taken up.
 """
 
 import argparse
-import json
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.kept_lines import Line, kept, run
 from workbench.blind.hiding import hide
 from workbench.discover.discovery import discover
 
@@ -39,7 +37,6 @@ WITHIN = 1.5
 DURATION_S = 20.0
 """Of each recording."""
 FOLDER = Path("docs/discover")
-Line = Mapping[str, Any]
 
 
 def cases(repeats: int, nothing: int = NOTHING) -> list[tuple[str, str, int]]:
@@ -133,12 +130,6 @@ def _told(each: Line) -> str:
     return f"{what} {_ratios(each)} {_said(each)}, {each['seconds']} s"
 
 
-def kept(folder: Path) -> list[Line]:
-    """Read the lines that are there."""
-    file = folder / "cases.jsonl"
-    return [json.loads(each) for each in file.read_text().splitlines()] if file.is_file() else []
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=1, help="of each effect (1)")
@@ -149,7 +140,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=FOLDER, help="where a line a case is kept")
     parser.add_argument("--table", action="store_true", help="run nothing, print the table")
     arguments = parser.parse_args()
-    lines = kept(arguments.out)
+    file = arguments.out / "cases.jsonl"
+    lines = kept(file)
     there = {each["seed"] for each in lines}
     todo = [
         each
@@ -157,13 +149,9 @@ def main() -> None:
         if each[0] in arguments.family and each[2] not in there
     ]
     todo = [] if arguments.table else todo[: arguments.cases]
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(arguments.workers) as pool, (arguments.out / "cases.jsonl").open("a") as file:
-        for done in as_completed([pool.submit(line, *each) for each in todo]):
-            each = done.result()
-            lines.append(each)
-            print(json.dumps(each), file=file, flush=True)
-            print(_told(each), flush=True)
+    for each in run(file, line, todo, arguments.workers):
+        lines.append(each)
+        print(_told(each), flush=True)
     print(*report(lines), sep="\n")
 
 

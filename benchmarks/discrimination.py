@@ -16,13 +16,14 @@ import argparse
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.blind import FOLDER, kept
+from benchmarks.blind import FOLDER, KEPT
+from benchmarks.kept_lines import Line, kept
 from config.recording import Recording
 from config.slave_file import Sensor
 from sim.composition import Composition
@@ -43,8 +44,6 @@ LONGEST_S = 26.0
 MENU_BUDGET = 120
 WHOLE = 1000
 """More moves than an input of the menu has."""
-
-Line = Mapping[str, Any]
 
 
 def menu(
@@ -137,7 +136,7 @@ def _kept(found: Discrimination, hidden: str) -> dict[str, Any]:
 def cases(families: Sequence[str], seeds: Sequence[int] | None) -> list[Line]:
     """Return the kept blind cases that ended in one set of more than one class, the hidden effect visible."""
     library = {name: shipped_effect(name, "library") for name in shipped_effects()}
-    lines = [*kept(FOLDER), *kept(FOLDER / "before")]
+    lines = [*kept(FOLDER / KEPT), *kept(FOLDER / "before" / KEPT)]
     return [
         each
         for each in lines
@@ -157,7 +156,7 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
             f"{how} {each[how]['outcome']} {'/'.join(each[how]['named'])} {each[how]['moves']} moves"
             for how in ("designed", "menu")
         )
-    for how in ("designed", "menu"):
+    for how in ("designed", "menu") if lines else ():
         yield from _figures(how, [each[how] for each in lines])
     both = [each for each in lines if each["designed"]["right"] and each["menu"]["right"]]
     if both:
@@ -181,9 +180,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1, help="threads (1)")
     parser.add_argument("--out", type=Path, help="where a line a case is kept; those there are not played again")
     arguments = parser.parse_args()
-    lines: list[Line] = []
-    if arguments.out is not None and arguments.out.is_file():
-        lines = [json.loads(each) for each in arguments.out.read_text().splitlines()]
+    lines = [] if arguments.out is None else kept(arguments.out)
     there = {each["seed"] for each in lines}
     for case in cases(arguments.family, arguments.seeds)[: arguments.cases]:
         if case["seed"] in there:

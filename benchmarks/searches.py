@@ -18,18 +18,17 @@ best search misses the cost of the true parameters by more than 1 %.
 """
 
 import argparse
-import json
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import count, islice
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from benchmarks.kept_lines import Line, kept, run
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
@@ -42,7 +41,6 @@ from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 
 Kind = Literal["full", "poor"]
-Line = Mapping[str, Any]
 FIRST_SEED = 52000
 """No case from here on had been looked at when the search was written."""
 FEW_SLIPS = 12
@@ -188,11 +186,6 @@ def _by_case(lines: Sequence[Line]) -> dict[tuple[str, int, str], list[Line]]:
     return found
 
 
-def kept(file: Path) -> list[Line]:
-    """Read the lines that are there."""
-    return [json.loads(each) for each in file.read_text().splitlines()] if file.is_file() else []
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--effects", nargs="*", choices=first_effects(), default=first_effects(), metavar="NAME")
@@ -208,11 +201,7 @@ def main() -> None:
     posed_cases = [] if arguments.table else cases(arguments.effects, arguments.cases, arguments.kind)
     tasks = [Task(case, number) for case in posed_cases for number in range(arguments.searches)]
     todo = [each for each in tasks if (*each.case, each.number) not in there]
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(arguments.workers) as pool, arguments.out.open("a") as file:
-        for done in as_completed([pool.submit(searched, each) for each in todo]):
-            lines.append(done.result())
-            print(json.dumps(lines[-1]), file=file, flush=True)
+    lines += run(arguments.out, searched, [(each,) for each in todo], arguments.workers)
     print(*report(lines), sep="\n")
 
 

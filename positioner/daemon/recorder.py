@@ -18,11 +18,11 @@ import re
 import time
 from collections import deque
 from datetime import UTC, datetime
-from hashlib import sha256
 from pathlib import Path
 from threading import Event, Thread
 
 from config.errors import InputError
+from config.file_stem import file_stem
 from positioner.daemon.logs import log_event
 from positioner.daemon.recording_compression import Compression, half_done
 
@@ -71,7 +71,7 @@ class Recorder:
     ) -> None:
         self.unrecorded = 0
         self._folder = folder
-        self._stem = _stem(name)
+        self._stem = file_stem(name)
         self._file_bytes = file_bytes
         self._keep_files = keep_files
         self._file_s = file_s or math.inf
@@ -198,7 +198,7 @@ class Recorder:
 
 def files_of(folder: Path, name: str) -> list[Path]:
     """Return the recordings of a valve in a folder, oldest first."""
-    return _files(folder, _stem(name))
+    return _files(folder, file_stem(name))
 
 
 def _files(folder: Path, stem: str) -> list[Path]:
@@ -221,14 +221,6 @@ def _compressed_already(folder: Path, stem: str) -> set[Path]:
 def _number(file: Path) -> int:
     """Return the running number of a recording."""
     return int(file.name.partition(".csv")[0].rpartition("-")[2])
-
-
-def _stem(name: str) -> str:
-    """Return what the names of a valve's files begin with: no two valves have the same."""
-    plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name)
-    if plain == name:
-        return name
-    return f"{plain.strip('-') or 'valve'}-{sha256(name.encode()).hexdigest()[:8]}"
 
 
 def _line(row: Row, unrecorded: int) -> str:

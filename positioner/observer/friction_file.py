@@ -11,6 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from config.errors import InputError
+from config.file_stem import file_stem
+from config.whole_file import replace_whole
 
 HEAD = "unix_s,friction_pa,baseline_pa"
 FrictionRow = tuple[float, float, float]
@@ -30,16 +32,13 @@ class FrictionFile:
     """
 
     def __init__(self, folder: Path, name: str, most: int) -> None:
-        safe = "".join(each if each.isalnum() or each in "-_." else "_" for each in name)
-        self.path = folder / f"friction-{safe}.csv"
+        self.path = folder / f"friction-{file_stem(name)}.csv"
         self._most = most
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self.rows: Sequence[FrictionRow] = self._read()[-most:]
             lines = [HEAD, *(_line(row) for row in self.rows)]
-            new = self.path.with_suffix(".new")
-            new.write_text("\n".join(lines) + "\n", encoding="ascii")
-            new.replace(self.path)
+            replace_whole(self.path, "\n".join(lines) + "\n")
         except OSError as error:
             raise InputError(str(self.path), f"cannot be kept: {error.strerror}") from None
 

@@ -43,3 +43,8 @@ def test_a_folder_that_is_none_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"friction-a\.csv: cannot be kept"):
         FrictionFile(tmp_path / "file", "a", 3)
+
+
+def test_names_that_differ_in_what_a_file_name_cannot_hold_have_files_of_their_own(tmp_path: Path) -> None:
+    names = ("FV 1", "FV_1", "FV/1", "FV.1")
+    assert len({FrictionFile(tmp_path, name, 3).path for name in names}) == len(names)
