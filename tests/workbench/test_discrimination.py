@@ -19,9 +19,10 @@ from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.data.record import Record
 from workbench.fit.fitting import Fit, fit
-from workbench.select.discrimination import Played, Race, Weighed, discriminate, log_odds
+from workbench.select.discrimination import Played, discriminate
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg
+from workbench.select.rival_race import RivalRace, Weighed, log_odds
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))
@@ -237,8 +238,8 @@ def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fi
 def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("workbench.select.discrimination.RARELY_OFF", 0.5)
-    monkeypatch.setattr(Race, "searched_anew", lambda race: race)
+    monkeypatch.setattr("workbench.select.rival_race.RARELY_OFF", 0.5)
+    monkeypatch.setattr(RivalRace, "searched_anew", lambda race: race)
     found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
     assert (found.outcome, found.named) == ("unexplained", ())
     assert found.odds >= 100.0

@@ -1,30 +1,19 @@
 """Rivals told apart by experiments: design, play, refit all on all recordings, weigh; until one is left.
 
-    lambda_i = n/2 log(C_i / C) + (k_i - k)/2 log n     log odds of the best against rival i; C cost, k parameters
-    n = N var(c) / (m var(mean of c in a block))        independent ones of N samples: c loss of the best, sample by
-                                                        sample, m samples in a block of 2 s
-    odds of the best = 1 / sum exp(-lambda_i)           against all the others together
-
-So the noise is what the best itself scatters by: where break-away jitters, its errors come in stretches, each of which
-counts once. Besides, lambda_i is at most z_i^2 / 2 as long as the errors of the two, second by second, differ by less
-than z_i = 2 standard errors (`block_errors`), as they must for a diagnosis to tell them apart.
-
-Nothing is named by a search that failed: rivals that have lost are searched anew from many starts before the best one
-is named, and the best must explain the experiments as well as a model can. Members of one class by algebra
-(`equivalence`) are one rival; no experiment is played for them.
-
     resolved       the best one's odds have reached 100 : 1
     one_class      all rivals are one by algebra: no record of pressure and position tells them apart
     not_separable  a refit imitates every experiment inside the bounds: separation 1
     budget_spent   the moves allowed are used up
     unexplained    the best one does not explain the experiments: the effect is none of the rivals
     stopped        the valve did not play an experiment: a permissive, a veto, a fault
+
+How they are weighed stands in `rival_race`. Members of one class by algebra (`equivalence`) are one rival; no
+experiment is played for them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import exp, inf, log
+from dataclasses import dataclass
+from math import inf, log
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -32,42 +21,24 @@ import numpy as np
 from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
-from config.valve_file import EffectTable, ValveFile
-from sim.composition import Composition
 from sim.effect import Effect
-from workbench.data.held_out import joined
-from workbench.data.record import Record, ready, require_few_samples, require_fittable
-from workbench.fit.descent import MIDDLING, descended, settled
-from workbench.fit.fitting import Fit, fit
-from workbench.fit.objective import FINAL, SimulationError
-from workbench.fit.threads import on_threads
-from workbench.model.free_run import FreeRun
-from workbench.model.parameters import free_parameters
-from workbench.select.block_errors import (
-    NEGLIGIBLE,
-    RARELY_OFF,
-    SAME_STANDARD_ERRORS,
-    block_logs,
-    relative_error_reduction,
-)
+from workbench.data.record import Record
+from workbench.fit.fitting import Fit
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import parameters_json
 from workbench.select.equivalence import classes
-from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, designed
+from workbench.select.rival_race import ODDS, RivalRace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ODDS = 100.0
 BUDGET = 60
 """Moves."""
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
 IMITATED = 1.001
 """A separation below it is none."""
-STRETCH_S = 2.0
-"""Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
 
 Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
 
@@ -92,15 +63,6 @@ class Designer(Protocol):
     ) -> DesignedExperiment | None:
         """Return it; None if none is allowed."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class Weighed:
-    """A rival in all recordings so far: its fit, log rms of its error by blocks, and what is independent of it."""
-
-    fit: Fit
-    logs: np.ndarray[Any, np.dtype[np.float64]]
-    share: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +206,7 @@ def discriminate(
         InputError: the recordings hold too little.
     """
     gathered = tuple(tuple(sorted(each, key=list(fits).index)) for each in classes(fits, library))
-    race = Race({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), seed, workers)
+    race = RivalRace({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), seed, workers)
     rounds: list[Round] = []
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
@@ -271,7 +233,7 @@ def discriminate(
 
 
 def _chosen(
-    race: "Race", bounds: Bounds, design: Designer, left: int, seed: int, workers: int | None
+    race: RivalRace, bounds: Bounds, design: Designer, left: int, seed: int, workers: int | None
 ) -> DesignedExperiment | None:
     """Return the shortest experiment that promises the odds by itself, or the one that promises most if repeated.
 
@@ -297,169 +259,6 @@ def rivals_of(diagnosis: Diagnosis) -> dict[str, Fit]:
         if len(fits) > 1:
             return fits
     return {}
-
-
-def log_odds(best: Weighed, rival: Weighed) -> float:
-    """Return lambda of the best against a rival: 0 where nothing speaks against it."""
-    n = best.share * best.fit.count
-    ratio = log(max(rival.fit.cost, np.finfo(float).tiny) / max(best.fit.cost, np.finfo(float).tiny))
-    evidence = 0.5 * (n * ratio + (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0)))
-    _, z = relative_error_reduction(rival.logs, best.logs)
-    return max(0.0, evidence if z >= SAME_STANDARD_ERRORS else min(evidence, 0.5 * max(0.0, z) ** 2))
-
-
-class Race:
-    """The rivals in all recordings so far."""
-
-    def __init__(
-        self, fits: Mapping[str, Fit], recordings: tuple[Recording, ...], seed: int, workers: int | None, first: int = 0
-    ) -> None:
-        self._recordings = recordings
-        self._first = first or len(recordings)
-        self._whole = joined(recordings)
-        require_few_samples(self._whole)
-        self.record = ready(self._whole)
-        require_fittable(self.record)
-        self._seed = seed
-        self._workers = workers
-        self.fits = dict(fits)
-        self._sigma_m = self.record.scale_m or np.finfo(float).tiny
-        weighed = {name: self._weighed(each) for name, each in fits.items()}
-        self._all = weighed
-        # The likeliest, by the cost and the number of its parameters.
-        self.best = min(weighed, key=lambda name: _criterion(weighed[name].fit))
-
-    @property
-    def relative(self) -> Mapping[str, float]:
-        """The odds of each rival against the best."""
-        best = self._all[self.best]
-        return {name: exp(-log_odds(best, each)) if name != self.best else 1.0 for name, each in self._all.items()}
-
-    @property
-    def alive(self) -> list[Fit]:
-        """Fits of the rivals that have not lost yet, at least two, likeliest first."""
-        ranked = sorted(self.relative.items(), key=lambda each: -each[1])
-        return [self.fits[name] for i, (name, odds) in enumerate(ranked) if i < 2 or odds > 1.0 / ODDS]
-
-    @property
-    def odds(self) -> float:
-        """The odds of the best against all others together."""
-        others = sum(self.relative.values()) - 1.0
-        return 1.0 / others if others > 0.0 else inf
-
-    @property
-    def decided(self) -> Outcome | None:
-        """What the odds come to; None below `ODDS`."""
-        if self.odds < ODDS:
-            return None
-        return "resolved" if self.explained else "unexplained"
-
-    def promised(self, chosen: DesignedExperiment) -> float:
-        """Return by how much an experiment is to raise the log odds."""
-        samples = (chosen.course.duration_s - REST_S) / self.record.period_s
-        return 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
-
-    def promised_by(self, chosen: DesignedExperiment, moves: int) -> float:
-        """Return by how much an experiment is to raise the log odds, repeated for so many moves."""
-        return self.promised(chosen) * max(1.0, moves / max(1, chosen.course.moves))
-
-    @property
-    def explained(self) -> bool:
-        """Whether the best does as well in the experiments as in the recordings before, or as the sensor allows."""
-        before = sum(map(len, self._recordings[: self._first]))
-        error_m = self._error_m(self.fits[self.best])
-        yardstick_m = max(self.record.floor_or_scale_m, _typical_m(self.record.time_s[:before], error_m[:before]))
-        return _typical_m(self.record.time_s[before:], error_m[before:]) <= RARELY_OFF * yardstick_m
-
-    def with_recording(self, recording: Recording) -> "Race":
-        """Return it after another recording: every rival refitted from where it was, and from where the best was."""
-        race = Race(self.fits, (*self._recordings, recording), self._seed, self._workers, self._first)
-        names = list(self.fits)
-        refitted = on_threads(lambda name: race._refitted(self.fits[name], self.fits[self.best]), names, self._workers)
-        found = race._with(dict(zip(names, refitted, strict=True)))
-        return found.searched_anew() if found.odds >= ODDS else found
-
-    def searched_anew(self) -> "Race":
-        """Return it with every rival searched from many starts; the better of both is kept."""
-        found, bases = {}, dict[tuple[EffectTable, ...], Fit]()
-        for name, here in self.fits.items():
-            others = tuple(each for each in here.valve.effect if each.name != name)
-            bare = ValveFile(valve=self.fits[self.best].valve.valve, effect=others)
-            how: dict[str, Any] = {"seed": self._seed, "workers": self._workers, "profile": False}
-            base = bases.get(others) or fit(self._whole, bare, **how)
-            bases[others] = base
-            there = fit(self._whole, bare, effects=(name,), base=base, **how)
-            found[name] = min(here, there, key=lambda each: each.cost)
-        return self._with(found)
-
-    def _with(self, fits: Mapping[str, Fit]) -> "Race":
-        return Race(fits, self._recordings, self._seed, self._workers, self._first)
-
-    def _refitted(self, here: Fit, best: Fit) -> Fit:
-        """Return a fit to the whole record, from its own parameters and from those that it shares with the best."""
-        composition = Composition.from_file(here.valve)
-        parameters = free_parameters(composition, tuple(here.parameters))
-        error = SimulationError(FreeRun(composition, self.record), composition, parameters, composition.theta)
-        own = error.coordinates(composition.theta)
-        shared = composition.theta.copy()
-        bests = Composition.from_file(best.valve)
-        for name, value in zip(bests.names, bests.theta.tolist(), strict=True):
-            if name in composition.names:
-                shared[composition.names.index(name)] = value
-        starts = [own, error.coordinates(shared), *map(error.coordinates, here.seeds)]
-        ends = [settled(error, descended(error, z, MIDDLING)) for z in starts]
-        z = min(ends, key=error.cost)
-        theta = error.theta(z)
-        values: dict[str, float] = dict(zip(composition.names, theta.tolist(), strict=True))
-        base = here.valve.valve.model_copy(
-            update={name: value for name, value in values.items() if name in type(here.valve.valve).model_fields}
-        )
-        tables = tuple(
-            each.model_copy(update={key: values[f"{each.name}.{key}"] for key in each.parameters})
-            for each in here.valve.effect
-        )
-        fitted = {
-            each.name: replace(here.parameters[each.name], value=float(theta[each.index])) for each in error.parameters
-        }
-        return replace(
-            here,
-            valve=ValveFile(valve=base, effect=tables),
-            parameters=fitted,
-            rms_m=error.rms_m(z),
-            cost=error.cost(z),
-            count=error.count,
-        )
-
-    def _error_m(self, found: Fit) -> np.ndarray[Any, np.dtype[np.float64]]:
-        composition = Composition.from_file(found.valve)
-        position_m = FreeRun(composition, self.record).position_m(composition.theta)
-        return np.where(self.record.valid, position_m - self.record.position_m, np.nan)
-
-    def _weighed(self, found: Fit) -> Weighed:
-        error_m = self._error_m(found)
-        negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
-        parts = np.cumsum([0, *map(len, self._recordings)])
-        logs = [block_logs(self.record.time_s[a:b], error_m[a:b], negligible_m) for a, b in pairwise(parts.tolist())]
-        return Weighed(found, np.concatenate(logs), _independent_share(error_m / self._sigma_m, self.record.period_s))
-
-
-def _typical_m(time_s: np.ndarray[Any, Any], error_m: np.ndarray[Any, Any]) -> float:
-    """Return the median of the blocks' errors, m."""
-    return exp(float(np.median(block_logs(time_s, error_m, 0.0))))
-
-
-def _independent_share(residuals: np.ndarray[Any, Any], period_s: float) -> float:
-    """Return n / N of the residuals, in units of the noise."""
-    loss = np.sqrt(1.0 + (residuals[np.isfinite(residuals)] / FINAL) ** 2)
-    size = max(1, round(STRETCH_S / period_s))
-    blocks = loss[: loss.size // size * size].reshape(-1, size)
-    spread = size * float(np.var(blocks.mean(axis=1)))
-    return min(1.0, float(np.var(loss)) / spread) if spread > 0.0 else 1.0
-
-
-def _criterion(found: Fit) -> float:
-    n = found.count
-    return n * log(max(found.cost, np.finfo(float).tiny)) + len(found.parameters) * log(n)
 
 
 def _odds(odds: float) -> str:
