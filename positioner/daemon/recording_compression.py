@@ -16,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from shutil import copyfileobj
 
+from config.whole_file import sync_folder
 from positioner.daemon.logs import log_event
 
 log = logging.getLogger(__name__)
@@ -80,7 +81,7 @@ def compress(path: Path) -> None:
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
-    _sync_folder(path.parent)
+    sync_folder(path.parent)
     path.unlink(missing_ok=True)
 
 
@@ -90,14 +91,6 @@ def _same(path: Path, packed: Path) -> bool:
             if back.read(len(block)) != block:
                 return False
         return not back.read(1)
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _work(files: Sequence[str]) -> int:
