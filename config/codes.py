@@ -48,6 +48,7 @@ class ServiceState(Code):
     FAULT_HOLD = 4, "fault, and the pressure is held"
     FAULT_SAFE = 5, "fault, and the pressure is the safe one"
     STOPPED = 6, "stopped: the valve is left as configured, nobody is served"
+    FAULT_MANUAL = 7, "fault, and an operator commands by hand"
 
 
 class State(Code):
@@ -80,6 +81,7 @@ class Fault(Code):
     POSITION_RATE = 11, "the position changes faster than the valve can"
     SATURATED = 12, "the command is at its limit for too long"
     OVERRUN = 13, "cycles or replies take longer than their period"
+    COMMAND_RATE = 14, "the command changes faster than it may"
 
 
 class Quality(Code):
@@ -112,6 +114,10 @@ class InhibitReason(Code):
     REFERENCE_COMES = 15, "a small move waits, for references keep coming that may take it back"
     RESTORED_WAITS = 17, "a reference waits until the stem rests, for what was restored is provisional"
     RESTORED_CONTRADICTED = 18, "the first landings contradict what was restored: identify the valve"
+    EXCITATION_OUTSIDE_WINDOW = 19, "excitation: the stem is outside the travel window"
+    EXCITATION_NO_CONSENT = 20, "excitation: no consent of the DCS"
+    EXCITATION_VETOED = 21, "excitation: vetoed"
+    EXCITATION_UNMEASURED = 22, "excitation waits for a good measurement"
 
 
 class Restored(Code):
@@ -219,6 +225,7 @@ class Ne107Cause(Code):
     POSITION_RATE = 15, "position changes faster than the valve can"
     SATURATED = 16, "command at its limit"
     OVERRUN = 17, "cycles or replies too slow"
+    COMMAND_RATE = 18, "command changes too fast"
 
 
 class EventKind(Code):

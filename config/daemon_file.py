@@ -92,12 +92,17 @@ class ExcitationTable(Schema):
     """Where the staircase may take the stem, as shares of the stroke."""
     staircase_limit_s: Positive = 600.0
     """The staircase ends by itself after this."""
+    permitted_travel: tuple[Fraction, Fraction] | None = None
+    """S3 begins inside it and is broken off beyond it, as shares of the stroke; wherever it is where nobody says."""
+    consent: bool = False
+    """Whether S3 needs register `experiment_consent` beside eta_1 = 0."""
 
     @model_validator(mode="after")
     def _window_is_open(self) -> Self:
-        low, high = self.travel_window
-        if high - low < NARROWEST_WINDOW:
-            raise ValueError(f"travel_window must be at least {NARROWEST_WINDOW:g} wide, it is {low:g} to {high:g}")
+        for name in ("travel_window", "permitted_travel"):
+            low, high = getattr(self, name) or (0.0, 1.0)
+            if high - low < NARROWEST_WINDOW:
+                raise ValueError(f"{name} must be at least {NARROWEST_WINDOW:g} wide, it is {low:g} to {high:g}")
         return self
 
 
@@ -244,9 +249,9 @@ class DaemonFile(Schema):
 
     @model_validator(mode="after")
     def _safe_pressure_is_known(self) -> Self:
-        monitors = (getattr(self.supervision, name).action for name in SupervisionTable.model_fields)
+        watched = (getattr(self.supervision, name).action for name in SupervisionTable.model_fields)
         safe_pa = self.safety.safe_pressure_pa
-        if "safe" in (self.safety.action, self.safety.heartbeat_action, *monitors) and safe_pa is None:
+        if "safe" in (self.safety.action, self.safety.heartbeat_action, *watched) and safe_pa is None:
             raise ValueError('safety.safe_pressure_pa is required by the action "safe" and missing')
         if safe_pa is not None and not self.pressure.minimum_pa <= safe_pa <= self.pressure.maximum_pa:
             allowed = f"{self.pressure.minimum_pa:g} to {self.pressure.maximum_pa:g} Pa ([pressure])"

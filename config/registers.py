@@ -248,7 +248,8 @@ HEALTH = (
     ),
     Register("ne107", 502, "uint16", "1", f"NAMUR NE 107: {listed(Ne107Status)}"),
     Register("ne107_cause", 503, "uint16", "1", f"what decides ne107: {listed(Ne107Cause)}"),
-    Register("ne107_causes", 504, "uint16", "1", "all causes that hold: bit n - 1 is cause n of ne107_cause"),
+    Register("ne107_causes", 504, "uint16", "1", "causes that hold: bit n - 1 is cause n of ne107_cause, 1 to 16"),
+    Register("ne107_causes_high", 505, "uint16", "1", "the same from 17 up: bit n - 17 is cause n"),
     Register("friction", 506, "float32", "Pa", "Coulomb friction F_c / A as the law uses it; NaN: none yet"),
     Register("friction_baseline", 508, "float32", "Pa", "what it was when it was called normal; NaN: never"),
     Register("friction_ratio", 510, "float32", "1", "friction over its baseline; NaN: one is missing"),
@@ -260,8 +261,16 @@ HEALTH = (
 )
 
 EXPERIMENT = (
-    _writable("experiment_consent", 600, "uint16", "1", 0, 1, "1: experiments may be played; 0 breaks one off"),
-    _operable("experiment_veto", 601, "uint16", "1", 0, 1, "1: none may be played; breaks one off"),
+    _writable(
+        "experiment_consent",
+        600,
+        "uint16",
+        "1",
+        0,
+        1,
+        "1: tests may be commanded; 0 breaks one off",
+    ),
+    _operable("experiment_veto", 601, "uint16", "1", 0, 1, "1: no experiment and no S3; breaks one off"),
     _writable("experiment_point", 602, "uint16", "1", 0, MOST_POINTS - 1, "which point is written; 0 begins anew"),
     _writable("experiment_time", 603, "float32", "s", 0.0, 1e5, "its time; written together with the point"),
     _writable("experiment_pressure", 605, "float32", "Pa", 0.0, _LARGEST_PA, "its pressure; the same"),

@@ -1,7 +1,8 @@
 """Tables `[safety]` and `[supervision]` of the daemon's file: what ends in the safe state, and what else is watched.
 
 Each monitor has a threshold (0: it is not watched), a delay for which it must hold, what is done then, and its class by
-NAMUR NE 107. `alarm` only says so; anything else is a fault, latched, with that action. None knows the law.
+NAMUR NE 107. `alarm` only says so; anything else is a fault, latched, with that action. What `[safety]` itself watches
+has its thresholds and delays there, action and class here. None knows the law.
 """
 
 from typing import Annotated, Literal
@@ -12,6 +13,9 @@ from config.loading import Fraction, NonNegative, Positive, Schema
 
 SafeActionName = Literal["hold", "vent", "fill", "safe"]
 """What is done on a fault: `safe` is the pressure `[safety] safe_pressure_pa`."""
+FaultActionName = Literal[SafeActionName, "manual"]
+"""Where the device still obeys, an operator may command by hand instead: the pressure is held until they write one."""
+Ne107Letter = Literal["F", "C", "S", "M"]
 
 
 class SafetyTable(Schema):
@@ -28,7 +32,7 @@ class SafetyTable(Schema):
     """How often the device is asked for the command it holds, that another master may have written; 0 is never."""
     heartbeat_timeout_s: NonNegative = 0.0
     """Silence of the DCS that is a fault; 0 is never."""
-    heartbeat_action: SafeActionName = "hold"
+    heartbeat_action: FaultActionName = "hold"
     safe_pressure_pa: NonNegative | None = None
     """Of the action "safe"."""
 
@@ -38,8 +42,8 @@ class Monitor(Schema):
 
     threshold: NonNegative = 0.0
     delay_s: NonNegative = 1.0
-    action: Literal["alarm", "hold", "vent", "fill", "safe"] = "alarm"
-    ne107: Literal["F", "C", "S", "M"] = "S"
+    action: Literal["alarm", FaultActionName] = "alarm"
+    ne107: Ne107Letter = "S"
 
 
 class TravelDeviation(Monitor):
@@ -52,16 +56,16 @@ class FrozenSensor(Monitor):
     """A position the same to the digit, inside the travel, while the pressure changes by a share of its span."""
 
     threshold: NonNegative = 0.5
-    action: Literal["alarm", "hold", "vent", "fill", "safe"] = "hold"
-    ne107: Literal["F", "C", "S", "M"] = "F"
+    action: Literal["alarm", FaultActionName] = "hold"
+    ne107: Ne107Letter = "F"
 
 
 class PositionRate(Monitor):
     """A position that changes by more strokes a second than the valve can."""
 
     delay_s: NonNegative = 0.0
-    action: Literal["alarm", "hold", "vent", "fill", "safe"] = "hold"
-    ne107: Literal["F", "C", "S", "M"] = "F"
+    action: Literal["alarm", FaultActionName] = "hold"
+    ne107: Ne107Letter = "F"
 
 
 class Saturation(Monitor):
@@ -76,11 +80,46 @@ class Overrun(Monitor):
     threshold: Annotated[float, Field(ge=0)] = 3.0
 
 
+class CommandRate(Monitor):
+    """A command that changes by more shares of the span a second, whoever gives it, while no fault is latched."""
+
+    delay_s: NonNegative = 0.0
+
+
+class SampleAge(Schema):
+    """No measurement, or the same (`[safety] lost_after_cycles`, `stale_after_s`): no reply, stale."""
+
+    action: SafeActionName | None = None
+    """That of `[safety]` where nobody says; not by hand, for the device does not answer."""
+    ne107: Ne107Letter = "F"
+
+
+class Plausibility(Schema):
+    """Measurements that cannot be (`[safety] travel_margin`, `lost_after_cycles`): implausible."""
+
+    action: FaultActionName | None = None
+    """That of `[safety]` where nobody says."""
+    ne107: Ne107Letter = "F"
+
+
+class Heartbeat(Schema):
+    """No heartbeat (`[safety] heartbeat_timeout_s`): DCS silent."""
+
+    action: FaultActionName | None = None
+    """`[safety] heartbeat_action` where nobody says."""
+    ne107: Ne107Letter = "S"
+
+
 class SupervisionTable(Schema):
-    """The monitors."""
+    """What is watched."""
+
+    sample_age: SampleAge = SampleAge()
+    plausibility: Plausibility = Plausibility()
+    heartbeat: Heartbeat = Heartbeat()
 
     travel_deviation: TravelDeviation = TravelDeviation()
     frozen_sensor: FrozenSensor = FrozenSensor()
     position_rate: PositionRate = PositionRate()
     saturation: Saturation = Saturation()
     overrun: Overrun = Overrun()
+    command_rate: CommandRate = CommandRate()

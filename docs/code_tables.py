@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from config.codes import CAUSES, Code, EventKind, Ne107Cause, Ne107Status, Refusal
+from positioner.control.permissives import table as permissives
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
 from positioner.history.entries import TABLES, Entry
@@ -17,6 +18,8 @@ BEGIN = "<!-- classes: written by `python -m docs.code_tables` -->"
 END = "<!-- end of the classes -->"
 STATES_BEGIN = "<!-- states: written by `python -m docs.code_tables` -->"
 STATES_END = "<!-- end of the states -->"
+PERMISSIVES_BEGIN = "<!-- permissives: written by `python -m docs.code_tables` -->"
+PERMISSIVES_END = "<!-- end of the permissives -->"
 EVENTS_BEGIN = "<!-- events: written by `python -m docs.code_tables` -->"
 EVENTS_END = "<!-- end of the events -->"
 TABLES_BEGIN = "<!-- tables: written by `python -m docs.code_tables` -->"
@@ -29,7 +32,7 @@ never gets a new meaning.
 SERVED: dict[type[Code], str] = {code: register for register, code in CODES.items()} | {
     Refusal: "*_reason, refusal",
     Ne107Status: "ne107, event_class",
-    Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes",
+    Ne107Cause: "ne107_cause, and bit n - 1 of ne107_causes, from 17 up bit n - 17 of ne107_causes_high",
 }
 """The register that serves each."""
 
@@ -58,10 +61,9 @@ def _causes(status: Ne107Status) -> str:
 
 
 def with_states(document: str) -> str:
-    """Return `reliability.md` with the service's states between its marks."""
-    head, _, rest = document.partition(STATES_BEGIN)
-    _, _, tail = rest.partition(STATES_END)
-    return "\n".join([head + STATES_BEGIN, *table(), STATES_END + tail])
+    """Return `reliability.md` with the service's states, and what permits a test, between their marks."""
+    document = _between(document, STATES_BEGIN, STATES_END, table())
+    return _between(document, PERMISSIVES_BEGIN, PERMISSIVES_END, permissives())
 
 
 def with_events(document: str) -> str:

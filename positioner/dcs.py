@@ -24,6 +24,9 @@ REFUSALS = (
     InhibitReason.ALPHA_BELOW_BREAKAWAY,
     InhibitReason.EXCITATION_BEYOND_LIMITS,
     InhibitReason.EXCITATION_TOO_LONG,
+    InhibitReason.EXCITATION_OUTSIDE_WINDOW,
+    InhibitReason.EXCITATION_NO_CONSENT,
+    InhibitReason.EXCITATION_VETOED,
     InhibitReason.AMPLITUDE_ZERO,
     InhibitReason.STAIRCASE_IN_VAIN,
 )

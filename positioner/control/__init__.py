@@ -23,5 +23,6 @@ real time.
     rest_detector                               where the stem rests
     excitation                                  S3: which excitation is under way, and when it ends
     sine_excitation, staircase_excitation       a sine, or a staircase of slides
+    permissives                                 what permits S3 and an experiment, and what its end does
     played_experiment                           a sequence that the DCS consents to: what it may, how it ends
 """

@@ -128,6 +128,7 @@ def step(
         sample.position_m if fresh else None,
         memory.command_pa,
         _sent_to_m(memory),
+        faulty=memory.supervision.fault is not NO_FAULT,
     )
     supervision = supervise(
         memory.supervision,
@@ -138,20 +139,21 @@ def step(
         good=fresh,
         monitored=monitoring.fault_among(settings.monitoring) if monitoring.holding else NO_FAULT,
     )
-    consumed = _consumed(memory, supervision.mode, requests)
+    consumed = _consumed(memory, supervision, requests)
     waits = _waits(memory, supervision.mode, requests, settings, statics)
     reference = _reference(memory, supervision.mode, consumed, requests, sample.position_m if fresh else None, waits)
     excitation, excitation_inhibit = excitation_after(
         memory.excitation,
         supervision.mode,
-        sample,
+        sample.now_s,
+        sample.position_m if fresh else None,
         requests,
         settings,
         held_pa=memory.wanted_pa,
         reference=reference,
         ratios=memory.applied.ratios,
     )
-    if excitation is not None and memory.excitation is None:
+    if excitation is not None and memory.excitation is None and not excitation.ended:
         statics.restart()
     experiment = _experiment(memory, supervision, sample, requests, settings, fresh=fresh)
     playing = experiment.commands
@@ -192,10 +194,10 @@ def step(
         )
         law_memory = after_step(memory.law, settings.law_with_memory, seen)
 
-    if supervision.fault:
-        asked_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
-    elif supervision.mode is MANUAL and requests.manual_writes != consumed.manual_writes:
+    if supervision.mode is MANUAL and requests.manual_writes != consumed.manual_writes:
         asked_pa = requests.manual_pa
+    elif supervision.fault:
+        asked_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
     else:
         exciting = experiment if playing else excitation
         asked_pa = _pressure_pa(
@@ -333,14 +335,16 @@ def _restoration(
     return memory.restoration.after(outcome, settings.limits.stroke_m)
 
 
-def _consumed(memory: ControllerMemory, mode: Mode, requests: Requests) -> ConsumedRequests:
-    """Return which writes are consumed: those whose mode is left now."""
-    before, consumed = memory.supervision.mode, memory.consumed
-    if mode is before:
+def _consumed(memory: ControllerMemory, supervision: SupervisionMemory, requests: Requests) -> ConsumedRequests:
+    """Return which writes are consumed: those whose mode is left now, or that a fault to be met by hand found."""
+    before, mode, consumed = memory.supervision.mode, supervision.mode, memory.consumed
+    latched = supervision.fault is not NO_FAULT and supervision.fault is not memory.supervision.fault
+    by_hand = mode is MANUAL and latched
+    if mode is before and not by_hand:
         return consumed
     return ConsumedRequests(
         requests.reference_writes if before is AUTOMATIC else consumed.reference_writes,
-        requests.manual_writes if before is MANUAL else consumed.manual_writes,
+        requests.manual_writes if before is MANUAL or by_hand else consumed.manual_writes,
     )
 
 

@@ -1,16 +1,16 @@
 """The excitation under way in S3: a sine as the DCS asks for it, or a staircase of slides, and when it ends.
 
-S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or a staircase that came to nothing, has
-ended: S3 is left, and only eta_1 = 1 makes room for another.
+S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or that is not permitted any more
+(`permissives`), or a staircase that came to nothing, has ended: S3 is left, and only eta_1 = 1 makes room for another.
 """
 
 from dataclasses import dataclass, replace
 
 from config.codes import AUTOMATIC, InhibitReason, Mode
 from positioner.control.balance_law import balance_pa
+from positioner.control.permissives import MEASURED, TIME, ExcitationLimits, missing
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
-from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.sine_excitation import SineExcitation
 from positioner.control.staircase_excitation import Staircase
@@ -49,7 +49,8 @@ class ActiveExcitation:
 def excitation_after(
     excitation: ActiveExcitation | None,
     mode: Mode,
-    sample: Sample,
+    now_s: float,
+    position_m: float | None,
     requests: Requests,
     settings: Settings,
     held_pa: float,
@@ -61,7 +62,8 @@ def excitation_after(
     Args:
         excitation: before.
         mode: in force.
-        sample: the latest.
+        now_s: of the sample.
+        position_m: None without a good measurement.
         requests: of the DCS.
         settings: limits, and which excitation.
         held_pa: the last command, from which a staircase begins.
@@ -70,12 +72,16 @@ def excitation_after(
     """
     if mode is not AUTOMATIC or requests.eta[0] != 0:
         return None, NOTHING
+    lacking = _lacking(requests, position_m, settings.excitation)
     if excitation is not None:
-        if not excitation.ended and sample.now_s - excitation.start_s > settings.excitation_limit_s:
-            excitation = replace(excitation, inhibit_reason=InhibitReason.EXCITATION_TOO_LONG)
+        if not excitation.ended:
+            too_long = now_s - excitation.start_s > settings.excitation.longest_s
+            excitation = replace(excitation, inhibit_reason=TIME.why if too_long else lacking)
         return excitation, excitation.inhibit_reason
-    if settings.staircase is not None:
-        return ActiveExcitation(Staircase(held_pa), sample.now_s), NOTHING
+    if position_m is None:
+        return None, MEASURED.why
+    if settings.staircase is not None or lacking is not NOTHING:  # one that is refused never commands
+        return ActiveExcitation(Staircase(held_pa), now_s, lacking), lacking
     alpha_pa = requests.alpha_pa
     if alpha_pa <= 0:
         direction = -1 if reference.delta_m < 0 else 1
@@ -84,7 +90,18 @@ def excitation_after(
     inhibit_reason = sine.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
     if inhibit_reason is not NOTHING:
         return None, inhibit_reason
-    return ActiveExcitation(sine, sample.now_s), inhibit_reason
+    return ActiveExcitation(sine, now_s), inhibit_reason
+
+
+def _lacking(requests: Requests, position_m: float | None, limits: ExcitationLimits) -> InhibitReason:
+    asked = requests.experiment
+    lacking = missing(
+        consented=asked.consented or not limits.by_consent,
+        vetoed=asked.vetoed,
+        position_m=position_m,
+        window_m=(limits.low_m, limits.high_m),
+    )
+    return NOTHING if lacking is None else lacking.why
 
 
 def climbed(

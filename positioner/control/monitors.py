@@ -5,6 +5,7 @@
     position rate      |x - x_before| / (t - t_before) > threshold * stroke
     saturation         u within threshold * span of a limit            x inside the travel
     overrun            t - t_before > threshold * period               in real time
+    command rate       |u - u_before| / (t - t_before) > threshold * span   while no fault is latched
 
 t on the clock of the cycle. Nothing here knows the law. An alarm ends with its condition; a fault is latched by
 `supervision`.
@@ -16,7 +17,7 @@ from typing import NamedTuple
 
 from config.codes import Fault
 from config.daemon_file import DaemonFile
-from config.supervision_table import SafeActionName
+from config.supervision_table import FaultActionName
 
 ENDS = 0.02
 """Share of the stroke from each end of the travel: there a stem may well stand, whatever the pressure."""
@@ -28,7 +29,7 @@ class MonitorLimits:
 
     fault: Fault
     delay_s: float
-    action: SafeActionName | None
+    action: FaultActionName | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ class MonitorSettings:
     """The monitors in the order of their faults, and the bounds of their conditions; infinite where one is off.
 
     Attributes:
-        deviation_m, frozen_pa, rate_m_per_s, overrun_s: beyond which a condition holds.
+        deviation_m, frozen_pa, rate_m_per_s, overrun_s, rate_pa_per_s: beyond which a condition holds.
         low_pa, high_pa: outside which the command is saturated.
         low_m, high_m: away from both ends of the travel a stem is between these.
     """
@@ -46,6 +47,7 @@ class MonitorSettings:
     frozen_pa: float
     rate_m_per_s: float
     overrun_s: float
+    rate_pa_per_s: float
     low_pa: float
     high_pa: float
     low_m: float
@@ -63,6 +65,7 @@ class MonitorSettings:
             (Fault.POSITION_RATE, table.position_rate),
             (Fault.SATURATED, table.saturation),
             (Fault.OVERRUN, table.overrun),
+            (Fault.COMMAND_RATE, table.command_rate),
         )
         near_pa = table.saturation.threshold * span_pa or -inf
         return cls(
@@ -74,6 +77,7 @@ class MonitorSettings:
             frozen_pa=table.frozen_sensor.threshold * span_pa or inf,
             rate_m_per_s=table.position_rate.threshold * stroke_m or inf,
             overrun_s=table.overrun.threshold * period_s or inf,
+            rate_pa_per_s=table.command_rate.threshold * span_pa or inf,
             low_pa=pressure.minimum_pa + near_pa,
             high_pa=pressure.maximum_pa - near_pa,
             low_m=ENDS * stroke_m,
@@ -81,7 +85,7 @@ class MonitorSettings:
         )
 
 
-NEVER = (inf, inf, inf, inf, inf)
+NEVER = (inf, inf, inf, inf, inf, inf)
 """No condition holds."""
 
 
@@ -96,6 +100,8 @@ class MonitorMemory(NamedTuple):
     """The last good one, and when; infinite before there was one."""
     unmoved_pa: float = inf
     """The command when it last changed."""
+    command_pa: float | None = None
+    """The last seen, while no fault was latched."""
     holding: tuple[Fault, ...] = ()
     """Those whose condition has held for their delay."""
 
@@ -112,6 +118,8 @@ def after_cycle(
     position_m: float | None,
     command_pa: float,
     reference_m: float | None,
+    *,
+    faulty: bool = False,
 ) -> MonitorMemory:
     """Return what is known after a cycle.
 
@@ -121,11 +129,16 @@ def after_cycle(
         position_m: None in a cycle without a good measurement.
         command_pa: the last given.
         reference_m: where the stem is asked to be; None where nobody asks.
+        faulty: whether a fault is latched: then a safe action commands.
     """
-    overrun = now_s - memory.seen_s > settings.overrun_s
+    elapsed_s = now_s - memory.seen_s
+    overrun = elapsed_s > settings.overrun_s
+    before_pa, seen_pa = memory.command_pa, None if faulty else command_pa
+    change_pa = 0.0 if before_pa is None or faulty else abs(command_pa - before_pa)
+    fast = change_pa > settings.rate_pa_per_s * elapsed_s > 0.0
     if position_m is None:
-        since_s, holding = _held(memory, settings, now_s, (False, False, False, False, overrun))
-        return memory._replace(since_s=since_s, seen_s=now_s, holding=holding)
+        since_s, holding = _held(memory, settings, now_s, (False, False, False, False, overrun, fast))
+        return memory._replace(since_s=since_s, seen_s=now_s, command_pa=seen_pa, holding=holding)
     way_m, passed_s = abs(position_m - memory.position_m), now_s - memory.good_s
     unmoved_pa = memory.unmoved_pa if way_m == 0.0 else command_pa
     inside = settings.low_m < position_m < settings.high_m
@@ -135,9 +148,10 @@ def after_cycle(
         way_m > settings.rate_m_per_s * passed_s > 0.0,
         inside and not settings.low_pa <= command_pa <= settings.high_pa,
         overrun,
+        fast,
     )
     since_s, holding = _held(memory, settings, now_s, conditions)
-    return MonitorMemory(since_s, now_s, now_s, position_m, unmoved_pa, holding)
+    return MonitorMemory(since_s, now_s, now_s, position_m, unmoved_pa, seen_pa, holding)
 
 
 def _held(

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from config.codes import ExperimentState, Fault, Mode
+from positioner.control.permissives import missing
 from positioner.control.requests import ExperimentRequest
 
 COMMANDING = (ExperimentState.UNDER_WAY, ExperimentState.RETURNING)
@@ -101,7 +102,7 @@ def experiment_after(
     over = around.now_s - here.begin_s >= here.sequence[-1][0]
     if here.state is ExperimentState.RETURNING:
         return replace(here, state=here.after) if over else here
-    stopped = _withdrawn(request) or _outside(around, limits)
+    stopped = _withdrawn(request, around, limits)
     if stopped is not ExperimentState.NONE or over:
         return _returning(here, stopped, around, limits)
     return here
@@ -145,7 +146,7 @@ def _way_s(from_pa: float, to_pa: float, limits: ExperimentLimits) -> float:
 def _refusal(request: ExperimentRequest, around: Surroundings, limits: ExperimentLimits) -> ExperimentState:
     """Return why an experiment may not begin; NONE if it may."""
     unmeasured = ExperimentState.NO_MEASUREMENT if around.position_m is None else ExperimentState.NONE
-    stopped = _not_ours(around) or unmeasured or _withdrawn(request) or _outside(around, limits)
+    stopped = _not_ours(around) or unmeasured or _withdrawn(request, around, limits)
     return stopped or _problem(request.points, around.command_pa, limits)
 
 
@@ -158,15 +159,14 @@ def _not_ours(around: Surroundings) -> ExperimentState:
     return ExperimentState.EXCITED if around.excited else ExperimentState.NONE
 
 
-def _withdrawn(request: ExperimentRequest) -> ExperimentState:
-    if request.vetoed:
-        return ExperimentState.VETOED
-    return ExperimentState.NONE if request.consented else ExperimentState.NO_CONSENT
-
-
-def _outside(around: Surroundings, limits: ExperimentLimits) -> ExperimentState:
-    inside = around.position_m is None or limits.low_m <= around.position_m <= limits.high_m
-    return ExperimentState.NONE if inside else ExperimentState.OUTSIDE_WINDOW
+def _withdrawn(request: ExperimentRequest, around: Surroundings, limits: ExperimentLimits) -> ExperimentState:
+    lacking = missing(
+        consented=request.consented,
+        vetoed=request.vetoed,
+        position_m=around.position_m,
+        window_m=(limits.low_m, limits.high_m),
+    )
+    return ExperimentState.NONE if lacking is None else lacking.experiment
 
 
 def _problem(points: tuple[tuple[float, float], ...], command_pa: float, limits: ExperimentLimits) -> ExperimentState:

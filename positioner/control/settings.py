@@ -2,15 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
+from config.codes import Fault
 from config.daemon_file import DaemonFile, LawTable
 from config.extended_valve import ExtendedValve
-from config.supervision_table import SafeActionName
+from config.supervision_table import FaultActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.conventional_law import ConventionalSettings
 from positioner.control.monitors import MonitorSettings
+from positioner.control.permissives import ExcitationLimits
 from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.slide_memory import DAY_S, SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
@@ -34,7 +36,7 @@ class Settings:
     minimum_pa: float
     maximum_pa: float
     breakaway_pa: float | None
-    excitation_limit_s: float
+    excitation: ExcitationLimits
     identification: IdentificationSettings
     applied: Applied
     """What the law may use before anything was identified."""
@@ -75,14 +77,14 @@ class Settings:
                 restart_tolerance_pa=max(1e-3 * file.pressure.maximum_pa, file.device.command_step_pa),
                 action=safety.action,
                 heartbeat_action=safety.heartbeat_action,
-                actions={each.fault: each.action for each in monitoring.monitors if each.action is not None},
+                actions=_actions(file, monitoring),
             ),
             monitoring=monitoring,
             safe_pressure_pa=safety.safe_pressure_pa,
             minimum_pa=file.pressure.minimum_pa,
             maximum_pa=file.pressure.maximum_pa,
             breakaway_pa=file.valve.breakaway_pa,
-            excitation_limit_s=file.excitation.staircase_limit_s if file.by_slides else file.excitation.limit_s,
+            excitation=_excitation(file),
             identification=IdentificationSettings(
                 stroke_m=file.valve.stroke_m,
                 pressure_pa=file.pressure.maximum_pa - file.pressure.minimum_pa,
@@ -107,10 +109,27 @@ class Settings:
             valve=valve,
         )
 
-    def safe_pa(self, action: SafeActionName, held_pa: float) -> float:
-        """Return the pressure of a safe action: what is held, the minimum (vent), the maximum (fill), the safe one."""
+    def safe_pa(self, action: FaultActionName, held_pa: float) -> float:
+        """Return the pressure of an action: what is held, the minimum (vent), the maximum (fill), the safe one.
+
+        By hand it is what is held, until an operator writes another.
+        """
         safe_pa = held_pa if self.safe_pressure_pa is None else self.safe_pressure_pa
-        return {"hold": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa, "safe": safe_pa}[action]
+        pressures = {"hold": held_pa, "manual": held_pa, "vent": self.minimum_pa, "fill": self.maximum_pa}
+        return {**pressures, "safe": safe_pa}[action]
+
+
+def _actions(file: DaemonFile, monitoring: MonitorSettings) -> dict[Fault, FaultActionName]:
+    """Return the actions of the faults that have their own."""
+    table = file.supervision
+    own: dict[Fault, FaultActionName | None] = {
+        Fault.NO_REPLY: table.sample_age.action,
+        Fault.STALE: table.sample_age.action,
+        Fault.IMPLAUSIBLE: table.plausibility.action,
+        Fault.DCS_SILENT: table.heartbeat.action,
+        **{each.fault: each.action for each in monitoring.monitors},
+    }
+    return {fault: action for fault, action in own.items() if action is not None}
 
 
 def _within_supply(file: DaemonFile, valve: ExtendedValve | None) -> DaemonFile:
@@ -168,6 +187,17 @@ WITH_MEMORY: dict[str, Callable[[DaemonFile], BreakawaySettings | SlideSettings 
 def _staircase(file: DaemonFile) -> StaircaseLimits:
     low, high = (share * file.valve.stroke_m for share in file.excitation.travel_window)
     return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa)
+
+
+def _excitation(file: DaemonFile) -> ExcitationLimits:
+    table = file.excitation
+    low, high = table.permitted_travel or (-inf, inf)
+    return ExcitationLimits(
+        longest_s=table.staircase_limit_s if file.by_slides else table.limit_s,
+        low_m=low * file.valve.stroke_m,
+        high_m=high * file.valve.stroke_m,
+        by_consent=table.consent,
+    )
 
 
 def _experiment(file: DaemonFile) -> ExperimentLimits:

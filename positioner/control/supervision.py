@@ -1,7 +1,9 @@
 """Supervision: did the daemon run, is the measurement fresh and plausible, does the DCS live, who commands?
 
 It knows nothing of the law. A fault is latched: the mode falls to hold, the safe action commands, and only an
-acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again.
+acknowledgement after its cause is gone frees the way; then a person or the DCS must choose a mode again. A fault whose
+action is manual leaves the valve to an operator instead: the mode falls to manual, unless it was hold, and the pressure
+is held until they write one.
 """
 
 import math
@@ -9,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from config.codes import HOLD, Fault, Mode, Quality
+from config.codes import HOLD, MANUAL, Fault, Mode, Quality
 from config.quantities import DeviceStatus
-from config.supervision_table import SafeActionName
+from config.supervision_table import FaultActionName, SafeActionName
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 
@@ -30,8 +32,8 @@ class Limits:
     restart_tolerance_pa: float
     """A device that comes back with a command farther than this from ours was restarted."""
     action: SafeActionName
-    heartbeat_action: SafeActionName
-    actions: Mapping[Fault, SafeActionName] = field(default_factory=dict)
+    heartbeat_action: FaultActionName
+    actions: Mapping[Fault, FaultActionName] = field(default_factory=dict)
     """Of faults that have their own."""
 
     def plausible(self, position_m: float) -> bool:
@@ -39,9 +41,9 @@ class Limits:
         margin_m = self.travel_margin * self.stroke_m
         return -margin_m <= position_m <= self.stroke_m + margin_m
 
-    def action_on(self, fault: Fault) -> SafeActionName:
-        """Return the safe action that answers a fault."""
-        return self.heartbeat_action if fault is Fault.DCS_SILENT else self.actions.get(fault, self.action)
+    def action_on(self, fault: Fault) -> FaultActionName:
+        """Return the action that answers a fault."""
+        return self.actions.get(fault, self.heartbeat_action if fault is Fault.DCS_SILENT else self.action)
 
 
 class SupervisionMemory(NamedTuple):
@@ -108,7 +110,7 @@ def supervise(
     acknowledged = requests.acknowledgements != memory.acknowledgements
     fault = cause or (NO_FAULT if acknowledged else memory.fault)
     return SupervisionMemory(
-        _mode(memory, requests, fault),
+        _mode(memory, requests, fault, limits),
         fault,
         bad_in_a_row,
         good_s,
@@ -137,7 +139,9 @@ def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s
     return NO_FAULT
 
 
-def _mode(memory: SupervisionMemory, requests: Requests, fault: Fault) -> Mode:
-    if fault:
-        return HOLD
-    return requests.mode if requests.mode_writes != memory.mode_writes else memory.mode
+def _mode(memory: SupervisionMemory, requests: Requests, fault: Fault, limits: Limits) -> Mode:
+    written = requests.mode_writes != memory.mode_writes
+    if not fault:
+        return requests.mode if written else memory.mode
+    by_hand = memory.mode is not HOLD and limits.action_on(fault) == "manual"
+    return MANUAL if by_hand and not (written and requests.mode is HOLD) else HOLD

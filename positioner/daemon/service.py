@@ -190,7 +190,7 @@ def _assembled(
         HealthSettings.of(file.health, file.valve.stroke_m, file.supervision), stored.record if stored else None
     )
     with logging_valve(file.valve.name):
-        happened = history.valve(file, health.settings.monitor_classes)
+        happened = history.valve(file, health.settings.fault_classes)
         cycle = Cycle(link, controller, pace, _first_requests(file), recorder, file.valve.name, health, happened)
     happened.look = partial(_look, cycle, health)
     locked = happened.locked = locks_out(file.supervisory.local_switch)

@@ -19,20 +19,34 @@ class ServiceEvent(StrEnum):
     HELD = "mode hold is written"
     FAULT_HOLDS = "a fault whose action is hold"
     FAULT_SAFE = "a fault whose action is vent, fill or safe"
+    FAULT_MANUAL = "a fault whose action is manual"
     ACKNOWLEDGED = "acknowledged, the cause gone"
     ENDED = "a signal, or a thread that died"
 
 
-_FAULTS = {ServiceEvent.FAULT_HOLDS: ServiceState.FAULT_HOLD, ServiceEvent.FAULT_SAFE: ServiceState.FAULT_SAFE}
+_FAULTS = {
+    ServiceEvent.FAULT_HOLDS: ServiceState.FAULT_HOLD,
+    ServiceEvent.FAULT_SAFE: ServiceState.FAULT_SAFE,
+    ServiceEvent.FAULT_MANUAL: ServiceState.FAULT_HOLD,
+}
+"""In mode hold, as all but active and fault-manual are, nobody commands by hand before the mode is written."""
+_BY_HAND = {ServiceEvent.FAULT_MANUAL: ServiceState.FAULT_MANUAL}
 _END = {ServiceEvent.ENDED: ServiceState.STOPPED}
 
 TRANSITIONS: dict[ServiceState, dict[ServiceEvent, ServiceState]] = {
     ServiceState.STARTING: {ServiceEvent.MEASURED: ServiceState.STANDBY, **_FAULTS, **_END},
     ServiceState.SHADOW: _END,
     ServiceState.STANDBY: {ServiceEvent.COMMANDED: ServiceState.ACTIVE, **_FAULTS, **_END},
-    ServiceState.ACTIVE: {ServiceEvent.HELD: ServiceState.STANDBY, **_FAULTS, **_END},
+    ServiceState.ACTIVE: {ServiceEvent.HELD: ServiceState.STANDBY, **_FAULTS, **_BY_HAND, **_END},
     ServiceState.FAULT_HOLD: {ServiceEvent.ACKNOWLEDGED: ServiceState.STANDBY, **_FAULTS, **_END},
     ServiceState.FAULT_SAFE: {ServiceEvent.ACKNOWLEDGED: ServiceState.STANDBY, **_FAULTS, **_END},
+    ServiceState.FAULT_MANUAL: {
+        ServiceEvent.HELD: ServiceState.FAULT_HOLD,
+        ServiceEvent.ACKNOWLEDGED: ServiceState.ACTIVE,
+        **_FAULTS,
+        **_BY_HAND,
+        **_END,
+    },
     ServiceState.STOPPED: {},
 }
 """Where an event leads; what is not named leaves the state as it is."""
@@ -48,7 +62,9 @@ def service_state(decision: Decision, limits: Limits, *, shadow: bool) -> Servic
     if shadow:
         return ServiceState.SHADOW
     if decision.fault is not Fault.NONE:
-        holds = limits.action_on(decision.fault) == "hold"
+        if decision.mode is Mode.MANUAL:
+            return ServiceState.FAULT_MANUAL
+        holds = limits.action_on(decision.fault) in ("hold", "manual")
         return ServiceState.FAULT_HOLD if holds else ServiceState.FAULT_SAFE
     if not decision.measured:
         return ServiceState.STARTING

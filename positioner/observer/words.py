@@ -77,13 +77,13 @@ def code_text(register: str, value: float) -> str:
         return f"code {int(value)}, which this version does not know"
 
 
-def ne107_causes(bits: float) -> list[str]:
-    """Return all causes behind an NE 107 status, first the one that decides.
+def ne107_causes(low: float, high: float = 0) -> list[str]:
+    """Return all causes behind an NE 107 status, of both registers.
 
-    >>> ne107_causes(0b100000010)
-    ['not automatic', 'friction low: packing leaks']
+    >>> ne107_causes(0b100000010, 1)
+    ['not automatic', 'friction low: packing leaks', 'cycles or replies too slow']
     """
-    number = int(bits) if math.isfinite(bits) else 0
+    number = sum(int(bits) << shift for bits, shift in ((low, 0), (high, 16)) if math.isfinite(bits))
     return [code_text("ne107_cause", bit + 1) for bit in range(number.bit_length()) if number >> bit & 1]
 
 

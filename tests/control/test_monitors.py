@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import pytest
 
-from config.codes import Fault, Mode, Quality
+from config.codes import Fault, Mode, Quality, State
 from config.daemon_file import DaemonFile
 from config.errors import InputError
 from config.loading import validated
+from config.quantities import DeviceStatus
 from positioner.control.controller_memory import Decision
 from tests.control.test_controller import LAW, STROKE_M, Bench, automatic
 
@@ -46,12 +47,19 @@ def is_late(bench: Bench) -> Decision:
     return bench.step()
 
 
+def is_fast(bench: Bench) -> Decision:
+    bench.ask(mode=Mode.MANUAL, manual_pa=60e3)
+    bench.step()
+    return bench.step()
+
+
 MONITORS: dict[str, tuple[Finds, Fault, float]] = {
     "travel_deviation": (deviates, Fault.TRAVEL_DEVIATION, 0.1),
     "frozen_sensor": (is_frozen, Fault.FROZEN_SENSOR, 0.5),
     "position_rate": (jumps, Fault.POSITION_RATE, 10.0),
     "saturation": (is_saturated, Fault.SATURATED, 0.01),
     "overrun": (is_late, Fault.OVERRUN, 3.0),
+    "command_rate": (is_fast, Fault.COMMAND_RATE, 1.0),
 }
 QUIET: dict[str, object] = {name: {"threshold": 0.0} for name in MONITORS}
 
@@ -95,7 +103,7 @@ def test_an_alarm_is_told_and_changes_nothing(name: str) -> None:
     assert (without.fault, without.alarms) == (Fault.NONE, ())
 
 
-@pytest.mark.parametrize("name", [each for each in MONITORS if each not in ("position_rate", "overrun")])
+@pytest.mark.parametrize("name", ["travel_deviation", "frozen_sensor", "saturation"])
 def test_what_does_not_last_for_its_delay_is_nothing(name: str) -> None:
     finds, fault, _ = MONITORS[name]
     bench = watched(name, delay_s=0.1, action="vent")
@@ -154,3 +162,101 @@ def test_by_default_a_sensor_that_stands_still_is_a_fault_and_a_slow_cycle_an_al
 def test_a_safe_pressure_that_is_none_is_one_line(safety: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         validated(DaemonFile, {"valve": {"stroke_m": STROKE_M}, "law": LAW, "safety": safety}, "daemon.toml")
+
+
+@pytest.mark.parametrize("name", MONITORS)
+def test_what_is_to_be_met_by_hand_is_held_until_an_operator_writes_a_pressure(name: str) -> None:
+    finds, fault, _ = MONITORS[name]
+    bench = watched(name, action="manual")
+    decision = finds(bench)
+    assert (decision.fault, decision.mode, decision.state) == (fault, Mode.MANUAL, State.S0_START)
+    held_pa = decision.command_pa
+    assert bench.step().command_pa == held_pa, "the law has let go, and nothing that was written before comes back"
+    bench.ask(reference_m=0.09)
+    assert bench.step().command_pa == held_pa
+    bench.ask(manual_pa=held_pa - 7e3)
+    by_hand = bench.step()
+    assert (by_hand.command_pa, by_hand.fault, by_hand.mode) == (held_pa - 7e3, fault, Mode.MANUAL)
+    bench.ask(mode=Mode.HOLD)
+    held = bench.step()
+    assert (held.mode, held.command_pa, held.fault) == (Mode.HOLD, held_pa - 7e3, fault), (
+        "hold is to be had at any time"
+    )
+
+
+def test_an_acknowledgement_leaves_the_valve_to_the_operator_who_has_it() -> None:
+    bench = watched("position_rate", action="manual")
+    jumps(bench)
+    bench.ask(manual_pa=45e3)
+    bench.step()
+    bench.acknowledge()
+    free = bench.step()
+    assert (free.fault, free.mode, free.command_pa) == (Fault.NONE, Mode.MANUAL, 45e3)
+
+
+def test_who_does_not_command_gets_nothing_by_hand_from_a_fault() -> None:
+    """In hold no request but a mode moves the valve, fault or not."""
+    bench = watched("position_rate", action="manual")
+    bench.ask(mode=Mode.HOLD, manual_pa=300e3)
+    bench.step()
+    decision = jumps(bench)
+    assert (decision.fault, decision.mode) == (Fault.POSITION_RATE, Mode.HOLD)
+    bench.ask(manual_pa=310e3)
+    assert bench.step().command_pa == decision.command_pa
+
+
+def test_another_fault_takes_the_valve_from_the_operator() -> None:
+    bench = watched("position_rate", action="manual")
+    jumps(bench)
+    bench.ask(manual_pa=45e3)
+    bench.step()
+    lost = [bench.step(quality=Quality.LOST) for _ in range(3)][-1]
+    assert (lost.fault, lost.mode, lost.command_pa) == (Fault.NO_REPLY, Mode.HOLD, 420e3)
+
+
+def test_a_safe_action_is_no_fast_command() -> None:
+    bench = watched("command_rate", action="hold")
+    unfit = [bench.step(status=DeviceStatus.SENSOR_FAULT) for _ in range(5)]
+    assert {each.fault for each in unfit} == {Fault.DEVICE}
+    assert unfit[-1].command_pa == 420e3
+
+
+@pytest.mark.parametrize(
+    ("table", "happens", "fault"),
+    [
+        ("sample_age", {"quality": Quality.LOST}, Fault.NO_REPLY),
+        ("sample_age", {"quality": Quality.REPEATED}, Fault.STALE),
+        ("plausibility", {"position_m": 1.0}, Fault.IMPLAUSIBLE),
+        ("heartbeat", {}, Fault.DCS_SILENT),
+    ],
+)
+@pytest.mark.parametrize(("action", "command_pa"), [("vent", 0.0), ("safe", 9e3), (None, 420e3)])
+def test_what_the_safety_table_watches_has_its_action_here(
+    table: str, happens: dict[str, object], fault: Fault, action: str | None, command_pa: float
+) -> None:
+    safety = {"action": "fill", "heartbeat_action": "fill", "heartbeat_timeout_s": 0.3, "safe_pressure_pa": 9e3}
+    own = {} if action is None else {table: {"action": action}}
+    bench = automatic(safety=safety, supervision=own)
+    found = [bench.step(**happens) for _ in range(40)]
+    assert (found[-1].fault, found[-1].command_pa) == (fault, command_pa)
+
+
+@pytest.mark.parametrize("table", ["plausibility", "heartbeat"])
+def test_a_bad_sensor_and_a_silent_dcs_may_be_met_by_hand(table: str) -> None:
+    bench = automatic(safety={"heartbeat_timeout_s": 0.3}, supervision={table: {"action": "manual"}})
+    bench.ask(reference_m=0.05)
+    before_pa = bench.step().command_pa
+    sample: dict[str, object] = {"position_m": 1.0} if table == "plausibility" else {}
+    found = [bench.step(**sample) for _ in range(40)][-1]
+    assert (found.mode, found.command_pa) == (Mode.MANUAL, before_pa)
+    bench.ask(manual_pa=33e3)
+    assert bench.step(**sample).command_pa == 33e3
+
+
+def test_a_device_that_does_not_answer_cannot_be_met_by_hand() -> None:
+    with pytest.raises(InputError, match=r"supervision\.sample_age\.action"):
+        validated(
+            DaemonFile,
+            {"valve": {"stroke_m": 0.1}, "supervision": {"sample_age": {"action": "manual"}}},
+            "d.toml",
+        )

@@ -15,7 +15,10 @@ from positioner.daemon.service_state import ServiceEvent, after_event, service_s
 from tests.control.test_controller import LAW, STROKE_M, Bench
 
 SAFETY = {"action": "vent", "lost_after_cycles": 5}
-SUPERVISION = {"position_rate": {"threshold": 10.0, "action": "hold"}}
+SUPERVISION = {
+    "position_rate": {"threshold": 10.0, "action": "hold"},
+    "plausibility": {"action": "manual"},
+}
 TABLES = {"safety": SAFETY, "supervision": SUPERVISION}
 LIMITS = Settings.of(DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}, "law": LAW, **TABLES})).limits
 
@@ -31,12 +34,14 @@ class Service:
         if state is ServiceState.STARTING:
             return
         self.measured()
-        if state in (ServiceState.ACTIVE, ServiceState.FAULT_HOLD, ServiceState.FAULT_SAFE):
+        if state not in (ServiceState.SHADOW, ServiceState.STANDBY):
             self.commanded()
         if state is ServiceState.FAULT_HOLD:
             self.fault_holds()
         if state is ServiceState.FAULT_SAFE:
             self.fault_safe()
+        if state is ServiceState.FAULT_MANUAL:
+            self.fault_manual()
 
     @property
     def state(self) -> ServiceState:
@@ -63,6 +68,11 @@ class Service:
 
     def fault_safe(self) -> None:
         self.decision = self.bench.step(status=DeviceStatus.SENSOR_FAULT)
+
+    def fault_manual(self) -> None:
+        for _ in range(5):
+            self.bench.step(position_m=1.0)
+        self.measured()
 
     def acknowledged(self) -> None:
         self.bench.acknowledge()

@@ -9,7 +9,7 @@
 The worst class counts, and in it the cause that stands first in `Ne107Cause`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status, State
@@ -30,13 +30,16 @@ CLASS = {
     Ne107Cause.TRAVEL: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.REVERSALS: Ne107Status.MAINTENANCE_REQUIRED,
 }
-"""The class of each cause, worst first; of those that `MONITORED` names, the daemon's file says it."""
+"""The class of each cause, worst first; of faults the daemon's file may say another, of those below it alone does."""
+FaultClasses = Mapping[Fault, Ne107Status]
+"""As table `[supervision]` of the daemon's file has them."""
 MONITORED = {
     Fault.TRAVEL_DEVIATION: Ne107Cause.TRAVEL_DEVIATION,
     Fault.FROZEN_SENSOR: Ne107Cause.FROZEN_SENSOR,
     Fault.POSITION_RATE: Ne107Cause.POSITION_RATE,
     Fault.SATURATED: Ne107Cause.SATURATED,
     Fault.OVERRUN: Ne107Cause.OVERRUN,
+    Fault.COMMAND_RATE: Ne107Cause.COMMAND_RATE,
 }
 """What the monitors find, as a cause."""
 
@@ -76,10 +79,21 @@ def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
         Ne107Cause.BEYOND_LIMITS: decision.inhibit_reason is InhibitReason.LAW_BEYOND_LIMITS,
         Ne107Cause.STUCK: decision.inhibit_reason is InhibitReason.STUCK,
     }
-    classes = {**CLASS, **health.settings.monitor_classes}
+    of_faults = health.settings.fault_classes
+    classes = {
+        **CLASS,
+        Ne107Cause.FAULT: class_of(decision.fault, of_faults),
+        Ne107Cause.DCS_SILENT: class_of(Fault.DCS_SILENT, of_faults),
+        **{cause: class_of(fault, of_faults) for fault, cause in MONITORED.items()},
+    }
     holding = {cause for cause, now in holds.items() if now} | set(_wear(health)) | monitored
     causes = sorted(holding, key=lambda cause: (-classes[cause], cause))
     return Ne107Condition(tuple(causes), classes[causes[0]] if causes else Ne107Status.GOOD)
+
+
+def class_of(fault: Fault, classes: FaultClasses) -> Ne107Status:
+    """Return the class of a fault."""
+    return classes.get(fault, Ne107Status.FAILURE)
 
 
 def _wear(health: Health) -> Iterator[Ne107Cause]:

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, nan
 
-from config.codes import Mode, Ne107Cause, Ne107Status, Quality, State
+from config.codes import Fault, Mode, Ne107Status, Quality, State
 from config.daemon_file import HealthTable
-from config.supervision_table import Monitor, SupervisionTable
+from config.supervision_table import Ne107Letter, SupervisionTable
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
@@ -37,8 +37,8 @@ class HealthSettings:
     stiction_limit: float
     travel_limit_m: float
     reversal_limit: int
-    monitor_classes: Mapping[Ne107Cause, Ne107Status]
-    """Of what the monitors of table `[supervision]` find."""
+    fault_classes: Mapping[Fault, Ne107Status]
+    """Of what table `[supervision]` names; any other fault is a failure."""
 
     @classmethod
     def of(cls, health: HealthTable, stroke_m: float, supervision: SupervisionTable = MONITORS) -> "HealthSettings":
@@ -52,18 +52,23 @@ class HealthSettings:
             stiction_limit=health.stiction_limit,
             travel_limit_m=health.travel_limit_strokes * stroke_m,
             reversal_limit=health.reversal_limit,
-            monitor_classes={
-                Ne107Cause.TRAVEL_DEVIATION: _class(supervision.travel_deviation),
-                Ne107Cause.FROZEN_SENSOR: _class(supervision.frozen_sensor),
-                Ne107Cause.POSITION_RATE: _class(supervision.position_rate),
-                Ne107Cause.SATURATED: _class(supervision.saturation),
-                Ne107Cause.OVERRUN: _class(supervision.overrun),
+            fault_classes={
+                Fault.NO_REPLY: _class(supervision.sample_age.ne107),
+                Fault.STALE: _class(supervision.sample_age.ne107),
+                Fault.IMPLAUSIBLE: _class(supervision.plausibility.ne107),
+                Fault.DCS_SILENT: _class(supervision.heartbeat.ne107),
+                Fault.TRAVEL_DEVIATION: _class(supervision.travel_deviation.ne107),
+                Fault.FROZEN_SENSOR: _class(supervision.frozen_sensor.ne107),
+                Fault.POSITION_RATE: _class(supervision.position_rate.ne107),
+                Fault.SATURATED: _class(supervision.saturation.ne107),
+                Fault.OVERRUN: _class(supervision.overrun.ne107),
+                Fault.COMMAND_RATE: _class(supervision.command_rate.ne107),
             },
         )
 
 
-def _class(monitor: Monitor) -> Ne107Status:
-    return next(each for each in Ne107Status if each.text.startswith(f"{monitor.ne107} "))
+def _class(letter: Ne107Letter) -> Ne107Status:
+    return next(each for each in Ne107Status if each.text.startswith(f"{letter} "))
 
 
 class Health:

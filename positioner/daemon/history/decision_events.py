@@ -1,21 +1,18 @@
 """Which events lie between two decisions of the controller, and their classes by NAMUR NE 107.
 
-fault      latched, or acknowledged and gone      F, or what table `[supervision]` says of a monitor
+fault      latched, or acknowledged and gone      F, or what table `[supervision]` says
 alarm      a monitor's condition holds, or no more
 mode, excitation, a played experiment             C while the valve does not follow the DCS
 identification applied, refused                   good
 what was restored is judged anew                  good, M where a landing contradicts it
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
-from config.codes import S3, EventKind, Fault, Mode, Ne107Cause, Ne107Status, Restored
+from config.codes import S3, EventKind, Fault, Mode, Ne107Status, Restored
 from positioner.control.controller_memory import Decision
-from positioner.daemon.health.ne107 import CLASS, MONITORED
-
-Classes = Mapping[Ne107Cause, Ne107Status]
-"""Of what monitors find, by the daemon's file."""
+from positioner.daemon.health.ne107 import FaultClasses, class_of
 
 
 class Happened(NamedTuple):
@@ -40,7 +37,7 @@ def noted(decision: Decision) -> tuple[object, ...]:
     )
 
 
-def events_between(before: Decision, after: Decision, classes: Classes) -> Iterator[Happened]:
+def events_between(before: Decision, after: Decision, classes: FaultClasses) -> Iterator[Happened]:
     """Yield what happened from one decision to another, the cause of the rest first."""
     yield from _alarms(before, after, classes)
     if before.fault is not after.fault:
@@ -62,14 +59,7 @@ def events_between(before: Decision, after: Decision, classes: Classes) -> Itera
         yield Happened(EventKind.EXPERIMENT, _check(after.experiment.commands), played)
 
 
-def class_of(fault: Fault, classes: Classes) -> Ne107Status:
-    """Return the class of a fault."""
-    if fault is Fault.DCS_SILENT:
-        return CLASS[Ne107Cause.DCS_SILENT]
-    return classes[MONITORED[fault]] if fault in MONITORED else Ne107Status.FAILURE
-
-
-def _alarms(before: Decision, after: Decision, classes: Classes) -> Iterator[Happened]:
+def _alarms(before: Decision, after: Decision, classes: FaultClasses) -> Iterator[Happened]:
     for alarm in sorted(set(after.alarms) - set(before.alarms)):
         yield Happened(EventKind.ALARM, class_of(alarm, classes), alarm)
     for alarm in sorted(set(before.alarms) - set(after.alarms)):

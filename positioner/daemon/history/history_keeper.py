@@ -22,9 +22,10 @@ from threading import Lock, Thread
 from config.codes import EventKind, Ne107Status
 from config.daemon_file import DaemonFile
 from config.record_tables import HistoryTable
+from positioner.daemon.health.ne107 import FaultClasses
 from positioner.daemon.history.audited_writes import AuditedWrites, Told
 from positioner.daemon.history.configuration_changes import changes, in_words, settings_of
-from positioner.daemon.history.decision_events import Classes, Happened
+from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.valve_history import Found, ValveHistory
 from positioner.daemon.logs import log_event
 from positioner.history import HistoryFile, HistoryFull
@@ -78,7 +79,7 @@ class HistoryKeeper:
         self._stopping = Flag()
         self._thread = Thread(target=self._work, name="history", daemon=True)
 
-    def valve(self, file: DaemonFile, classes: Classes) -> ValveHistory:
+    def valve(self, file: DaemonFile, classes: FaultClasses) -> ValveHistory:
         """Return a valve's side, and take note that it starts. Before `start`."""
         history = ValveHistory(file.valve.name, classes, self)
         history.lost = lambda: self.lost

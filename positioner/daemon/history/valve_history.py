@@ -7,8 +7,9 @@ from typing import NamedTuple, Protocol
 
 from config.codes import CAUSES, EventKind, Ne107Status
 from positioner.control.controller_memory import Decision
+from positioner.daemon.health.ne107 import FaultClasses
 from positioner.daemon.history.audited_writes import Told, written_text
-from positioner.daemon.history.decision_events import Classes, Happened, events_between, noted
+from positioner.daemon.history.decision_events import Happened, events_between, noted
 from positioner.daemon.history.health_hours import HealthHours, HealthLook
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate
@@ -41,11 +42,11 @@ class ValveHistory:
 
     Args:
         valve: its name.
-        classes: of what its monitors find, by the daemon's file.
+        classes: of its faults, by the daemon's file.
         queue: of the keeper.
     """
 
-    def __init__(self, valve: str, classes: Classes, queue: Queue) -> None:
+    def __init__(self, valve: str, classes: FaultClasses, queue: Queue) -> None:
         self.valve = valve
         self.newest = Event(valve, 0, 0.0, int(EventKind.NONE), EventKind.NONE.name, 0, 0, "")
         """The newest event; replaced whole by the keeper's thread."""

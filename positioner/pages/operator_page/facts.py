@@ -68,7 +68,7 @@ def condition(picture: ValvePicture) -> tuple[str, str, list[str]]:
     number = picture.value("ne107")
     known = math.isfinite(number) and int(number) in {int(each) for each in Ne107Status}
     letter = NE107_LETTER[Ne107Status(int(number))] if known else "?"
-    causes = ne107_causes(picture.value("ne107_causes"))
+    causes = ne107_causes(picture.value("ne107_causes"), picture.value("ne107_causes_high"))
     decides = picture.text("ne107_cause")
     return letter, picture.text("ne107"), sorted(causes, key=lambda each: each != decides)
 

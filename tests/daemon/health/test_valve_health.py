@@ -7,15 +7,19 @@ import pytest
 from pymodbus.constants import ExcCodes
 
 from config.codes import Fault, InhibitReason, Mode, Ne107Cause, Ne107Status
-from config.daemon_file import DaemonFile
+from config.daemon_file import DaemonFile, HealthTable
 from config.registers import BY_NAME
 from config.slave_file import SlaveFile
+from config.supervision_table import SupervisionTable
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
 from positioner.control.requests import Requests
 from positioner.daemon.health import Health, ne107_condition
+from positioner.daemon.health.ne107 import Ne107Condition
+from positioner.daemon.health.valve_health import HealthSettings
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
 from positioner.estimation.acceptance import Applied, Ratios
+from positioner.observer.words import ne107_causes
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.modbus_slave import device_of
 
@@ -214,6 +218,33 @@ def test_the_class_of_each_fault(
     decision = panel.cycle.snapshot.decision._replace(mode=mode, fault=fault, inhibit_reason=inhibit_reason)
     now = ne107_condition(decision, Health.idle(STROKE_M))
     assert (now.status, now.cause) == (status, cause)
+
+
+def test_an_overrun_is_told_as_itself_beyond_the_sixteenth_cause() -> None:
+    """The first word is full: all its bits were set where cause 17 held."""
+    panel = Panel(LAW)
+    snapshot = panel.cycle.snapshot
+    panel.cycle.snapshot = replace(snapshot, decision=snapshot.decision._replace(alarms=(Fault.OVERRUN,)))
+    low, high = panel.get("ne107_causes"), panel.get("ne107_causes_high")
+    assert ne107_causes(low, high) == ["not automatic", Ne107Cause.OVERRUN.text]
+
+
+@pytest.mark.parametrize(
+    ("table", "fault", "cause"),
+    [
+        ("sample_age", Fault.STALE, Ne107Cause.FAULT),
+        ("plausibility", Fault.IMPLAUSIBLE, Ne107Cause.FAULT),
+        ("heartbeat", Fault.DCS_SILENT, Ne107Cause.DCS_SILENT),
+        ("command_rate", Fault.COMMAND_RATE, Ne107Cause.COMMAND_RATE),
+    ],
+)
+def test_the_file_says_the_class_of_what_is_watched(table: str, fault: Fault, cause: Ne107Cause) -> None:
+    supervision = SupervisionTable.model_validate({table: {"ne107": "M"}})
+    health = Health(HealthSettings.of(HealthTable(), STROKE_M, supervision))
+    decision = Panel(LAW).cycle.snapshot.decision._replace(mode=Mode.AUTOMATIC, fault=fault)
+    assert ne107_condition(decision, health) == Ne107Condition((cause,), Ne107Status.MAINTENANCE_REQUIRED)
+    other = decision._replace(fault=Fault.DEVICE)
+    assert ne107_condition(other, health).status is Ne107Status.FAILURE
 
 
 def test_limits_of_travel_and_reversals_of_0_are_none() -> None:

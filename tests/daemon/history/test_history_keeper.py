@@ -23,7 +23,7 @@ from tests.daemon.test_supervisory_registers import Panel, refused
 from tests.history.test_history_file import full_above
 
 FILE = DaemonFile.model_validate({"valve": {"name": "FV 1", "stroke_m": 0.1016}})
-CLASSES = HealthSettings.of(FILE.health, 0.1016, FILE.supervision).monitor_classes
+CLASSES = HealthSettings.of(FILE.health, 0.1016, FILE.supervision).fault_classes
 TABLE = HistoryTable(folder="history")
 PEER = "127.0.0.1:40000"
 
