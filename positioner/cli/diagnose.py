@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
     named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
-    with naming(named), _known_at_all():
+    with naming(named), _known_at_all(), Progress() as progress:
         diagnosis = diagnose(
             recordings,
             valve,
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
             effects=arguments.effects,
             seed=arguments.seed,
             on_preview=_tell_preview,
-            progress=Progress(),
+            progress=progress,
             over=(lambda: time.monotonic() - began_s > budget_s),
         )
     commands = extend_commands(diagnosis, arguments)

@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
     named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
     progress = Progress()
-    with naming(named), told_when_broken_off("discover", lambda: progress.known):
+    with naming(named), told_when_broken_off("discover", lambda: progress.known), progress:
         found = discover(
             recordings, valve, test=test, seed=arguments.seed, on_proposal=_tell_proposal, progress=progress
         )

@@ -58,9 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
     test = Recording.read(arguments.test) if arguments.test else None
     make_folder(arguments.out)
     named = {"recording": ", ".join(map(str, arguments.rec)), "valve file": arguments.valve}
-    with naming(named):
+    with naming(named), Progress() as progress:
         found = diagnose(
-            recordings, valve, test=test, effects=arguments.effects, seed=arguments.seed, progress=Progress()
+            recordings, valve, test=test, effects=arguments.effects, seed=arguments.seed, progress=progress
         )
     print(found.sentence, flush=True)
     fits = rivals_of(found)

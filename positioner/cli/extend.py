@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     Journal.beside(path)  # what is none is refused before the work begins
     named = {"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}
     progress = Progress()
-    with naming(named), told_when_broken_off("extend", lambda: progress.known):
+    with naming(named), told_when_broken_off("extend", lambda: progress.known), progress:
         extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=progress)
     journal = write_extended(extension, path, arguments.out)
     print(extension.summary())

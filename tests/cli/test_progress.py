@@ -1,6 +1,7 @@
 """Progress: one moving line on a terminal, few lines in a log."""
 
 import io
+import threading
 
 from positioner.cli.parts.progress import SELDOM_S, Progress
 
@@ -32,3 +33,38 @@ def test_a_log_has_few_lines() -> None:
 
 def test_what_is_soon_done_leaves_no_line() -> None:
     assert told(io.StringIO(), 1.0, 2.0) == ""
+
+
+def beaten(stream: io.StringIO, *times_s: float) -> str:
+    """Return what is printed when half is done at the first of these times, and nothing more at the others."""
+    clock = iter((0.0, *times_s))
+    progress = Progress(stream, lambda: next(clock))
+    for i in range(len(times_s)):
+        if i:
+            progress.beat()
+        else:
+            progress("fitting", 0.5)
+    return stream.getvalue()
+
+
+def test_a_log_is_told_that_long_work_goes_on() -> None:
+    said = beaten(io.StringIO(), 1.0, 2.0, SELDOM_S, SELDOM_S + 1.0, 2.0 * SELDOM_S)
+    assert said == "fitting: 50%, 20 s so far\nfitting: 50%, 40 s so far\n"
+
+
+def test_a_terminal_shows_the_seconds_go_by() -> None:
+    clock = iter((0.0, 1.0, 2.0))
+    stream = Terminal()
+    progress = Progress(stream, lambda: next(clock))
+    progress("fitting", 0.5)
+    progress.beat()
+    progress.beat()
+    assert stream.getvalue().count("\r") == 3
+    assert stream.getvalue().endswith("50%, 2 s so far")
+
+
+def test_beats_end_with_the_work() -> None:
+    with Progress(io.StringIO()) as progress:
+        assert any(each.name == "progress" for each in threading.enumerate())
+        progress("fitting", 0.5)
+    assert not any(each.name == "progress" for each in threading.enumerate())

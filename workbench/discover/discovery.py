@@ -32,6 +32,7 @@ from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
+from workbench.select.verdict_sentence import knife_edges_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,7 +60,9 @@ class Discovery(Result):
         floor = told_mm(self.split.floor_m)
         match self.outcome:
             case "explained":
-                return "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
+                said = "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
+                excepted = knife_edges_sentence(self.base.errors)
+                return f"{said}.{excepted}" if excepted else said
             case "unjudged":
                 return "the noise is unknown, and with it whether anything is missing: say it, --noise-m M"
             case "none":

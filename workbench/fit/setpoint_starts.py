@@ -52,11 +52,17 @@ def setpoint_starts(
         theta: of the valve file.
         seed: of the draws.
         workers: threads.
-        tell: called with the fraction done.
+        tell: called with the fraction done, from the threads.
     """
     box = _box(error, theta)
 
+    renewed = [0] * EVOLUTIONS
+
     def evolved(number: int) -> Vector:
+        def generation(*_reached: object) -> None:
+            renewed[number] += 1
+            tell(sum(renewed) / (EVOLUTIONS * GENERATIONS))
+
         found = differential_evolution(
             partial(error.rough.cost, scale=MIDDLE),
             Bounds(*box),
@@ -65,13 +71,14 @@ def setpoint_starts(
             maxiter=GENERATIONS,
             init="sobol",
             polish=False,
+            callback=generation,
         )
         return np.asarray(found.x, np.float64)
 
     places = [Place(error.coordinates(theta), "valve file")]
     for number, z in enumerate(on_threads(evolved, range(EVOLUTIONS), workers)):
         places.append(Place(z, f"evolution {number}"))
-        tell((number + 1.0) / EVOLUTIONS)
+    tell(1.0)
     return places
 
 

@@ -169,8 +169,9 @@ def diagnose(
         held = None
         try:
             if parts.train.record.by_setpoint:
-                tell("positioner or packing", 0.0)
-                held = positioner_or_packing(parts, base, seed=seed, workers=threads)
+                held = positioner_or_packing(
+                    parts, base, seed=seed, workers=threads, progress=lambda done: tell("positioner or packing", done)
+                )
             first = {name: each for name, each in library.items() if each.after not in library}
             scores = preview(base.fit, parts, first, threads)
             if on_preview:

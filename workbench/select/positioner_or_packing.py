@@ -12,7 +12,7 @@ out.
     neither needed                      one stands in for the other, or none is there: not told
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import inf
@@ -83,7 +83,9 @@ class PositionerOrPacking(Brief):
                 )
 
 
-def positioner_or_packing(split: Split, both: EvaluatedModel, *, seed: int, workers: int) -> PositionerOrPacking:
+def positioner_or_packing(
+    split: Split, both: EvaluatedModel, *, seed: int, workers: int, progress: Callable[[float], None] | None = None
+) -> PositionerOrPacking:
     """Fit the valve without either, and judge what each is worth.
 
     Args:
@@ -91,12 +93,18 @@ def positioner_or_packing(split: Split, both: EvaluatedModel, *, seed: int, work
         both: the fitted valve, with its positioner.
         seed: of the searches.
         workers: threads.
+        progress: called with the fraction done.
     """
+    tell = progress or (lambda _: None)
     name = positioner_of(both.fit.valve).name
     free = [each for each in both.fit.parameters if each != f"{name}.{DEAD_BAND}"]
     refit = partial(fit, split.train.recording, seed=seed, workers=workers, profile=False)
-    no_band = refit(_with(both.fit.valve, name, {DEAD_BAND: 0.0}), free=free)
-    frictionless = refit(_frictionless(both.fit.valve), free=[each for each in both.fit.parameters if each not in FREE])
+    no_band = refit(_with(both.fit.valve, name, {DEAD_BAND: 0.0}), free=free, progress=lambda done: tell(0.5 * done))
+    frictionless = refit(
+        _frictionless(both.fit.valve),
+        free=[each for each in both.fit.parameters if each not in FREE],
+        progress=lambda done: tell(0.5 + 0.5 * done),
+    )
     bare = {each: block_errors(found, split) for each, found in (("band", no_band), ("friction", frictionless))}
     friction = gain(frictionless, both.fit, bare["friction"], both.errors)
     dead_band = gain(no_band, both.fit, bare["band"], both.errors)
