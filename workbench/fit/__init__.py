@@ -5,6 +5,7 @@ Its files:
     fitting            puts it together
     starts, guesses    where searches begin; what the positions suggest
     setpoint_starts    the same for a valve behind its positioner
+    shooting           searches by multiple shooting, where those of the free run leave something to explain
     landings           the balance of forces where slides end in rest, from which searches begin too
     objective          what they lower
     descent            how: trust region, and a scan of the stairs

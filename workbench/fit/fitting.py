@@ -37,6 +37,7 @@ from workbench.fit.guesses import FINEST
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.setpoint_starts import FREE as FREE_BY_SETPOINT
 from workbench.fit.setpoint_starts import setpoint_starts
+from workbench.fit.shooting import shooting_starts
 from workbench.fit.starts import base_starts, effect_starts, forces_regressed, moved_starts, weakest_start
 from workbench.fit.strewing import proved, strewn
 from workbench.fit.threads import linear_algebra_alone, on_threads
@@ -74,6 +75,8 @@ AT_BOUND = 1e-3
 WANTS_OUT = 2.0
 """Slope of the cost at the bound times the deviation, in rises of 95 %: the least lies four deviations beyond it."""
 LEAST_SLIPS = 3
+LEAVES = 0.6
+"""Cost a sample above which a fit leaves something to explain; that of white residuals of the noise is 0.485."""
 
 Progress = Callable[[float], None]
 T = TypeVar("T")
@@ -345,11 +348,22 @@ def _begun(
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
-    starts, at_landings = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint, points=points)
+    starts = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint, points=points)
     tell = progress or (lambda _: None)
     weakest = weakest_start(error, added, seeds[0])
-    begun = BegunFit(composition, error, (), effort, workers, tell, weakest=weakest, waiting=at_landings, added=added)
-    return _widely(begun, [*starts, *at_landings[:1]])
+    begun = BegunFit(
+        composition,
+        error,
+        (),
+        effort,
+        workers,
+        tell,
+        weakest=weakest,
+        waiting=starts.at_landings,
+        added=added,
+        grid=starts.grid,
+    )
+    return _widely(begun, [*starts.begins, *starts.at_landings[:1]])
 
 
 def _widely(fit: "BegunFit", begins: Sequence[Place]) -> "BegunFit":
@@ -383,6 +397,8 @@ class BegunFit:
     """The parameters of what is added."""
     waiting: Sequence[Place] = ()
     """Starts from landings that no search has begun at."""
+    grid: Sequence[Vector] = ()
+    """Coordinates of strengths of what is added, from which multiple shooting chooses."""
     through: bool = False
     """Whether the searches have come through the middling scale."""
 
@@ -422,14 +438,16 @@ class BegunFit:
 
     def settled(self, count: int) -> "BegunFit":
         """Bring at most so many more of the searches to where they stay."""
-
-        def ended(start: Place) -> Place:
-            z = settled(self.error, start.z, self.effort.improves_below)
-            return replace(start, z=strewn(self.error, z) if self._rounds(z) else z)
-
         chosen = self.places[len(self.ends) : len(self.ends) + count]
-        found = _each(ended, chosen, self.workers, lambda done: self.tell(0.5 + 0.4 * done))
-        return replace(self, ends=tuple(sorted([*self.ends, *found], key=lambda end: self.error.cost(end.z))))
+        found = _each(self._ended, chosen, self.workers, lambda done: self.tell(0.5 + 0.4 * done))
+        return replace(self, ends=self._ordered([*self.ends, *found]))
+
+    def _ended(self, start: Place) -> Place:
+        z = settled(self.error, start.z, self.effort.improves_below)
+        return replace(start, z=strewn(self.error, z) if self._rounds(z) else z)
+
+    def _ordered(self, ends: Sequence[Place]) -> tuple[Place, ...]:
+        return tuple(sorted(ends, key=lambda end: self.error.cost(end.z)))
 
     def finished(self, *, profile: bool) -> Fit:
         """Return the fit, searches brought to where they stay two at a time until they agree.
@@ -443,10 +461,19 @@ class BegunFit:
         while len(here.ends) < most and (not here.ends or agreeing(here.error, here.ends) < here.effort.agreeing):
             # One that was there already is the first of two: the fit is the same whether it was begun apart or not.
             here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
+        here = here.shot()
         best = here.ends[0].z
         if here._rounds(best) and here._shows(best):
             here = replace(here, ends=proved(here.error, here.ends))
         return here.judged(profile=profile)
+
+    def shot(self) -> "BegunFit":
+        """Search from starts by multiple shooting too, where the best end leaves something to explain."""
+        if self.cost <= LEAVES * self.error.count:
+            return self
+        begins = shooting_starts(self.error, self.grid, self.ends[0].z)
+        found = _each(self._ended, begins, self.workers, lambda done: self.tell(0.9 + 0.05 * done))
+        return replace(self, ends=self._ordered([*self.ends, *found]))
 
     def left(self) -> Fit:
         """Return the fit by the best place on the way: nothing has settled, and nothing is brought there."""

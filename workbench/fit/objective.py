@@ -59,6 +59,10 @@ class SimulationError:
         run = FreeRun(
             self.composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH, by=self.run.by
         )
+        return self.over(run)
+
+    def over(self, run: FreeRun) -> "SimulationError":
+        """Return the error of another run over the same coordinates."""
         return SimulationError(run, self.composition, self.parameters, self._theta)
 
     def theta(self, z: Vector) -> Vector:

@@ -16,6 +16,7 @@ measurement.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,6 +61,16 @@ NARROWEST, WIDEST, PLAYS = 6e-3, 0.9, 5
 STATIC_SHIFTS = (1.0, 0.0, -1.0)
 
 
+class EffectStarts(NamedTuple):
+    """Where searches with effects begin."""
+
+    begins: list[Place]
+    at_landings: list[Place]
+    """For `moved_starts` to finish."""
+    grid: list[Vector]
+    """Coordinates of all strengths at the best base fit, from which the first of `begins` were chosen."""
+
+
 def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, count: int) -> list[Place]:
     """Return where the bare valve's searches begin: landings, origins and draws, the best by the screening cost.
 
@@ -87,10 +98,8 @@ def effect_starts(
     *,
     landed: bool = True,
     points: Sequence[tuple[float, ...]] = (),
-) -> tuple[list[Place], list[Place]]:
+) -> EffectStarts:
     """Return where searches with effects begin: at each base fit the best strengths by screening, and at landings.
-
-    Those at landings are for `moved_starts` to finish.
 
     Args:
         error: by whose screening cost they are compared.
@@ -109,13 +118,16 @@ def effect_starts(
     solved = (rounds and guesses[:1]) or points
     at_landings = landed_starts(error, seeds[-2:][:1], solved, added, LANDED_EFFECT) if landed else []
     starts = [weakest_start(error, added, seeds[0])]
-    for number, theta in enumerate(seeds, 1):
-        grid = [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
-        grid = [_smoothed(error, z) for z in grid] if number == 1 else grid
+    grids = [
+        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
+        for theta in seeds
+    ]
+    grids[0] = [_smoothed(error, z) for z in grids[0]]
+    for number, grid in enumerate(grids, 1):
         starts += [Place(z, f"base fit {number}") for z in error.screened(grid, EACH_SEED if number > 1 else AT_BEST)]
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
-    return starts, at_landings
+    return EffectStarts(starts, at_landings, grids[0])
 
 
 def _slower(parameter: Parameter, value: float) -> float:

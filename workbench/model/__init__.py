@@ -2,7 +2,8 @@
 
 Its files:
 
-    free_run      simulates it whole, on the command alone
-    sampling      with inertia, without, or landing by landing: by how far apart the samples are
-    parameters    the coordinates of a fit
+    free_run             simulates it whole, on the command alone
+    multiple_shooting    the same, put back to the measured stem before each slip
+    sampling             with inertia, without, or landing by landing: by how far apart the samples are
+    parameters           the coordinates of a fit
 """
