@@ -11,6 +11,7 @@ import argparse
 import logging
 import os
 import re
+import shutil
 import sys
 import tempfile
 import time
@@ -72,7 +73,9 @@ def _tried(name: str, parser: "Parser", runs: int, kept: Path, seed: int) -> Tri
     """Try a parser on so many inputs, from what broke it on anew."""
     tried, start_s = Tried(0, 0, 0, 0, 0, 0), time.monotonic()
     stem = re.sub(r"\W+", "_", name)
-    with tempfile.TemporaryDirectory() as corpus:
+    # Not as a context: the child, a copy of this process, must not clean up after itself what its parent tries on with.
+    corpus = tempfile.mkdtemp(prefix="fuzz-corpus-")
+    try:
         for n, good in enumerate(parser.good):
             (Path(corpus) / f"good{n}").write_bytes(good)
         while tried.inputs < runs and tried.broken < BREAKS:
@@ -97,6 +100,8 @@ def _tried(name: str, parser: "Parser", runs: int, kept: Path, seed: int) -> Tri
             )
             if not status:
                 log.unlink()
+    finally:
+        shutil.rmtree(corpus, ignore_errors=True)
     return tried._replace(speed=round(tried.inputs / (time.monotonic() - start_s)))
 
 

@@ -88,14 +88,28 @@ def expiry(tls: Tls) -> datetime:
         InputError: a file that is not there or does not fit, or the package `cryptography` is missing.
     """
     _require_cryptography(tls)
+    client_context(tls)
+    ends = [end for file in (tls.authority, tls.certificate) for end in _ends_of_certificates(file)]
+    return min(ends if tls.revoked is None else [*ends, *_ends_of_lists(tls.revoked)])
+
+
+def _ends_of_certificates(file: Path) -> list[datetime]:
     from cryptography import x509
 
-    client_context(tls)
-    files = (tls.authority, tls.certificate)
-    ends = [each.not_valid_after_utc for file in files for each in x509.load_pem_x509_certificates(file.read_bytes())]
-    lists = () if tls.revoked is None else PEM_LIST.findall(tls.revoked.read_bytes())
-    ends += [end for one in lists if (end := x509.load_pem_x509_crl(one).next_update_utc) is not None]
-    return min(ends)
+    try:
+        return [each.not_valid_after_utc for each in x509.load_pem_x509_certificates(file.read_bytes())]
+    except (ValueError, TypeError, x509.InvalidVersion):  # OpenSSL, which has taken it, reads less of it
+        raise InputError(str(file), "holds a certificate that cannot be read") from None
+
+
+def _ends_of_lists(file: Path) -> list[datetime]:
+    from cryptography import x509
+
+    try:
+        lists = [x509.load_pem_x509_crl(each) for each in PEM_LIST.findall(file.read_bytes())]
+        return [end for each in lists if (end := each.next_update_utc) is not None]
+    except (ValueError, TypeError, x509.InvalidVersion):
+        raise InputError(str(file), "holds a list of revoked certificates that cannot be read") from None
 
 
 class NotAuthorized(Exception):
@@ -182,7 +196,7 @@ def identity_in(certificate: bytes) -> Identity:
     from cryptography import x509
     from cryptography.exceptions import UnsupportedAlgorithm
 
-    unreadable = (ValueError, UnsupportedAlgorithm, x509.InvalidVersion, x509.DuplicateExtension)
+    unreadable = (ValueError, TypeError, UnsupportedAlgorithm, x509.InvalidVersion, x509.DuplicateExtension)
     try:
         return _identity_in(certificate)
     except (*unreadable, x509.UnsupportedGeneralNameType):
@@ -263,7 +277,7 @@ def _revoked_numbers(tls: Tls) -> frozenset[int]:
     lists = PEM_LIST.findall(tls.revoked.read_bytes())
     try:
         return frozenset(each.serial_number for one in lists for each in x509.load_pem_x509_crl(one))
-    except ValueError:
+    except (ValueError, TypeError, x509.InvalidVersion):
         raise InputError(str(tls.revoked), "holds no list of revoked certificates in PEM form") from None
 
 

@@ -182,7 +182,9 @@ def test_a_certificate_that_cannot_be_read_ends_the_connection_with_a_reason() -
     """Found by fuzzing: of version 6, or with an extension twice, it ended the connection's thread with a traceback."""
     good = ssl.PEM_cert_to_DER_cert((folder() / "operator.pem").read_text())
     assert identity_in(good).role is Role.OPERATOR
-    for bad in (good.replace(bytes.fromhex("a003020102"), bytes.fromhex("a003020105")), good[:-1], b""):
+    version_6 = good.replace(bytes.fromhex("a003020102"), bytes.fromhex("a003020105"))
+    name_of_bits = good.replace(bytes.fromhex("06035504030c"), bytes.fromhex("060355040303"))
+    for bad in (version_6, name_of_bits, good[:-1], b""):
         with pytest.raises(ConnectionAbortedError) as caught:
             identity_in(bad)
         assert failure_reason(caught.value) == "its certificate cannot be read"

@@ -7,6 +7,7 @@ import os
 import shutil
 import sqlite3
 import tempfile
+from base64 import encodebytes
 from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime
@@ -20,6 +21,7 @@ import openpyxl
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding
+from scipy.io import savemat
 
 from config.canopen_device import SHIPPED_EDS
 from config.daemon_file import load_valves
@@ -34,13 +36,15 @@ from config.roles import Role
 from config.slave_file import load_slave
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.canopen.eds import read_eds
-from fieldbus.modbus.tls import ROLE_OID, identity_in, role_extension
+from fieldbus.modbus.tls import ROLE_OID, Guard, expiry, identity_in, role_extension
 from positioner.daemon.health.health_file import HealthRecord, read_record, write_record
 from positioner.daemon.memory.memory_file import KEYS, VERSION, read_memory, write_memory
 from positioner.history.entries import Event
 from positioner.history.history_file import FILE_NAME, HistoryFile
 from positioner.history.history_reader import HistoryReader
 from positioner.pages.operator_page.role_passwords import read_passwords
+from tests.certificates import folder as certificates
+from tests.certificates import revoke, tls
 from tests.daemon.memory.test_memory_file import KNOWLEDGE, NOW
 from tests.fuzz.parser import Parser, refused_in_one_line, require_line
 
@@ -102,6 +106,34 @@ def health(data: bytes) -> None:
     """Read a valve's counts."""
     _, problem = read_record(written("fuzz.health.json", data), "FV-1")
     require_line(problem)
+
+
+def pem(data: bytes) -> None:
+    """Take the files of a server's TLS: certificate, key, authority, list of revoked ones; bytes are made PEM, too."""
+    for kinds, text in (
+        (("authority", "certificate", "key"), data),
+        (("authority", "certificate"), _pem(b"CERTIFICATE", data)),
+        (("revoked",), _pem(b"X509 CRL", data)),
+    ):
+        path = written("fuzz.pem", text)
+        for kind in kinds:
+            table = tls("daemon").model_copy(update={kind: path})
+            refused_in_one_line(lambda table=table: Guard(table, lambda _: Role.ENGINEER), InputError)  # type: ignore[misc]
+            refused_in_one_line(lambda table=table: expiry(table), InputError)  # type: ignore[misc]
+
+
+def _pem(label: bytes, data: bytes) -> bytes:
+    return b"-----BEGIN %b-----\n%b-----END %b-----\n" % (label, encodebytes(data), label)
+
+
+def _matlab() -> tuple[bytes, ...]:
+    vectors = {"t": np.arange(4.0), "x": np.linspace(0.0, 1.0, 4)}
+    columns = {"log": vectors, "u": np.full((4, 1), 4e4), "note": "FV-1"}
+    return (
+        _saved(lambda path: savemat(path, columns), "good.mat"),
+        _saved(lambda path: savemat(path, columns, do_compression=True), "good.mat"),
+        _saved(lambda path: savemat(path, vectors, format="4"), "good.mat"),
+    )
 
 
 def _history(path: Path) -> None:
@@ -200,6 +232,8 @@ def file_parsers() -> dict[str, Parser]:
     counts = _saved(lambda path: write_record(path, "FV-1", HealthRecord(1.5, 3, 0.5, 7, 2e3)), "good.json")
     valves = tuple(shipped_valve(name).read_bytes() for name in ("seed", "ordinary"))
     sheets, daemons = (SHIPPED_EDS.read_bytes(), SMALL_SHEET), (profiles["daemon"], profiles["fleet"], canopen[0])
+    certificate_pem, revoked = (certificates() / "daemon.pem").read_bytes(), folder() / "revoked.pem"
+    revoke(revoked, "observer")
     return {
         "daemon file": Parser(of_file("d.toml", load_valves), daemons, 4, True),
         "slave file": Parser(of_file("s.toml", load_slave), (profiles["slave"], canopen[1]), 4, True),
@@ -208,10 +242,12 @@ def file_parsers() -> dict[str, Parser]:
         "recording": Parser(of_file("r.csv", read_recording, Recording.read), (CSV,), 8, True),
         "recording, Parquet": Parser(of_file("r.parquet", Recording.read, _preview), (parquet,), 2),
         "export": Parser(of_file("x.txt", _own, _preview, _import), (CSV, *EXPORTS), 2, True),
+        "export, MATLAB": Parser(of_file("x.mat", _preview, _import), _matlab(), 2),
         "export, workbook": Parser(of_file("x.xlsx", _preview, _import), (workbook,), 0.3),
         "memory file": Parser(memory, (kept,), 2, True),
         "health file": Parser(health, (counts,), 8, True),
         "history file": Parser(of_file("h.sqlite", _history), (_history_file(),), 1),
         "certificate": Parser(certificate, (_certificate(),), 8),
+        "certificate files": Parser(pem, (certificate_pem, revoked.read_bytes()), 1, True),
         "passwords": Parser(of_file("p.json", read_passwords), (PASSWORDS,), 8, True),
     }
