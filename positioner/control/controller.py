@@ -289,7 +289,13 @@ def _experiment(
 def _outcome(
     memory: ControllerMemory, sample: Sample, settings: Settings, statics: StaticIdentification
 ) -> SlideOutcome | None:
-    """Return what a change of the command did, in the step in which it is known."""
+    """Return what a change of the command did, in the step in which it is known.
+
+    Of a device that was found anew or left alone nobody knows what it did meanwhile: that is no slide of a command.
+    """
+    if sample.held_pa is not None or sample.unattended_s > 0.0:
+        statics.detector.interrupt()
+        return None
     path, valve = memory.path, settings.valve
     arrived = path is None or valve is None or path.has_arrived(sample.now_s, valve.inverse)
     return statics.update(sample.now_s, sample.position_m, memory.wanted_pa, sample.pressure_pa, arrived=arrived)

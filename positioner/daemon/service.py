@@ -18,6 +18,7 @@ from config.errors import InputError
 from config.extended_valve import ExtendedValve
 from config.registers import WRITER_AT
 from config.roles import Role
+from config.tls_table import Tls
 from drivers import driver_for
 from drivers.boundary import DriverError, Reading
 from fieldbus.modbus.admission import ServerLimits
@@ -313,7 +314,7 @@ def _server(valves: Sequence[ServedValve], history: HistoryKeeper) -> RegisterSe
         where.host,
         where.port,
         where.unit,
-        _guard(first.file),
+        None if (tls := first.file.supervisory.tls) is None else guard_of(tls),
         {valve.file.supervisory.unit: valve.served(requests) for valve in others},
         _server_limits(where),
         history.session,
@@ -326,9 +327,10 @@ def _server_limits(table: SupervisoryTable) -> ServerLimits:
     return ServerLimits(table.most_clients, table.clients_per_host, reserved, table.requests_per_s, table.idle_s)
 
 
-def _guard(file: DaemonFile) -> Guard | None:
+def guard_of(tls: Tls) -> Guard:
+    """Return who may do what at the supervisory port."""
     # What nobody may write, the registers themselves refuse, and say so.
-    return Guard(tls, lambda at: WRITER_AT.get(at, Role.OBSERVER)) if (tls := file.supervisory.tls) else None
+    return Guard(tls, lambda at: WRITER_AT.get(at, Role.OBSERVER))
 
 
 def _first_requests(file: DaemonFile) -> Requests:

@@ -5,17 +5,20 @@ from typing import Any
 
 import pytest
 
-from config.codes import InhibitReason, Mode, Restored, State
+from config.codes import Fault, InhibitReason, Mode, Restored, State
 from config.daemon_file import DaemonFile
 from config.extended_valve import ExtendedValve
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
+from positioner.control.controller import Controller
 from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
+from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.memory.conditions import changed, conditions_of
+from positioner.estimation.acceptance import Ratios
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from sim.slave.simulated_device import Device
 from sim.static_inverse import extended_valve
@@ -179,6 +182,37 @@ def test_a_changed_valve_is_dropped_before_a_second_wrong_move(
     bench.step_to(next(references, 0.55), 4.0)
     assert bench.decision.command_pa == held_pa
     assert bench.kept() is None
+
+
+@pytest.mark.parametrize(
+    "told", [{"held_pa": 24e3}, {"held_pa": 24e3, "unattended_s": 2.0}], ids=["restarted", "stalled"]
+)
+def test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing(told: dict[str, float]) -> None:
+    """`make kills`: a device that was powered up anew elsewhere had a valid file set aside."""
+    known = ValveKnowledge(
+        Ratios(-800e3, -20e3), covariance=((2e6, 0.0, 0.0), (0.0, 3e3, 0.0), (0.0, 0.0, 1e-6)), residual_m=2e-5
+    )
+    file = DaemonFile.model_validate({"valve": {"stroke_m": STROKE_M}})
+    controller = Controller(Settings.of(file), 50e3, restored=known)
+    requests = Requests(mode=Mode.AUTOMATIC, mode_writes=1, acknowledgements=0)
+
+    def run(position_m: float, **sample: Any) -> Decision:
+        for n in range(120):
+            now_s = clock[0] = clock[0] + 0.01
+            seen = Sample(now_s, now_s, position_m + 1e-6 * (n % 3), controller.command_pa)
+            decision = controller.step(replace(seen, **sample) if n == 0 else seen, requests)
+        return decision
+
+    clock = [0.0]
+    assert run(0.05).restoration.trust is Restored.PROVISIONAL
+    requests = replace(requests, reference_m=0.06, reference_writes=1)
+    run(0.06)
+    requests = replace(requests, reference_m=0.04, reference_writes=2)
+    agreed = run(0.04).restoration
+    assert (agreed.ups, agreed.downs, agreed.trust) == (1, 1, Restored.PROVISIONAL)
+    after = run(0.045, **told)
+    assert after.fault in (Fault.RESTARTED, Fault.STALLED)
+    assert (after.restoration, after.static_law.landings) == (agreed, 2)
 
 
 def test_identified_anew_it_is_replaced(knowledge: ValveKnowledge) -> None:

@@ -153,6 +153,10 @@ class LandingDetector:
         self._known = self._known or (outcome is not None and outcome.moved)
         return outcome
 
+    def interrupt(self) -> None:
+        """Take note that something else than the commands may have moved the stem: what they did is not known."""
+        self._level_pa, self.rest, self._known = nan, None, True
+
     def _learn_quantum(self, position_m: float) -> None:
         step_m = abs(position_m - self._position_m)
         if step_m > SAME * self._stroke_m:
