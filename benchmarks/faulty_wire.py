@@ -2,13 +2,15 @@
 
 Kinds of fault are those of `positioner.testing.spoiler`.
 
-Modbus TCP through a proxy that knows frames; RTU through a line that carries whole ones; CANopen at the node, whose
-replies are its TPDOs. A corrupt CAN frame is none (its check sum): there, and where a bus has no connection, the case
-is left out.
+Modbus TCP through a proxy that knows frames, on TLS through one that knows records, all that a wire sees there: one
+that is spoilt ends the session, and those of a handshake are spoilt, too. RTU through a line that carries whole frames;
+CANopen at the node, whose replies are its TPDOs. A corrupt CAN frame is none (its check sum): there, and where a bus
+has no connection, the case is left out.
 """
 
 import os
 import select
+import socket
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -18,9 +20,11 @@ from threading import Thread
 from config.canopen_device import CanBus, CanopenDevice
 from config.device import Device as DeviceTable
 from config.device import ModbusRtuDevice, ModbusTcpDevice
+from config.roles import Role
 from config.serial_port import SerialPort
 from fieldbus.canopen.loopback import free_channel
 from fieldbus.modbus.server import RegisterServer
+from fieldbus.modbus.tls import Guard
 from positioner.testing.fault_proxy import spoilt_wire
 from positioner.testing.spoiler import WIRE_FAULTS, Spoiler
 from sim.slave import canopen_slave
@@ -29,17 +33,21 @@ from sim.slave.clocks import Clock
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.rtu_server import RtuServer
 from sim.slave.simulated_device import Device
+from tests.certificates import tls
 
 REPLY_TIMEOUT_S = 0.08
 LATE_S = 1.3 * REPLY_TIMEOUT_S
-NOT_ON = {"canopen": {"corrupt", "disconnect"}, "rtu": {"disconnect"}, "modbus": set[str]()}
+NOT_ON = {"canopen": {"corrupt", "disconnect"}, "rtu": {"disconnect"}, "modbus": set[str](), "tls": set[str]()}
+HANDSHAKE_TIMEOUT_S = 0.4
+RECORD_HEADER, ENCRYPTED = 5, 23
+"""Type, version and length of a TLS record (RFC 8446, section 5.1), and the type of those that say something."""
 
 
 @contextmanager
 def on_bus(bus: str, device: Device, clock: Clock, spoiler: Spoiler) -> Iterator[tuple[DeviceTable, "Side"]]:
     """Put a device on a bus; give the daemon's table of it, and its far side."""
     with ExitStack() as stack:
-        yield {"modbus": _tcp, "rtu": _rtu, "canopen": _canopen}[bus](device, clock, spoiler, stack)
+        yield {"modbus": _tcp, "tls": _tls, "rtu": _rtu, "canopen": _canopen}[bus](device, clock, spoiler, stack)
 
 
 class Side:
@@ -63,6 +71,63 @@ def _tcp(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tu
     stack.callback(server.stop)
     port = stack.enter_context(spoilt_wire(server.port, spoiler))
     return ModbusTcpDevice(port=port, reply_timeout_s=REPLY_TIMEOUT_S), Side(device)
+
+
+def _tls(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tuple[DeviceTable, Side]:
+    guard = Guard(tls("device", handshake_timeout_s=HANDSHAKE_TIMEOUT_S), lambda _: Role.OPERATOR)
+    server = RegisterServer(DeviceRegisters(device, clock), "127.0.0.1", 0, 1, guard)
+    server.start()
+    stack.callback(server.stop)
+    port = stack.enter_context(_spoilt_records(server.port, spoiler))
+    secured = tls("daemon", handshake_timeout_s=HANDSHAKE_TIMEOUT_S)
+    return ModbusTcpDevice(port=port, reply_timeout_s=REPLY_TIMEOUT_S, tls=secured), Side(device)
+
+
+@contextmanager
+def _spoilt_records(port: int, spoiler: Spoiler) -> Iterator[int]:
+    """Carry TLS records between the port given and whoever connects; say on which port."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    Thread(target=_accept_secured, args=(listener, port, spoiler), daemon=True).start()
+    try:
+        yield listener.getsockname()[1]
+    finally:
+        listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+
+
+def _accept_secured(listener: socket.socket, port: int, spoiler: Spoiler) -> None:
+    while True:
+        try:
+            near, _ = listener.accept()
+        except OSError:
+            return
+        far = socket.create_connection(("127.0.0.1", port))
+        spoiler.forget()
+        for each in (near, far):
+            each.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        requests = partial(_carry_records, near, far, lambda record: [] if spoiler.takes_request() else [record])
+        Thread(target=requests, daemon=True).start()
+        Thread(target=partial(_carry_records, far, near, spoiler.replies), daemon=True).start()
+
+
+def _carry_records(near: socket.socket, far: socket.socket, spoilt: Callable[[bytes], Sequence[bytes]]) -> None:
+    """Carry one way until either end hangs up."""
+    with suppress(OSError):
+        while record := _record(near):
+            for carried in spoilt(record) if record[0] == ENCRYPTED else [record]:
+                far.sendall(carried)
+    for end in (near, far):
+        with suppress(OSError):
+            end.shutdown(socket.SHUT_RDWR)
+    near.close()
+
+
+def _record(line: socket.socket) -> bytes:
+    """Return the next record; b"" at the end."""
+    head = line.recv(RECORD_HEADER, socket.MSG_WAITALL)
+    if len(head) < RECORD_HEADER:
+        return b""
+    return head + line.recv(int.from_bytes(head[3:]), socket.MSG_WAITALL)
 
 
 def _rtu(device: Device, clock: Clock, spoiler: Spoiler, stack: ExitStack) -> tuple[DeviceTable, Side]:

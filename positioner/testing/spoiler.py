@@ -27,6 +27,10 @@ class Spoiler:
         with self._lock:
             self.kind, self.left = kind, count
 
+    def forget(self) -> None:
+        """Keep nothing back any more: the connection is another."""
+        self._kept = []
+
     def takes_request(self) -> bool:
         """Return whether a request gets lost."""
         return self.kind == "lose" and self._spend()
