@@ -14,6 +14,7 @@ Its files:
     bus_plugins, extras                           buses of other packages; which package is not installed
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
+    passwords, role_passwords                     passwords as they are kept; the file with those of the roles
     recording, historian_export, noise            the recording format; others' exports; the noise of a position
     exports                                       each step from a file of another program to a recording
     results                                       what results have in common in a notebook

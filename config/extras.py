@@ -16,6 +16,7 @@ EXTRAS = {
     "cryptography": "tls",
     "shtab": "completion",
     "prometheus_client": "metrics",
+    "asyncua": "opcua",
     "nicegui": "web",
     "fastapi": "web",
     "uvicorn": "web",

@@ -24,6 +24,7 @@ COMMANDS = (
     "map",
     "events",
     "metrics",
+    "opcua",
     "import",
     "valve",
     "simulate",

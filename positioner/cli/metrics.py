@@ -23,23 +23,20 @@ def run(arguments: argparse.Namespace) -> int:
     from config.errors import InputError
     from config.extras import needed
     from positioner.cli.parts.daemon_address import client_tls
+    from positioner.cli.parts.served_valves import places_in
 
     needed("prometheus_client", "positioner metrics")
-    from config.daemon_file import load_valves
     from positioner.metrics.exporter import serve_metrics
     from positioner.metrics.scraped_valve import ScrapedValve
 
     if not 0 <= arguments.listen_port <= 65535:
         raise InputError("--listen-port", f"must lie between 0 (any free one) and 65535, got {arguments.listen_port}")
     tls = None if arguments.tls is None else client_tls(*arguments.tls)
-    valves: dict[str, ScrapedValve] = {}
-    for path in arguments.config:
-        for file in load_valves(path):
-            name, where = file.valve.name, file.supervisory
-            if name in valves:
-                raise InputError(str(path), f"valve.name: {name!r} is also in another file; metrics tell by names")
-            valves[name] = ScrapedValve(name, (where.host, where.port, where.unit), tls)
-    port = serve_metrics(list(valves.values()), arguments.listen_host, arguments.listen_port)
-    print(f"serving metrics of {', '.join(valves)} on http://{arguments.listen_host}:{port}/metrics", flush=True)
+    valves = [ScrapedValve(each.name, (each.host, each.port, each.unit), tls) for each in places_in(arguments.config)]
+    port = serve_metrics(valves, arguments.listen_host, arguments.listen_port)
+    print(
+        f"serving metrics of {', '.join(each.name for each in valves)} on http://{arguments.listen_host}:{port}/metrics",
+        flush=True,
+    )
     Event().wait()
     return 0

@@ -8,6 +8,7 @@
     friction_file                   friction against its baseline, kept over restarts
     words                           codes, causes and estimates in words
     poller                          reads a daemon in a thread of its own
+    watched_valves                  the valves that somebody looks at, their pollers and connections
     last_moves                      the last minutes as a recording, and the response figures of their steps
     permissives, valve_commands     what must hold, and what an operator may do, confirmed by what is read back
 """

@@ -22,7 +22,7 @@ from positioner.cli.main import main
 from positioner.cli.parts.authority import Authority, Owner
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs
-from positioner.pages.operator_page.watched_valves import Place, watching
+from positioner.observer.watched_valves import Place, watching
 from tests.children import ended, running
 from tests.cli.test_daemon_process import LAW, until
 

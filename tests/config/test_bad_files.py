@@ -14,10 +14,10 @@ from config.exports.raw_table import raw_tables
 from config.exports.text_table import text_tables
 from config.plain_file import MOST_BYTES, MOST_COLUMNS, MOST_VALUES
 from config.recording import Recording
+from config.role_passwords import read_passwords
 from fieldbus.canopen.eds import read_eds
 from positioner.cli.main import main
 from positioner.daemon.health.health_file import HealthRecord, read_record
-from positioner.pages.operator_page.role_passwords import read_passwords
 
 DIGITS = "9" * 5000
 VALVE = "[valve]\nstroke_m = 0.1\n"

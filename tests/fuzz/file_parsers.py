@@ -32,6 +32,7 @@ from config.exports.own_format import own_recording
 from config.historian_export import read_export
 from config.loading import SHIPPED
 from config.recording import Recording, read_recording
+from config.role_passwords import read_passwords
 from config.roles import Role
 from config.slave_file import load_slave
 from config.valve_file import load_valve, shipped_valve
@@ -42,7 +43,6 @@ from positioner.daemon.memory.memory_file import KEYS, VERSION, read_memory, wri
 from positioner.history.entries import Event
 from positioner.history.history_file import FILE_NAME, HistoryFile
 from positioner.history.history_reader import HistoryReader
-from positioner.pages.operator_page.role_passwords import read_passwords
 from tests.certificates import folder as certificates
 from tests.certificates import revoke, tls
 from tests.daemon.memory.test_memory_file import KNOWLEDGE, NOW

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
+from config.passwords import MOST_WRONG, PAUSE_S, Password, SignIn
 from positioner.pages.parts.gate import Gate, Message, Receive, Send, TooMuch
-from positioner.pages.parts.sessions import MOST_WRONG, PAUSE_S, Password, SignIn
 
 KEY, COOKIE, MOST = "the-key", "positioner_1", 1000
 

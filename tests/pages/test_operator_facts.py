@@ -10,15 +10,15 @@ import pytest
 
 from config.codes import Fault, Mode, Ne107Cause, Ne107Status, State
 from config.errors import InputError
+from config.passwords import MOST_WRONG, SignIn
 from config.registers import BY_NAME
+from config.role_passwords import read_passwords, set_password
 from config.roles import Role
 from positioner.observer.freshness import Freshness
 from positioner.observer.trends import thinned
 from positioner.observer.valve_view import ValvePicture
 from positioner.pages.operator_page import facts
 from positioner.pages.operator_page.controls import SIGNED_IN_S, SignedIn
-from positioner.pages.operator_page.role_passwords import read_passwords, set_password
-from positioner.pages.parts.sessions import MOST_WRONG, SignIn
 from positioner.pages.parts.units import LENGTHS, Units
 
 STROKE_M = 0.1
@@ -141,7 +141,7 @@ def test_passwords_that_are_too_short_or_none_are_refused_by_name(tmp_path: Path
         ("{", "is no file of passwords"),
         ("[]", "is no file of passwords"),
         (json.dumps({"operator": {"salt": "00"}}), "is no file of passwords"),
-        (json.dumps({"admin": {"salt": "00", "digest": "00"}}), "role: allowed are operator, engineer, got admin"),
+        (json.dumps({"admin": {"salt": "00", "digest": "00"}}), "role: allowed are observer, operator, engineer, got admin"),
     ):
         file.write_text(text)
         with pytest.raises(InputError, match=said):

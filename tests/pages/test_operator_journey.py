@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from positioner.pages.operator_page.role_passwords import set_password
+from config.role_passwords import set_password
 from tests.pages.browser import needs_chromium, opened, served
 from tests.pages.valve_site import valve_site
 

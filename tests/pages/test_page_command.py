@@ -9,7 +9,7 @@ from config.errors import CommandFailed, InputError
 from config.roles import Role
 from positioner.cli import page
 from positioner.cli.main import command_parser, main
-from positioner.pages.operator_page.watched_valves import Place
+from positioner.observer.watched_valves import Place
 from tests.certificates import folder
 
 VALVE = "[valve]\nname = '{name}'\nstroke_m = 0.1\n[supervisory]\nport = {port}\n[recorder]\nfolder = 'rec'\n"
@@ -42,7 +42,7 @@ def test_without_a_file_an_address_is_enough() -> None:
     ("words", "said"),
     [
         (["--config", "nowhere.toml"], "nowhere.toml"),
-        (["--config", "a.toml", "--config", "a.toml"], "a.toml: valve.name: 'FV-101' is also in another --config"),
+        (["--config", "a.toml", "--config", "a.toml"], "a.toml: valve.name: 'FV-101' is also in another file"),
         (["--config", "a.toml", "--port", "802"], "--port: is given, so --config must not be"),
         (["--port", "99999"], "the daemon: port: "),
         (["--roles", "nowhere.json"], "nowhere.json: cannot be read"),

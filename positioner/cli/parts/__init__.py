@@ -11,6 +11,7 @@ A command imports from here what it needs when it runs.
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out
     page_address                                where a page listens
+    served_valves                               the valves of daemons' files, and by which certificates they are read
     output_files                                what `--out` and `--json` ask for
     telegraf                                    the register map as Telegraf's configuration
     sampling                                    when a device samples, for `doctor --nudge-pa`

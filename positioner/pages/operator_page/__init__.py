@@ -6,13 +6,11 @@ does what counts as live: a page that shows a value that is not of now greys it 
 Its files:
 
     page                    the page of one tab: all valves, or one in full
-    watched_valves          the valves that it looks at, their pollers and connections
     overview, valve_panel   a card a valve; all of one
     marks                   how things are stressed: grey, NE 107, a fault
     trend_plot              reference, position and pressure as they come, the states as bands
     recorded_plot           the last minutes as recorded, to zoom into
     friction_plot           friction against its baseline, a row a minute
     controls                signing in; mode, reference, identification, acknowledgement
-    role_passwords          the passwords of operator and engineer, kept in a file as scrypt leaves them
     facts                   what is said of a valve, a line each
 """

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from config.codes import Mode
+from config.passwords import SignIn
 from config.registers import register_named
+from config.role_passwords import WRITERS
 from config.roles import Role
 from positioner.observer.permissives import identify_permissives
 from positioner.observer.valve_commands import EXCITATION, Confirmation, refusal_for
 from positioner.observer.valve_view import ValvePicture
-from positioner.pages.operator_page.role_passwords import ROLES
-from positioner.pages.operator_page.watched_valves import WatchedValve
-from positioner.pages.parts.sessions import SignIn
+from positioner.observer.watched_valves import WatchedValve
 from positioner.pages.parts.telling import aside, heading
 
 SIGNED_IN_S = 900.0
@@ -59,7 +59,7 @@ class Door:
                 ui.label(NO_PASSWORDS)
                 ui.button("Close", on_click=self._dialog.close).props("flat no-caps")
                 return
-            names = {role.name.lower(): role.name.lower() for role in ROLES if role.name.lower() in sign_in.passwords}
+            names = {role.name.lower(): role.name.lower() for role in WRITERS if role.name.lower() in sign_in.passwords}
             self._role = ui.select(names, label="role", value=next(iter(names), None)).classes("full-width")
             self._role.props('data-testid="role"')
             self._password = ui.input("password", password=True).classes("full-width").on("keydown.enter", self._try)

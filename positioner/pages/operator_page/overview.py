@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from positioner.observer.valve_view import ValvePicture
+from positioner.observer.watched_valves import WatchedValve
 from positioner.pages.operator_page.facts import condition, figures
 from positioner.pages.operator_page.marks import grey, mark_ne107
-from positioner.pages.operator_page.watched_valves import WatchedValve
 from positioner.pages.parts.units import Units
 
 LINES = ("reference", "pressure", "mode", "state", "fault")

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 from nicegui import app, ui
 
+from config.passwords import SignIn
+from positioner.observer.watched_valves import Place, WatchedValve, watching
 from positioner.pages.operator_page.controls import Door, SignedIn
 from positioner.pages.operator_page.marks import STYLE, SignOfLife
 from positioner.pages.operator_page.overview import Overview
 from positioner.pages.operator_page.valve_panel import ValvePanel
-from positioner.pages.operator_page.watched_valves import Place, WatchedValve, watching
 from positioner.pages.parts.server import Listening, serve
-from positioner.pages.parts.sessions import SignIn
 from positioner.pages.parts.telling import aside
 from positioner.pages.parts.theme import Theme
 from positioner.pages.parts.unit_choice import unit_choice

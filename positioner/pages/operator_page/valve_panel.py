@@ -8,6 +8,7 @@ from nicegui import ui
 from config.results.block import as_html
 from positioner.observer.last_moves import LastMoves, last_moves
 from positioner.observer.valve_view import SeenEvent, ValvePicture
+from positioner.observer.watched_valves import WatchedValve
 from positioner.pages.operator_page import facts
 from positioner.pages.operator_page.controls import Controls, SignedIn
 from positioner.pages.operator_page.facts import Fact
@@ -15,7 +16,6 @@ from positioner.pages.operator_page.friction_plot import FrictionPlot
 from positioner.pages.operator_page.marks import grey, mark_fault, mark_ne107
 from positioner.pages.operator_page.recorded_plot import RecordedPlot
 from positioner.pages.operator_page.trend_plot import WINDOWS_S, TrendPlot
-from positioner.pages.operator_page.watched_valves import WatchedValve
 from positioner.pages.parts.telling import aside, heading
 from positioner.pages.parts.theme import Theme
 from positioner.pages.parts.units import Units

@@ -4,7 +4,7 @@ Its files:
 
     server               listens and serves one page, everything of it from this machine
     gate                 who comes in: by the key in the address or by a password; how much at once
-    sessions             who came in, and how often a password was wrong
+    sessions             who came in
     theme                light and dark, colours of page and plots
     telling              errors and sentences, shown
     units, unit_choice   the units that a person reads in, and where they are chosen

@@ -16,7 +16,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from positioner.pages.parts.sessions import Sessions, SignIn
+from config.passwords import SignIn
+from positioner.pages.parts.sessions import Sessions
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]

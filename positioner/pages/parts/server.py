@@ -15,8 +15,8 @@ from fastapi import FastAPI
 from nicegui import app, ui
 
 from config.errors import InputError
+from config.passwords import Password, SignIn
 from positioner.pages.parts.gate import KEY, Gate
-from positioner.pages.parts.sessions import Password, SignIn
 
 PORT = 8765
 """Where a page listens if nothing is said; taken, another free one."""

@@ -1,15 +1,16 @@
-"""The passwords of operator and engineer, in a file as scrypt leaves them: `positioner page --set-password ROLE`."""
+"""The passwords of roles, in a file as scrypt leaves them: `--set-password ROLE` of `positioner page` and `opcua`."""
 
 import json
 from pathlib import Path
 
 from config.errors import InputError
+from config.passwords import Password
 from config.roles import Role
 from config.whole_file import replace_whole
-from positioner.pages.parts.sessions import Password
 
-ROLES = (Role.OPERATOR, Role.ENGINEER)
-"""Who may sign in: whoever sees the page is an observer."""
+ROLES = (Role.OBSERVER, Role.OPERATOR, Role.ENGINEER)
+WRITERS = ROLES[1:]
+"""Who may sign in on a page: whoever sees it is an observer."""
 LEAST_LENGTH = 8
 OWN_ALONE = 0o600
 

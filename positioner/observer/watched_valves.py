@@ -1,4 +1,4 @@
-"""The valves that a page looks at: where each one's daemon is, who polls it, and how a role connects to it."""
+"""The valves that somebody looks at: where each one's daemon is, who polls it, and how a role connects to it."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,6 +31,9 @@ class Place:
     """Of an observer."""
     tls_of: Mapping[Role, Tls] = field(default_factory=dict)
     """Of those who may write, where the daemon asks for certificates."""
+    history: Path | None = None
+    range_pa: tuple[float, float] | None = None
+    """Of the commands."""
     keep: Path | None = None
     """The folder that keeps what the page has seen of friction."""
 
