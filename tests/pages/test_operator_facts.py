@@ -141,7 +141,10 @@ def test_passwords_that_are_too_short_or_none_are_refused_by_name(tmp_path: Path
         ("{", "is no file of passwords"),
         ("[]", "is no file of passwords"),
         (json.dumps({"operator": {"salt": "00"}}), "is no file of passwords"),
-        (json.dumps({"admin": {"salt": "00", "digest": "00"}}), "role: allowed are observer, operator, engineer, got admin"),
+        (
+            json.dumps({"admin": {"salt": "00", "digest": "00"}}),
+            "role: allowed are observer, operator, engineer, got admin",
+        ),
     ):
         file.write_text(text)
         with pytest.raises(InputError, match=said):
