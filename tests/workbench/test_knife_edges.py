@@ -1,6 +1,7 @@
 """A held-out slip that is narrowly mistimed is excepted by name; what no change of friction puts right is not."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def changed(**factors: float) -> ValveFile:
 
 def found(valve: ValveFile, part: Part) -> tuple[tuple[KnifeEdge, ...], float]:
     error_m = error_of(valve, part)
-    edges = knife_edges(valve, part, error_m, NOISE_M, from_pressure=False)
+    edges = knife_edges(valve, part, part, error_m, NOISE_M, from_pressure=False)
     return edges, rms_without(part.record.time_s, error_m, edges)
 
 
@@ -73,6 +74,25 @@ def test_a_stop_that_is_not_there_is_no_knife_edge(part: Part) -> None:
 
 def test_many_mistimed_slips_are_the_models_fault(part: Part) -> None:
     assert found(changed(static_n=0.995, coulomb_n=1.01), part)[0] == ()
+
+
+def test_another_friction_than_was_fitted_is_no_knife_edge(part: Part) -> None:
+    """One change puts every slip right, but what was fitted tells that friction better."""
+    other = changed(static_n=1.0 / 1.01)
+    fitted = record_of(other, 20)
+    record = ready(fitted)
+    both = partial(knife_edges, other, part=part, error_m=error_of(other, part), floor_m=NOISE_M, from_pressure=False)
+    assert both(fitted=Part(fitted, record, record.valid)) == ()
+    assert len(both(fitted=part)) > 3, "where what was fitted allows the change, all of them are"
+
+
+def test_a_stretch_of_many_slips_is_no_knife_edge(part: Part) -> None:
+    other = changed(coulomb_n=1.0 / 1.02)
+    assert np.nanstd(error_of(other, part)) > 3.0 * NOISE_M
+    fitted = record_of(other, 20)
+    record = ready(fitted)
+    error_m = error_of(other, part)
+    assert knife_edges(other, Part(fitted, record, record.valid), part, error_m, NOISE_M, from_pressure=False) == ()
 
 
 def test_the_rms_without_leaves_out_the_stretches_and_nothing_else() -> None:

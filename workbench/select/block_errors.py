@@ -64,7 +64,7 @@ class BlockErrors(Brief):
     independent_share: float
     """Share of the fitted samples that are independent."""
     knife_edges: tuple[KnifeEdge, ...]
-    """Held-out slips that are narrowly mistimed, where these would decide whether all is explained."""
+    """Held-out slips that are narrowly mistimed, where these decide whether all is explained, or anything is left."""
     test_rest_rmse_m: float
     """The rms error held out without these."""
 
@@ -80,8 +80,8 @@ class BlockErrors(Brief):
         return mostly and max(self.train_rmse_m, self.test_rest_rmse_m) <= RARELY_OFF * floor_m
 
     def floors_left(self, floor_m: float) -> float:
-        """Return a typical second's error, fitted or held out, whichever is more, in floors."""
-        return max(self.train_block_m, self.test_block_m) / floor_m
+        """Return what is left, in floors: a typical second's error or the rms, fitted or held out, the most of them."""
+        return max(self.train_block_m, self.test_block_m, self.train_rmse_m, self.test_rest_rmse_m) / floor_m
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
@@ -118,10 +118,11 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         test_rest_rmse_m=test_rmse_m,
     )
     floor_m = split.floor_m
-    if floor_m is None or found.at_floor(floor_m) or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
+    if floor_m is None or test_rmse_m <= NOISE_KNOWN_TO * floor_m:
         return found
-    slow = train if fit.by.slow else None
-    edges = knife_edges(fit.valve, test, held_out_m, floor_m, from_pressure=fit.from_pressure, slow_fit=slow)
+    if not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
+        return found
+    edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure, slow=fit.by.slow)
     return replace(found, knife_edges=edges, test_rest_rmse_m=rms_without(test.record.time_s, held_out_m, edges))
 
 

@@ -7,11 +7,12 @@ asked whether the same model with F_s or F_c changed by at most `MOST_CHANGE` wo
     |r| > 5 floors, gaps of less than 0.2 s closed                        a stretch
     rms over it, changed, <= max(1.75 floors, a fifth of what it was)     a knife edge
 
-An error that no such change takes away is no knife edge. Nor are many: more than a tenth of the slips are the model's,
-unless one change puts all of them right.
+An error that no such change takes away is no knife edge. Nor are many: where these stretches hold more than a tenth of
+the slips it is the model's, unless one change puts all of them right and what was fitted allows it. A friction that what
+was fitted refutes is another friction, and no narrow miss.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,7 @@ CHANGES, MOST_CHANGE = (0.001, 0.0025, 0.005, 0.01), 0.02
 WIDEST, INTERVAL = 0.1, 2.0
 """Of static friction: its interval at the most, and times the number of slips."""
 MOST_SHARE = 0.1
-"""Of the slips held out; one may always be."""
+"""Of the slips held out; one may always be, with the one that ends its stretch."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -58,42 +59,54 @@ class KnifeEdge(Brief):
 
 
 def knife_edges(
-    valve: ValveFile, part: Part, error_m: Column, floor_m: float, *, from_pressure: bool, slow_fit: Part | None = None
+    valve: ValveFile,
+    fitted: Part,
+    part: Part,
+    error_m: Column,
+    floor_m: float,
+    *,
+    from_pressure: bool,
+    slow: bool = False,
 ) -> tuple[KnifeEdge, ...]:
     """Return the stretches of a held-out error that are knife edges, in order; none if they are too many.
 
     Args:
         valve: as fitted.
+        fitted: what it was fitted to.
         part: what was held out.
         error_m: the fit's error on it, simulated less measured, m, (n,), NaN where a sample does not count.
         floor_m: what no model undercuts.
         from_pressure: whether the fit runs from the measured pressure.
-        slow_fit: what was fitted where samples lie farther apart than slides last: static friction is known to an
-            interval that falls with the number of its slips, 2 / slips of it.
+        slow: whether samples lie farther apart than slides last: static friction is known to an interval that falls
+            with the number of slips fitted, 2 / slips of it.
     """
-    widest = min(WIDEST, INTERVAL / max(1, _slips(slow_fit))) if slow_fit else 0.0
+    widest = min(WIDEST, INTERVAL / max(1, len(_slips(fitted)))) if slow else 0.0
     stretches = list(_stretches(part, error_m, LARGE * floor_m))
-    allowed = max(1, int(MOST_SHARE * _slips(part)))
+    few = _few(stretches, _slips(part))
     found: dict[tuple[int, int], KnifeEdge] = {}
     time_s = part.record.time_s
     for name, change in _changes(widest):
-        if len(found) == len(stretches):
+        if few and len(found) == len(stretches):
             break
         changed = _changed(valve, name, change)
         if changed is None:
             continue
-        composition = Composition.from_file(changed)
-        run = FreeRun(composition, part.record, from_pressure=from_pressure)
-        other_m = residual_m(part, run.position_m(composition.theta))
+        other_m = _error_m(changed, part, from_pressure)
         right = {
             (first, end): KnifeEdge(float(time_s[first]), float(time_s[end - 1]), name, change)
             for first, end in stretches
             if _rms(other_m[first:end]) <= max(AT_MOST * floor_m, FELL * _rms(error_m[first:end]))
         }
-        if len(right) == len(stretches):
+        if len(right) == len(stretches) and _rms(_error_m(changed, fitted, from_pressure)) <= AT_MOST * floor_m:
             return tuple(right.values())
         found = right | found
-    return tuple(found[each] for each in sorted(found)) if len(found) <= allowed else ()
+    return tuple(found[each] for each in sorted(found)) if _few(found, _slips(part)) else ()
+
+
+def _few(stretches: Collection[tuple[int, int]], slip_rows: Sequence[int]) -> bool:
+    """Whether stretches hold few of the slips, given by the rows where these begin; the last only ends its stretch."""
+    held = [sum(first <= row < end for row in slip_rows) for first, end in stretches]
+    return sum(max(1, each - 1) for each in held) <= max(1, int(MOST_SHARE * len(slip_rows)))
 
 
 def rms_without(time_s: Column, error_m: Column, edges: tuple[KnifeEdge, ...]) -> float:
@@ -120,6 +133,12 @@ def _changed(valve: ValveFile, name: str, change: float) -> ValveFile | None:
     return None if changed.static_n < changed.coulomb_n else valve.model_copy(update={"valve": changed})
 
 
+def _error_m(valve: ValveFile, part: Part, from_pressure: bool) -> Column:
+    composition = Composition.from_file(valve)
+    run = FreeRun(composition, part.record, from_pressure=from_pressure)
+    return residual_m(part, run.position_m(composition.theta))
+
+
 def _stretches(part: Part, error_m: Column, large_m: float) -> Iterator[tuple[int, int]]:
     """Yield the rows, half open, over which an error is large."""
     time_s = part.record.time_s
@@ -132,11 +151,11 @@ def _stretches(part: Part, error_m: Column, large_m: float) -> Iterator[tuple[in
         yield int(rows[first]), int(rows[last]) + 1
 
 
-def _slips(part: Part) -> int:
-    """Return how many slips were held out."""
+def _slips(part: Part) -> list[int]:
+    """Return the rows at which the slips that count begin."""
     record = part.record
     counted = np.where(part.counted, record.position_m, np.nan)
-    return sum(len(slips(counted[first:end], record.scale_m)) for first, end in record.segments)
+    return [first + each.first for first, end in record.segments for each in slips(counted[first:end], record.scale_m)]
 
 
 def _rms(values: Column) -> float:

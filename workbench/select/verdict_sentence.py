@@ -36,7 +36,7 @@ def verdict_sentence(
             f"another name, the held-out error falls from {before:.3g} to {after:.3g} mm. Fit again with the mass free."
         )
     if verdict == "adequate":
-        said = f"Nothing is missing: no effect lowers the held-out error of {after:.3g} mm as it must."
+        said = _adequate(best.errors, parts)
         return said + knife_edges_sentence(best.errors) + _suspicion(steps[0].suspected) + _scatter(parts)
     if verdict == "missing":
         suspicion = _suspicion(steps[-1].suspected) if steps[-1].added is None else ""
@@ -44,7 +44,8 @@ def verdict_sentence(
         return said + knife_edges_sentence(best.errors) + suspicion
     if verdict == "one_of":
         rivals = (tuple(each.name for each in step.indistinguishable) for step in steps)
-        return f"Missing: {names}, or another that does as well; {fell}." + "".join(
+        left = f", and {_left(best.errors, parts)}" if _floors_left(best.errors, parts) > NOISE_KNOWN_TO else ""
+        return f"Missing: {names}, or another that does as well; {fell}{left}." + "".join(
             [*(rivals_sentence(each, library) for each in rivals), knife_edges_sentence(best.errors)]
         )
     part = "lowers it" if verdict in ("unjudged", "unfinished") else "explains a part"
@@ -54,9 +55,24 @@ def verdict_sentence(
     return _unproved(verdict, steps, library) + begun
 
 
+def _adequate(errors: BlockErrors, parts: Split) -> str:
+    """Say that the valve as it is explains the record, and what it leaves of it."""
+    after, floors = f"{1e3 * errors.test_rmse_m:.3g} mm", _floors_left(errors, parts)
+    if floors <= NOISE_KNOWN_TO:
+        return f"Nothing is missing: no effect lowers the held-out error of {after} as it must."
+    return (
+        f"Nothing is missing that an effect here would explain: none lowers the held-out error of {after} as it must; "
+        f"what is left are {floors:.2g} floors."
+    )
+
+
+def _floors_left(errors: BlockErrors, parts: Split) -> float:
+    return errors.floors_left(parts.floor_m) if parts.floor_m else 1.0
+
+
 def _left(errors: BlockErrors, parts: Split) -> str:
     """Say what an explained record leaves."""
-    floors = errors.floors_left(parts.floor_m) if parts.floor_m else 1.0
+    floors = _floors_left(errors, parts)
     if floors <= NOISE_KNOWN_TO:
         return "nothing is left to explain"
     return f"what is left, {floors:.2g} floors, no other effect here explains"
