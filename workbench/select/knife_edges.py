@@ -8,8 +8,8 @@ asked whether the same model with F_s or F_c changed by at most `MOST_CHANGE` wo
     rms over it, changed, <= max(1.75 floors, a fifth of what it was)     a knife edge
 
 An error that no such change takes away is no knife edge. Nor are many: where these stretches hold more than a tenth of
-the slips it is the model's, unless one change puts all of them right and what was fitted allows it. A friction that what
-was fitted refutes is another friction, and no narrow miss.
+the slips it is the model's, unless one change puts all of them right and what was fitted allows it. A friction that
+what was fitted refutes is another friction, and no narrow miss.
 """
 
 from collections.abc import Collection, Iterator, Sequence
