@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint browser bench campaign fuzz kills soak blind journey docs clean
+.PHONY: venv demo test suite lint browser bench campaign fuzz kills endurance blind journey docs clean
 
 venv: $(READY)
 
@@ -46,8 +46,8 @@ fuzz: $(READY)          ## every parser on ten million inputs, guided by coverag
 kills: $(READY)         ## kill -9 at random instants, 300 times: some twenty minutes, prints the table
 	$(BIN)/python -m benchmarks.kills --times 300
 
-soak: $(READY)          ## ten minutes of a polled, recording daemon: does its memory stay flat?
-	$(BIN)/python -m benchmarks.memory --minutes 10
+endurance: $(READY)     ## an hour at 1 kHz and a month in virtual time: does anything grow, drift or stop?
+	$(BIN)/python -m benchmarks.endurance --minutes 60 --days 30
 
 blind: $(READY)         ## hours, can be broken off: what is missing of the blind campaign, and its tables
 	$(BIN)/python -m benchmarks.blind

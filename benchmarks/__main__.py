@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: every benchmark that takes seconds; `benchmarks.memory` takes minutes and runs alone."""
+"""`python -m benchmarks`: every benchmark that takes seconds; `benchmarks.endurance` takes an hour and runs alone."""
 
 from benchmarks import bus, can, cycle_time, estimation, modbus_pieces, physics, rtu_cycle, startup, tls_cycle
 

@@ -18,7 +18,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.memory import resident_kb
+from benchmarks.endurance import held_by
 from positioner.dcs import Dcs
 from tests.pages.browser import CHROMIUM, opened, served
 from tests.pages.valve_site import Site, valve_site
@@ -162,7 +162,7 @@ def _memory(config: Path, port: int, minutes: float) -> Iterator[str]:
             while time.monotonic() < end_s:
                 dcs.set("reference", 0.4 + 0.3 * (look % 2))
                 time.sleep(1.0)
-            seen.append(resident_kb(pid))
+            seen.append(held_by(pid)[0])
         grown_kb = seen[-1] - seen[LOOKS // 2]
         yield f"page's memory after {minutes:g} min: {seen[-1] / 1024:.0f} MiB, second half {grown_kb:+d} kB"
 
