@@ -5,10 +5,11 @@ import numpy as np
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
+from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, SEED, with_effect
 from workbench.data.held_out import split
-from workbench.select.equivalence import bare_imitation, undetectable
+from workbench.select.equivalence import bare_imitation, undetectable, unseen_without_spring
 
 VALVE = ValveFile(valve=SEED.valve.model_copy(update={"coulomb_n": 600.0, "static_n": 720.0}))
 WIDTH_M = 1.5e-3
@@ -90,3 +91,10 @@ def test_a_valve_that_has_play_is_not_told_of_another() -> None:
 def test_a_play_wider_than_a_slip_has_no_bare_twin() -> None:
     assert bare_imitation(with_effect(VALVE, "backlash", width_m=5e-3)) is None
     assert bare_imitation(VALVE) is None
+
+
+def test_an_offset_shows_by_the_spring_alone() -> None:
+    drive = SEED.valve.model_copy(update={"spring_n_per_m": 0.0})
+    effects = [shipped_effect(name, "library") for name in shipped_effects()]
+    assert [each.name for each in effects if unseen_without_spring(each, drive)] == ["sensor_offset"]
+    assert not any(unseen_without_spring(each, SEED.valve) for each in effects)

@@ -23,7 +23,7 @@ from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
-from workbench.select.equivalence import undetectable
+from workbench.select.equivalence import undetectable, unseen_without_spring
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
@@ -157,7 +157,8 @@ def diagnose(
     there = {each.name for each in valve.effect}
     named = [find_effect(name, "effects") for name in (tried_effects() if effects is None else effects)]
     by = sampling(parts.train.record, valve.valve)
-    unseen = {each.written: by.left_out(each) for each in named if by.left_out(each)}
+    why = {each.written: by.left_out(each) or unseen_without_spring(each, valve.valve) for each in named}
+    unseen = {name: each for name, each in why.items() if each}
     library = {each.written: each for each in named if each.written not in there and each.written not in unseen}
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)

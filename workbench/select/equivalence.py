@@ -16,7 +16,7 @@ jumps past both. Hence `undetectable` asks the record itself: it is simulated wi
 so.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from config.recording import Column
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import BASE, Composition
 from sim.effect import Effect
+from sim.interpreted import interpreted
 from workbench.data.held_out import Part, Split
 from workbench.data.motion import slips
 from workbench.model.free_run import FreeRun
@@ -37,6 +38,10 @@ DETECTABLE = 0.3
 WIDTHS = 16
 LEAST_PLAY = 4.0
 """Floors; a play that narrow is not worth saying."""
+PLACES = (0.0, 0.1373, 0.3819, 0.6181, 0.8771)
+"""Of the stroke: none is a multiple of another, as those of a quantum are."""
+ROUNDED = 1e-12
+"""Of the stroke: as far as lengths come out different by the arithmetic alone."""
 TAKEN_UP = 2
 """Slips after which the play has been taken up from either side, wherever the linkage stood at the start."""
 
@@ -143,6 +148,24 @@ def classes(names: Iterable[str], library: Mapping[str, Effect]) -> list[frozens
 def distinguishing_record(name: str, other: str, library: Mapping[str, Effect]) -> str:
     """Return what record tells two effects apart, as their files say it; empty if they do not."""
     return library[name].confounded.get(other, "") or library[other].confounded.get(name, "")
+
+
+def unseen_without_spring(effect: Effect, valve: ValveParameters) -> str:
+    """Say why a drive without a spring cannot show an effect; empty if it can, or there is a spring.
+
+    An indication that is off by a constant stands in for a force only where a spring says from where the stem is moved.
+    """
+    if valve.spring_n_per_m or effect.places != ("sensor",) or effect.memory:
+        return ""
+    laws = interpreted((effect,))
+    q = laws.parameters([*([0.0] * len(BASE)), *effect.strengths(valve)[0]])
+    places_m = [part * valve.stroke_m for part in PLACES]
+    off_m = [laws.sensor(x, 0.0, laws.Stem(0.0, x, 0.0, 0.0), q, ()) - x for x in places_m]
+    return "shifts the indication, and a drive without a spring stands anywhere" if _all_same(off_m, valve) else ""
+
+
+def _all_same(lengths_m: Sequence[float], valve: ValveParameters) -> bool:
+    return max(lengths_m) - min(lengths_m) <= ROUNDED * valve.stroke_m
 
 
 def _same(name: str, library: Mapping[str, Effect]) -> frozenset[str]:
