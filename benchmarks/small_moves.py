@@ -50,19 +50,19 @@ LOWEST, HIGHEST = 0.4, 0.9
 SMALLEST, LARGEST = 1e-3, 0.1
 
 
-Law = Literal["seed", "breakaway", "slides"]
+Law = Literal["seed", "breakaway", "slides", "moves"]
 WRITTEN_S, FOLLOWED_S = 0.5, 60.0
 RAMP_PER_S, WANDER = 0.01, 2e-3
 """Of the stroke."""
-PERIODS_S = (1e-3, 0.01, 0.02, 0.05, 0.1, 0.2)
+PERIODS_S = (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2)
 VISIBLE = 1e-4
 """Of the stroke: a stem that moves no farther between two writes has not."""
 KNOWN = {
     "b_over_c_pa_per_m": -SEED.spring_n_per_m / SEED.diaphragm_area_m2,
     "k_over_c_pa": -SEED.coulomb_n / SEED.diaphragm_area_m2,
 }
-LAWS: tuple[Law, ...] = ("seed", "breakaway", "slides")
-SLIDES: tuple[Law, ...] = ("slides",)
+LAWS: tuple[Law, ...] = ("seed", "breakaway", "slides", "moves")
+SLIDES: tuple[Law, ...] = ("slides", "moves")
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,16 +175,17 @@ class Loop:
         pace = DevicePace()
         link = Link(MemoryDriver(Late(device)), pace)
         held_pa, _ = link.open()
-        self.controller = Timed(Settings.of(DaemonFile.model_validate(daemon)), held_pa)
+        file = DaemonFile.model_validate(daemon)
+        self.controller = Timed(Settings.of(file), held_pa)
         self.cycle = Cycle(link, self.controller, pace, first, recorder=None)
         if not case.known:
-            self._identify(law)
+            self._identify(by_slides=file.by_slides)
         self.path(case.period_s)
         self.controller.steps = self.controller.busy_ns = 0
 
-    def _identify(self, law: Law) -> None:
+    def _identify(self, *, by_slides: bool) -> None:
         self._ask(eta=(0, 0, 0))
-        if law == "slides":
+        if by_slides:
             while self.cycle.snapshot.decision.estimates.progress < 1:
                 self.cycle.once()
         else:
@@ -290,7 +291,7 @@ def followed(loop: Loop, references: np.ndarray) -> str:
     )
 
 
-def following(seed: int, noise_pu: float) -> Iterator[str]:
+def following(seed: int, noise_pu: float, laws: Sequence[Law], periods_s: Sequence[float]) -> Iterator[str]:
     """Yield the table of references that come every 0.5 s."""
     ramp, noise = written(seed)
     own = " and ".join(f"{np.abs(np.diff(each)).sum() * 60.0 / FOLLOWED_S:.2f}" for each in (ramp, noise))
@@ -298,8 +299,8 @@ def following(seed: int, noise_pu: float) -> Iterator[str]:
     columns = f"{'rms %':>10}{'at end':>9}{'strokes':>9}{'turns':>9}"
     yield f"{'':18}{'under a ramp':>37}{'under noise':>37}"
     yield f"{'':18}{columns}{columns}"
-    for period_s in PERIODS_S:
-        for law in LAWS:
+    for period_s in periods_s:
+        for law in laws:
             case = Case("", noise_pu, period_s=period_s, known=True)
             said = "".join(followed(Loop(law, case, seed), each) for each in (ramp, noise))
             yield f"{1e3 * period_s:4g} ms {law:>10}{said}"
@@ -347,10 +348,13 @@ def main() -> None:
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=LAWS, metavar="NAME")
     parser.add_argument("--following", action="store_true", help="references every 0.5 s, alone")
     parser.add_argument("--noise-pu", type=float, default=1e-4, help="of the position, with --following (1e-4)")
+    parser.add_argument("--periods-ms", nargs="+", type=float, default=[1e3 * each for each in PERIODS_S])
     arguments = parser.parse_args()
     started_s = time.monotonic()
+    periods_s = [1e-3 * each for each in arguments.periods_ms]
+    followed_lines = following(arguments.seed, arguments.noise_pu, arguments.laws, periods_s)
     lines = report(arguments.steps, arguments.rest_s, arguments.seed, arguments.laws)
-    for line in following(arguments.seed, arguments.noise_pu) if arguments.following else lines:
+    for line in followed_lines if arguments.following else lines:
         print(line, flush=True)
     print(f"{time.monotonic() - started_s:.0f} s")
 

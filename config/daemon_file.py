@@ -79,6 +79,10 @@ NARROWEST_WINDOW = 0.2
 """Of the stroke, for a staircase."""
 
 
+SLOWEST_SINE_S = 5e-3
+"""Period of the slowest loop in which a sine identifies."""
+
+
 class ExcitationTable(Schema):
     """Table `[excitation]`: what S3 applies until the DCS writes otherwise, and how long at the most."""
 
@@ -87,7 +91,7 @@ class ExcitationTable(Schema):
     omega_rad_per_s: Positive = 1.0
     limit_s: Positive = 10.0
     kind: Literal["sine", "staircase"] | None = None
-    """A sine for a fast loop, a staircase of slides for any; where nobody says, the law of slides has the staircase."""
+    """A sine for a fast loop, a staircase of slides for any; where nobody says, the law and the period choose."""
     travel_window: tuple[Fraction, Fraction] = (0.1, 0.9)
     """Where the staircase may take the stem, as shares of the stroke."""
     staircase_limit_s: Positive = 600.0
@@ -153,7 +157,7 @@ class LawTable(Schema):
 class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what it may do."""
 
-    law: Literal["seed", "breakaway", "slides", "conventional"] = "seed"
+    law: Literal["moves", "seed", "breakaway", "slides", "conventional"] = "seed"
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
     push_limit_pa: Positive | None = None
@@ -282,8 +286,13 @@ class DaemonFile(Schema):
 
     @property
     def by_slides(self) -> bool:
-        """Whether S3 excites by a staircase of slides: where nobody says, the law of slides does."""
-        return (self.excitation.kind or ("staircase" if self.control.law == "slides" else "sine")) == "staircase"
+        """Whether S3 excites by a staircase of slides.
+
+        Where nobody says, the law of slides does, and in a loop too slow for a sine the law that chooses the move.
+        """
+        slow = self.control.law == "moves" and self.cycle.period_s > SLOWEST_SINE_S
+        asked = self.excitation.kind or ("staircase" if slow or self.control.law == "slides" else "sine")
+        return asked == "staircase"
 
 
 SHARED = frozenset({"supervisory", "history", "log"})

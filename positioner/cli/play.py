@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.add_argument("valve", metavar="VALVE.toml", help="a valve file, or the name of a shipped valve")
     parser.add_argument("--reference", type=Path, required=True, metavar="REF.csv", help="time_s, reference_m")
-    laws = ("seed", "breakaway", "slides", "conventional")
+    laws = ("seed", "moves", "breakaway", "slides", "conventional")
     parser.add_argument("--law", choices=laws, default="seed", help="the control law (seed)")
     parser.add_argument(
         "--extended",

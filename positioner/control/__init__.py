@@ -12,6 +12,7 @@ real time.
     balance_law                                 the seed's law: the pressure that balances spring and friction
     breakaway_law, breakaway_memory             the law for small moves: the course of a move
     slide_law, slide_memory                     the law of slides: nothing, one or two
+    move_law, move_memory                       the law that chooses the move: nothing, a pulse, a slide or two
     reference_course                            does the reference rest, or take back what would be corrected
     slide_margins                               how far a slide must be sent to break the stem loose, as learnt
     slide_inverse                               what the law of slides takes from an extended valve

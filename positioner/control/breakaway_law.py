@@ -30,8 +30,10 @@ Here is the course of a move. What is remembered is in `breakaway_memory`, 5. in
 give and what its outcome teaches (3., 4.) in `pulse_trial`; `pulse` has the mechanics of the stem.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import sqrt
+from typing import NamedTuple
 
 from config.codes import InhibitReason
 from positioner.control.balance_law import balance_pa
@@ -72,19 +74,41 @@ REFILL_S = 60.0
 """At rest, after this time each, a pulse comes back to the number that is left."""
 
 
+class PlannedPulse(NamedTuple):
+    """What a pulse that may be given is predicted to do, m."""
+
+    error_m: float
+    """That there is now ..."""
+    left_m: float
+    """... and that it leaves."""
+    trial: PulseTrial
+    dead_m: float
+    """The dead band of the move."""
+
+
+Worth = Callable[[BreakawayMemory, PlannedPulse], bool]
+"""Whether a pulse is worth giving to a stem at rest: a law that has other moves may say that it is not."""
+
+
+def _always(_memory: BreakawayMemory, _pulse: PlannedPulse) -> bool:
+    return True
+
+
 def while_not_commanding(memory: BreakawayMemory, observation: Observation, command_pa: float) -> BreakawayMemory:
     """Return the memory while another state commands: the rest of the stem under that command, nothing of a move."""
-    rest = memory.rest if command_pa == memory.level_pa else memory.rest.restarted()
-    rest = rest.updated(observation.position_m) if observation.usable else rest
     return replace(
-        memory,
-        rest=rest,
-        now_s=observation.now_s,
-        level_pa=command_pa,
+        while_watching(memory, observation, command_pa),
         move=None,
         in_progress=None,
         inhibit_reason=InhibitReason.NOTHING,
     )
+
+
+def while_watching(memory: BreakawayMemory, observation: Observation, command_pa: float) -> BreakawayMemory:
+    """Return the memory while another law moves the stem: its rest under that command; the move stays as it was."""
+    rest = memory.rest if command_pa == memory.level_pa else memory.rest.restarted()
+    rest = rest.updated(observation.position_m) if observation.usable else rest
+    return replace(memory, rest=rest, now_s=observation.now_s, level_pa=command_pa)
 
 
 def step(
@@ -94,8 +118,14 @@ def step(
     ratios: Ratios,
     estimates: Estimates,
     settings: BreakawaySettings,
+    worth: Worth = _always,
 ) -> BreakawayMemory:
-    """Return what is remembered after one step of the law; its `level_pa` is the pressure asked for."""
+    """Return what is remembered after one step of the law; its `level_pa` is the pressure asked for.
+
+    Args:
+        memory, observation, reference_m, ratios, estimates, settings: as said.
+        worth: as said there.
+    """
     period_s = observation.now_s - memory.now_s
     memory = replace(memory, now_s=observation.now_s)
     if ratios != memory.ratios:
@@ -117,7 +147,7 @@ def step(
         should_be_at_rest(in_progress, observation, ratios) or moved_nothing(in_progress, memory.rest)
     ):
         return replace(memory, rest=memory.rest.restarted())
-    return _next_pulse(evaluate_trial(memory, ratios, settings), period_s, ratios, settings)
+    return next_pulse(evaluate_trial(memory, ratios, settings), period_s, ratios, settings, worth)
 
 
 def _begin_move(
@@ -135,10 +165,17 @@ def _begin_move(
     return replace(begun, in_progress=in_progress, level_pa=level_pa, rest=memory.rest.restarted())
 
 
-def _next_pulse(
-    memory: BreakawayMemory, period_s: float, ratios: Ratios, settings: BreakawaySettings
+def next_pulse(
+    memory: BreakawayMemory,
+    period_s: float,
+    ratios: Ratios,
+    settings: BreakawaySettings,
+    worth: Worth = _always,
 ) -> BreakawayMemory:
-    """End the move, or give the next pulse; a stem at rest that something else has moved begins it again."""
+    """End the move, or give the next pulse; a stem at rest that something else has moved begins it again.
+
+    Arguments as of `step`; the stem rests, and period_s is that of the loop.
+    """
     move, rest = memory.move, memory.rest
     if move is None or (move.ended_s is not None and not _was_disturbed(move, rest, settings)):
         return memory
@@ -156,7 +193,9 @@ def _next_pulse(
         return _end_move(memory, move, InhibitReason.STUCK)
     trial = planned_trial(memory, abs(error_m), direction, period_s, ratios, settings)
     end = memory.response.end(trial.pulse, RESOLUTION * settings.stroke_m)
-    if move.pulses >= MOST_PULSES or abs(abs(error_m) - end.travel_m) > LARGEST_LEFT * abs(error_m):
+    planned = PlannedPulse(abs(error_m), abs(abs(error_m) - end.travel_m), trial, dead_m)
+    resolved = planned.left_m > LARGEST_LEFT * planned.error_m
+    if move.pulses >= MOST_PULSES or resolved or not worth(memory, planned):
         return _end_move(memory, move, InhibitReason.TRIM_ENDED)
     return _give_pulse(memory, move, trial, end.time_s, period_s, ratios, settings)
 

@@ -191,6 +191,7 @@ def step(
             statics=statics,
             stroke_m=settings.limits.stroke_m,
             valve=settings.valve,
+            provisional=restoration.provisional,
         )
         law_memory = after_step(memory.law, settings.law_with_memory, seen)
 

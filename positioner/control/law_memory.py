@@ -3,14 +3,16 @@
 A law without a memory is a function (`settings.LAWS`); these remember a move, and what moves have taught.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from config.extended_valve import ExtendedValve
 from positioner.control import breakaway_law as breakaway
 from positioner.control import conventional_law as conventional
+from positioner.control import move_law as moves
 from positioner.control import slide_law as slides
 from positioner.control.breakaway_memory import BreakawayMemory, BreakawaySettings, Observation, initial_memory
 from positioner.control.conventional_law import ConventionalMemory, ConventionalSettings
+from positioner.control.move_memory import MoveMemory, MoveSettings
 from positioner.control.sample import Sample
 from positioner.control.slide_inverse import stem_observed, with_margins_at
 from positioner.control.slide_memory import SlideMemory, SlideSettings, StemObservation
@@ -19,8 +21,11 @@ from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 
-LawSettings = BreakawaySettings | SlideSettings | ConventionalSettings
-LawMemory = BreakawayMemory | SlideMemory | ConventionalMemory
+LawSettings = MoveSettings | BreakawaySettings | SlideSettings | ConventionalSettings
+LawMemory = MoveMemory | BreakawayMemory | SlideMemory | ConventionalMemory
+
+_WITH_A_PUSH = (MoveMemory, BreakawayMemory, SlideMemory)
+"""Whose command may be one that something else is to follow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +47,15 @@ class LawInput:
     stroke_m: float
     valve: ExtendedValve | None
     """Whose effects are known."""
+    provisional: bool = False
+    """Whether the first landings have still to tell that what is known of the valve holds."""
 
 
 def first_memory(settings: LawSettings | None, held_pa: float) -> LawMemory | None:
     """Return the memory of the law before its first step; None for a law without one."""
     match settings:
+        case MoveSettings():
+            return MoveMemory(initial_memory(settings.pulses), SlideMemory(level_pa=held_pa))
         case BreakawaySettings():
             return initial_memory(settings)
         case SlideSettings():
@@ -60,6 +69,8 @@ def first_memory(settings: LawSettings | None, held_pa: float) -> LawMemory | No
 def after_step(memory: LawMemory, settings: LawSettings | None, seen: LawInput) -> LawMemory | None:
     """Return what the law remembers after one step; its `level_pa` is the pressure it asks for."""
     match memory, settings:
+        case MoveMemory(), MoveSettings():
+            return _after_moves(memory, settings, seen)
         case BreakawayMemory(), BreakawaySettings():
             return _after_pulses(memory, settings, seen)
         case SlideMemory(), SlideSettings():
@@ -72,12 +83,26 @@ def after_step(memory: LawMemory, settings: LawSettings | None, seen: LawInput) 
 
 def held_pa(memory: LawMemory | None, command_pa: float) -> float:
     """Return what to hold when something interrupts the law after a command, Pa: what follows a push, an excursion."""
-    return memory.held_pa(command_pa) if isinstance(memory, BreakawayMemory | SlideMemory) else command_pa
+    return memory.held_pa(command_pa) if isinstance(memory, _WITH_A_PUSH) else command_pa
+
+
+def _after_moves(memory: MoveMemory, settings: MoveSettings, seen: LawInput) -> MoveMemory:
+    sampled = _sampled(seen)
+    if seen.ratios is None:
+        return moves.while_not_commanding(memory, sampled, seen.command_pa)
+    observation = _observed(seen)
+    if seen.valve is not None:
+        sampled = replace(sampled, position_m=observation.position_m)
+        memory = replace(memory, slides=with_margins_at(memory.slides, seen.reference_m, seen.valve))
+    balance = _balance(seen, seen.ratios)
+    reference_m, allowed = seen.reference_m, not seen.provisional
+    return moves.step(
+        memory, sampled, observation, reference_m, balance, seen.estimates, settings, pulses_allowed=allowed
+    )
 
 
 def _after_pulses(memory: BreakawayMemory, settings: BreakawaySettings, seen: LawInput) -> BreakawayMemory:
-    sample = seen.sample
-    observation = Observation(sample.now_s, sample.position_m, sample.pressure_pa, seen.usable)
+    observation = _sampled(seen)
     if seen.ratios is None:
         return breakaway.while_not_commanding(memory, observation, seen.command_pa)
     return breakaway.step(memory, observation, seen.reference_m, seen.ratios, seen.estimates, settings)
@@ -86,20 +111,33 @@ def _after_pulses(memory: BreakawayMemory, settings: BreakawaySettings, seen: La
 def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) -> SlideMemory:
     if seen.ratios is None:
         return slides.while_not_commanding(memory, seen.command_pa)
-    statics = seen.statics
+    if seen.valve is not None:
+        memory = with_margins_at(memory, seen.reference_m, seen.valve)
+    return slides.step(memory, _observed(seen), seen.reference_m, _balance(seen, seen.ratios), settings)
+
+
+def _sampled(seen: LawInput) -> Observation:
+    sample = seen.sample
+    return Observation(sample.now_s, sample.position_m, sample.pressure_pa, seen.usable)
+
+
+def _observed(seen: LawInput) -> StemObservation:
+    detector = seen.statics.detector
     observation = StemObservation(
         now_s=seen.sample.now_s,
         position_m=seen.sample.position_m,
         usable=seen.usable,
-        rest=statics.detector.rest,
-        quantum_m=statics.detector.quantum_m,
+        rest=detector.rest,
+        quantum_m=detector.quantum_m,
         outcome=seen.outcome,
     )
-    if seen.valve is not None:
-        observation = stem_observed(observation, seen.valve, statics.way)
-        memory = with_margins_at(memory, seen.reference_m, seen.valve)
-    balance = slides.Balance(
-        seen.ratios,
+    return observation if seen.valve is None else stem_observed(observation, seen.valve, seen.statics.way)
+
+
+def _balance(seen: LawInput, ratios: Ratios) -> slides.Balance:
+    statics = seen.statics
+    return slides.Balance(
+        ratios,
         statics.balances,
         statics.held,
         seen.stroke_m,
@@ -107,7 +145,6 @@ def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) 
         seen.sample.now_s,
         statics.law.swing if statics.valve is None else 0.0,
     )
-    return slides.step(memory, observation, seen.reference_m, balance, settings)
 
 
 def _after_conventional(

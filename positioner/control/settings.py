@@ -11,7 +11,9 @@ from config.supervision_table import FaultActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.conventional_law import ConventionalSettings
+from positioner.control.law_memory import LawSettings
 from positioner.control.monitors import MonitorSettings
+from positioner.control.move_memory import MoveSettings
 from positioner.control.permissives import ExcitationLimits
 from positioner.control.played_experiment import ExperimentLimits
 from positioner.control.slide_memory import DAY_S, SlideSettings
@@ -42,7 +44,7 @@ class Settings:
     """What the law may use before anything was identified."""
     law: Callable[[float, int, Ratios], float]
     """Without a memory, see `LAWS`; what commands unless `law_with_memory` does."""
-    law_with_memory: BreakawaySettings | SlideSettings | ConventionalSettings | None
+    law_with_memory: LawSettings | None
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
     experiment: ExperimentLimits
@@ -54,7 +56,7 @@ class Settings:
     @property
     def moves_by_single_steps(self) -> bool:
         """Whether the law commands a pressure and waits for what it does."""
-        return self.law_with_memory is None or isinstance(self.law_with_memory, SlideSettings)
+        return self.law_with_memory is None or isinstance(self.law_with_memory, MoveSettings | SlideSettings)
 
     @classmethod
     def of(cls, file: DaemonFile, valve: ExtendedValve | None = None) -> "Settings":
@@ -168,6 +170,10 @@ def _slides(file: DaemonFile) -> SlideSettings:
     )
 
 
+def _moves(file: DaemonFile) -> MoveSettings:
+    return MoveSettings(_breakaway(file), _slides(file))
+
+
 def _conventional(file: DaemonFile) -> ConventionalSettings:
     return ConventionalSettings(
         dead_band_m=file.control.dead_band * file.valve.stroke_m,
@@ -176,7 +182,8 @@ def _conventional(file: DaemonFile) -> ConventionalSettings:
     )
 
 
-WITH_MEMORY: dict[str, Callable[[DaemonFile], BreakawaySettings | SlideSettings | ConventionalSettings]] = {
+WITH_MEMORY: dict[str, Callable[[DaemonFile], LawSettings]] = {
+    "moves": _moves,
     "breakaway": _breakaway,
     "slides": _slides,
     "conventional": _conventional,

@@ -10,6 +10,7 @@ from math import isfinite, sqrt
 from config.extended_valve import ExtendedValve
 from positioner.control.breakaway_memory import BreakawayMemory, LearntPush
 from positioner.control.law_memory import LawMemory
+from positioner.control.move_memory import MoveMemory
 from positioner.control.slide_margins import Margins
 from positioner.control.slide_memory import SlideMemory
 from positioner.estimation.acceptance import Ratios
@@ -100,6 +101,7 @@ def known(
             how far it is off.
     """
     static_law = statics.law
+    pulses, slides = (law.pulses, law.slides) if isinstance(law, MoveMemory) else (law, law)
     residual_m, covariance = FINEST * stroke_m, NO_DOUBT
     if valve is not None:
         residual_m = max(residual_m, _missed_m(statics.landings, valve))
@@ -114,20 +116,32 @@ def known(
         landings=statics.landings,
         held=statics.held,
         answers=statics.detector.answers,
-        margins=law.margins if isinstance(law, SlideMemory) else None,
-        pushes=(law.up, law.down) if isinstance(law, BreakawayMemory) else None,
+        margins=slides.margins if isinstance(slides, SlideMemory) else None,
+        pushes=(pulses.up, pulses.down) if isinstance(pulses, BreakawayMemory) else None,
     )
 
 
 def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None) -> LawMemory | None:
     """Return the memory of a law with what it had learnt, if it is the same law."""
+    if knowledge is None:
+        return law
     match law:
-        case SlideMemory() if knowledge is not None and knowledge.margins is not None:
-            return replace(law, margins=knowledge.margins)
-        case BreakawayMemory() if knowledge is not None and knowledge.pushes is not None:
-            return replace(law, up=knowledge.pushes[0], down=knowledge.pushes[1])
+        case MoveMemory():
+            return replace(law, pulses=_with_pushes(law.pulses, knowledge), slides=_with_margins(law.slides, knowledge))
+        case SlideMemory():
+            return _with_margins(law, knowledge)
+        case BreakawayMemory():
+            return _with_pushes(law, knowledge)
         case _:
             return law
+
+
+def _with_margins(law: SlideMemory, knowledge: ValveKnowledge) -> SlideMemory:
+    return law if knowledge.margins is None else replace(law, margins=knowledge.margins)
+
+
+def _with_pushes(law: BreakawayMemory, knowledge: ValveKnowledge) -> BreakawayMemory:
+    return law if knowledge.pushes is None else replace(law, up=knowledge.pushes[0], down=knowledge.pushes[1])
 
 
 def _missed_m(landings: Sequence[SlideOutcome], valve: ExtendedValve) -> float:
