@@ -157,7 +157,7 @@ class LawTable(Schema):
 class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what it may do."""
 
-    law: Literal["moves", "seed", "breakaway", "slides", "conventional"] = "seed"
+    law: Literal["seed", "moves", "breakaway", "slides", "conventional"] = "seed"
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
     push_limit_pa: Positive | None = None
