@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from config.recording import Recording
+from config.recording import Column, Recording
 from config.slave_file import Sensor
 from config.valve_file import ValveFile
 from config.writing import write_valve
@@ -110,9 +110,15 @@ def _with_effect(record: Any, seed: int) -> tuple[str, Recording]:
 def _tightened(bare: Hidden, seed: int) -> Recording:
     valve = bare.truth.valve
     tighter = valve.model_copy(update={"coulomb_n": TIGHTER * valve.coulomb_n, "static_n": TIGHTER * valve.static_n})
-    composition = Composition.from_file(ValveFile(valve=tighter))
+    return recorded(bare, ValveFile(valve=tighter), seed)[0]
+
+
+def recorded(bare: Hidden, valve: ValveFile, seed: int) -> tuple[Recording, Column]:
+    """Return what another valve makes of the same autumn, and the clean positions, m, (samples,)."""
+    composition = Composition.from_file(valve)
     trial = Trial(bare.test.command_pa, PERIOD_S)
-    return trial.recording(trial.answer_m(composition, composition.theta), Sensor(noise_std_m=NOISE_M, seed=seed))
+    clean_m = trial.answer_m(composition, composition.theta)
+    return trial.recording(clean_m, Sensor(noise_std_m=NOISE_M, seed=seed)), clean_m
 
 
 def score(found: Fleet, truth: Mapping[str, str]) -> Score:

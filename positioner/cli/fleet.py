@@ -25,33 +25,65 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask scheduler (workers of this machine)")
     parser.add_argument("--workers", type=int, metavar="N", help="how many of these (one a core)")
+    parser.add_argument(
+        "--time-limit-s",
+        type=float,
+        default=900.0,
+        metavar="S",
+        help="for one recording; one that takes longer is listed (900)",
+    )
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the ranking as a page")
+    parser.add_argument(
+        "--diagnoses", type=int, default=10, metavar="N", help="diagnosis reports behind that page, the gravest (10)"
+    )
     parser.add_argument("--since", metavar="DATE", help="say what changed of the valves since then")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what changed since then")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Examine what was not examined before, write the tables, print the ranking."""
     from config.errors import InputError
-    from config.results.block import as_text
+    from config.extras import needed
     from positioner.cli.parts.output_files import writable
+    from workbench.fleet.drill_down import write_diagnosis_reports
     from workbench.fleet.fleet import at, fleet
     from workbench.fleet.fleet_report import report_fleet
-    from workbench.fleet.model_changes import changed_since, changes_told
     from workbench.fleet.tables import write_tables
+    from workbench.report import require_plotly
 
     writable(arguments.report, "--report")
+    writable(arguments.picture, "--picture")
+    if arguments.picture is not None:
+        needed("matplotlib.pyplot", "--picture")
+    if arguments.picture is not None and arguments.since is None:
+        raise InputError("--picture", "draws what changed since a date: give it as --since DATE")
+    if arguments.diagnoses < 0:
+        raise InputError("--diagnoses", f"must be 0 or more, got {arguments.diagnoses}")
+    if arguments.report is not None and arguments.diagnoses:
+        require_plotly(arguments.report)
     since = at(arguments.since) if arguments.since else None
     if arguments.workers is not None and arguments.workers < 1:
         raise InputError("--workers", f"must be 1 or more, got {arguments.workers}")
+    if not arguments.time_limit_s > 0.0:
+        raise InputError("--time-limit-s", f"must be above 0, got {arguments.time_limit_s:g}")
     found = fleet(
-        arguments.manifest, arguments.out, scheduler=arguments.scheduler, workers=arguments.workers, told=_tell
+        arguments.manifest,
+        arguments.out,
+        scheduler=arguments.scheduler,
+        workers=arguments.workers,
+        time_limit_s=arguments.time_limit_s,
+        told=_tell,
     )
     write_tables(found.courses, arguments.out)
     if arguments.report is not None:
-        report_fleet(found, arguments.report, arguments.manifest.name)
+        reports = write_diagnosis_reports(found, arguments.out, arguments.diagnoses)
+        report_fleet(found, arguments.report, arguments.manifest.name, reports)
     print(found.summary())
     if since is not None:
-        print(as_text(changes_told(changed_since(found.courses, since), since)))
+        changes = found.changed_since(since)
+        print(changes.summary())
+        if arguments.picture is not None:
+            changes.plot().savefig(arguments.picture, dpi=120)
     return 1 if found.complaining else 0
 
 

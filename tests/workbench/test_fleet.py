@@ -7,11 +7,13 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import psutil
+import pyarrow as pa
 import pytest
 from distributed import KilledWorker
 from distributed.comm.core import CommClosedError
@@ -26,24 +28,27 @@ from sim.composition import Composition
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import Trial
 from workbench.fleet import engine
-from workbench.fleet.examination import examine
+from workbench.fleet.examination import Change, Examination, examine
 from workbench.fleet.fleet import fleet
-from workbench.fleet.manifest import read_manifest
-from workbench.fleet.tables import write_tables
+from workbench.fleet.manifest import Entry, read_manifest
+from workbench.fleet.tables import columns_told, write_tables
+from workbench.fleet.valve_course import ValveCourse
 
 HEAD = "valve,file,recording,when\n"
+PLACES = {"valve": "V", "file": "V.toml", "recording": "r.csv"}
+ROOT = Path(__file__).parents[2]
 ROWS, PERIOD_S = 1000, 0.02
 TIGHTER = {"coulomb_n": 2200.0, "static_n": 2600.0}
 PLAY = {"name": "backlash", "width_m": 4e-3}
 
 
-def record(file: ValveFile, path: Path, seed: int) -> None:
-    """Record a valve under a command that shows what it is."""
+def record(file: ValveFile, path: Path, seed: int, *, share: float = 1.0, gain: float = 1.0) -> None:
+    """Record a valve under a command that shows what it is: a share of it arrives, the position is read by a gain."""
     path.parent.mkdir(exist_ok=True)
-    trial = Trial(excitation(valve("seed").valve, np.random.default_rng(seed), ROWS), PERIOD_S)
+    command_pa = excitation(valve("seed").valve, np.random.default_rng(seed), ROWS)
     composition = Composition.from_file(file)
-    answer_m = trial.answer_m(composition, composition.theta)
-    trial.recording(answer_m, Sensor(noise_std_m=5e-5, seed=seed)).write(path)
+    answer_m = gain * Trial(share * command_pa, PERIOD_S).answer_m(composition, composition.theta)
+    Trial(command_pa, PERIOD_S).recording(answer_m, Sensor(noise_std_m=5e-5, seed=seed)).write(path)
 
 
 def play() -> ValveFile:
@@ -76,7 +81,7 @@ class Straight:
         pass
 
 
-def straight(_client: object, courses: Any) -> None:
+def straight(_client: object, courses: Any, _time_limit_s: float) -> None:
     for course in courses:
         while (request := course.following()) is not None:
             course.take(examine(request))
@@ -136,8 +141,8 @@ def test_a_second_run_examines_nothing_anew_and_is_the_same_to_the_byte(
     said = capsys.readouterr().out
     assert "9 recordings, 1 of them examined now" in said, "the unreadable one, which is tried again"
     assert "since 2026-01-15: 2 valves have another model" in said
-    assert re.search(r"play +backlash.width_m +none +0.00\d", said)
-    assert re.search(r"tight +coulomb_n +1423.4 .*\+5\d\.\d %", said)
+    assert re.search(r"play +backlash.width_m +none +0.00\d+ +play or stop", said)
+    assert re.search(r"tight +coulomb_n +1423.4 .*\+5\d\.\d % +sticks", said)
 
 
 def test_a_new_recording_is_held_against_the_model_that_the_last_one_left(
@@ -160,16 +165,113 @@ def test_the_page_and_the_tables_tell_what_was_found(ranked: Path) -> None:
     page = (ranked / "fleet.html").read_text()
     assert page.index("play or stop") < page.index("sticks")
     assert "positioner diagnose recordings/play-2.csv --valve seed.toml --report play.html" in page
-    assert "recordings/bad-2.csv: column time_s is missing" in page
-    assert page.count("<svg") == 2
+    assert "column time_s is missing" in page
+    assert str(ranked.parent) not in page
+    assert "Nothing is known of</h2>\n<p>absent</p>" in page
+    assert re.search(r"As their models say</h2>\n<p>bad, well</p>", page)
+    ranking = page[: page.index("<details")]
+    assert ranking.count("<svg") == 2
+    assert '<a href="#history-1">' in ranking
+    assert (report := re.search(r'<a href="(reports/\w+\.html)">The diagnosis report', page))
+    assert "Valve “play”: which effect is missing" in (ranked / report[1]).read_text()
     assert "://" not in page
     rows = parquet.read_table(ranked / "valves.parquet").to_pylist()
     assert [row["valve"] for row in rows[:2]] == ["play", "tight"]
     assert rows[0]["effects"] == "backlash"
     assert rows[0]["cost_share"] == pytest.approx(0.0196, rel=0.05)
+    assert rows[0]["since"] == datetime(2026, 2, 1)
+    true = valve("seed").valve
+    dead_band = 2.0 * true.coulomb_n / (true.spring_n_per_m * true.stroke_m)
+    assert rows[0]["dead_band_share"] == pytest.approx(dead_band, rel=0.02)
     models = parquet.read_table(ranked / "models.parquet").to_pylist()
     assert {row["valve"] for row in models} == {"play", "tight"}
     assert ValveFile.model_validate(tomllib.loads(models[0]["text"]))
+    assert models[0]["error_after_m"] < 1e-4 < models[0]["error_before_m"]
+
+
+def test_the_columns_are_of_the_same_types_whatever_was_found(tmp_path: Path, ranked: Path, without_dask: None) -> None:
+    (tmp_path / "plant.csv").write_text(HEAD + "a,seed,absent.csv,2026-01-01T00:00+01:00\n")
+    write_tables(fleet(tmp_path / "plant.csv", tmp_path / "out").courses, tmp_path / "out")
+    for name in ("valves", "recordings", "models"):
+        nothing, much = (parquet.read_schema(folder / f"{name}.parquet") for folder in (tmp_path / "out", ranked))
+        for one, other in zip(nothing, much, strict=True):
+            assert one.name == other.name
+            assert one.type == (pa.timestamp("us", tz="UTC") if other.type == pa.timestamp("us") else other.type)
+            assert one.metadata[b"meaning"]
+    (row,) = parquet.read_table(tmp_path / "out" / "recordings.parquet").to_pylist()
+    assert row["when"] == datetime(2025, 12, 31, 23, tzinfo=UTC)
+
+
+def test_the_document_has_the_columns_of_the_tables() -> None:
+    assert columns_told() in (ROOT / "docs" / "fleet.md").read_text()
+
+
+def test_what_changed_is_drawn_and_a_date_that_cannot_be_compared_refused(
+    site: Path, ranked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], without_dask: None
+) -> None:
+    words = ["fleet", str(site), "--out", str(ranked)]
+    assert main([*words, "--since", "2026-01-15", "--picture", str(tmp_path / "since.png")]) == 1
+    assert (tmp_path / "since.png").stat().st_size > 5000
+    changes = fleet(site, ranked).changed_since(datetime(2026, 1, 15))
+    assert set(zip(*list(changes.frame_columns().values())[:2], strict=True)) >= {
+        ("play", "backlash.width_m"),
+        ("tight", "coulomb_n"),
+    }
+    (axes,) = changes.plot().axes
+    assert [each.get_text() for each in axes.get_yticklabels()][-1] == "play  backlash.width_m"
+    capsys.readouterr()
+    assert main([*words, "--since", "2026-01-15T00:00+00:00"]) == 2
+    assert "must have no offset" in capsys.readouterr().err
+    assert main([*words, "--picture", str(tmp_path / "since.png")]) == 2
+    assert "--picture: draws what changed since a date" in capsys.readouterr().err
+
+
+def course(*changes: dict[str, tuple[float, float]]) -> ValveCourse:
+    """A valve whose first recording was as its drawing says, and what changed at each that followed."""
+    made = ValveCourse("V")
+    found = [Examination(outcome="as_before", sentence="")]
+    for each in changes:
+        parts = tuple(Change(name=name, before=a, now=b, lower=b, upper=b) for name, (a, b) in each.items())
+        found.append(Examination(outcome="changed", sentence="", changes=parts))
+    for month, came in enumerate(found, start=1):
+        made.take(Entry.model_validate({**PLACES, "when": f"2026-{month:02}-01"}), came)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ([{"coulomb_n": (1000.0, 1300.0), "static_n": (1200.0, 1500.0)}], "sticks"),
+        ([{"coulomb_n": (1000.0, 1100.0)}, {"coulomb_n": (1100.0, 1210.0)}], "drifts, sticks"),
+        ([{"coulomb_n": (1000.0, 1100.0)}, {"coulomb_n": (1100.0, 1000.0)}], "sticks"),
+        ([{"spring_n_per_m": (5e4, 5.5e4), "coulomb_n": (1000.0, 1100.0)}], "air supply or leak"),
+        ([{"spring_n_per_m": (5e4, 5.5e4)}], "lost calibration, spring or diaphragm"),
+        (
+            [{"spring_n_per_m": (5e4, 5.5e4), "coulomb_n": (1000.0, 1500.0)}],
+            "lost calibration, spring or diaphragm, sticks",
+        ),
+    ],
+)
+def test_what_changed_is_called_what_an_engineer_calls_it(changes: list[Any], kind: str) -> None:
+    assert course(*changes).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("share", "gain", "kind"), [(0.85, 1.0, "air supply or leak"), (1.0, 1.12, "lost calibration")]
+)
+def test_a_leak_and_a_lost_calibration_are_told_from_a_packing(
+    tmp_path: Path, without_dask: None, share: float, gain: float, kind: str
+) -> None:
+    """Of the pressure asked for a share arrives; the position is read by another scale."""
+    well = valve("seed")
+    record(well, tmp_path / "recordings" / "V-1.csv", 0)
+    record(well, tmp_path / "recordings" / "V-2.csv", 1, share=share, gain=gain)
+    write_valve(tmp_path / "V.toml", well)
+    rows = [f"V,V.toml,recordings/V-{i}.csv,2026-0{i}-01\n" for i in (1, 2)]
+    (tmp_path / "plant.csv").write_text(HEAD + "".join(rows))
+    (found,) = fleet(tmp_path / "plant.csv", tmp_path / "out").courses
+    assert [each.outcome for _, each in found.examined] == ["as_before", "changed"]
+    assert found.kind.startswith(kind)
 
 
 @pytest.mark.parametrize(
@@ -218,7 +320,7 @@ class Future:
     """An answer of Dask's that is none."""
 
     def __init__(self, status: str, error: Exception | None = None) -> None:
-        self.status, self._error = status, error
+        self.status, self._error, self.key = status, error, "examine-1"
 
     def exception(self) -> Exception | None:
         return self._error
@@ -229,12 +331,13 @@ class Future:
 
 def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_gone_said() -> None:
     died: Any = KilledWorker
-    killed = engine._answer(Future("error", died("examine-1", None, 3)))
+    killed = engine._answer(Future("error", died("examine-1", None, 3)), set(), 1.0)
     assert killed.outcome == "unreadable"
     assert killed.sentence == "the workers that examined it died"
     for status in ("cancelled", "lost", "finished"):
         with pytest.raises(CommandFailed, match="the same command goes on from there"), engine._told_when_gone():
-            engine._answer(Future(status))
+            engine._answer(Future(status), set(), 1.0)
+    assert engine._answer(Future("cancelled"), {"examine-1"}, 9.0).sentence == "not examined within 9 s"
 
 
 @pytest.mark.patient
@@ -245,6 +348,37 @@ def test_no_scheduler_is_one_line(
     assert main(["fleet", str(site), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1"]) == 2
     err = capsys.readouterr().err
     assert err.splitlines()[-1].startswith("positioner fleet: tcp://127.0.0.1:1: no scheduler answers there")
+
+
+def test_a_task_runs_since_those_before_it_at_its_worker_are_through() -> None:
+    clocks = engine._Clocks()
+    clocks.look({"here": ["first"], "there": ["other"]}, {"here": 1, "there": 1}, 0.0)
+    clocks.look({"here": ["behind", "first"], "there": ["other"]}, {"here": 1, "there": 1}, 5.0)
+    assert clocks.late(1.0) == [("here", "first"), ("there", "other")]
+    clocks.look({"here": ["behind"]}, {"here": 1}, 6.0)
+    assert clocks.late(5.9) == []
+    assert clocks.late(6.1) == [("here", "behind")]
+
+
+@pytest.mark.patient
+def test_a_recording_that_takes_too_long_is_listed_and_tried_again(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An effect of one's own, a program, that does not come back in a worker."""
+    own = (ROOT / "sim" / "effects" / "preload.py").read_text()
+    endless = "import multiprocessing, time\nif multiprocessing.parent_process() is not None:\n    time.sleep(1e6)\n"
+    (tmp_path / "endless.py").write_text(own + endless)
+    text = (site.parent / "seed.toml").read_text() + "\n[[effect]]\nname = './endless.py'\nforce_n = 10.0\n"
+    (tmp_path / "seed.toml").write_text(text)
+    shutil.copy(site.parent / "recordings" / "well-1.csv", tmp_path / "r.csv")
+    (tmp_path / "plant.csv").write_text(HEAD + "V,seed.toml,r.csv,2026-01-01\n")
+    monkeypatch.setenv("POSITIONER_EFFECTS", str(tmp_path))
+    found = fleet(tmp_path / "plant.csv", tmp_path / "out", workers=1, time_limit_s=2.0)
+    assert [reason for *_, reason in found.bad] == ["not examined within 2 s"]
+    assert kept(tmp_path / "out") == 0
+    monkeypatch.delenv("POSITIONER_EFFECTS")
+    found = fleet(tmp_path / "plant.csv", tmp_path / "out", workers=1)
+    assert "lies in no folder allowed" in found.bad[0][2], "listed as well: the others would go on"
 
 
 @pytest.mark.patient

@@ -65,7 +65,7 @@ class Effort:
     agree, as the place where the effect is off can be reached from everywhere."""
 
 
-OF_BASE, OF_EFFECT = Effort(8, 6, 3), Effort(5, 4, 2)
+OF_BASE, OF_EFFECT, OF_ONE = Effort(8, 6, 3), Effort(5, 4, 2), Effort(1, 1, 1)
 DRAWS = 8
 ELSEWHERE = 0.01
 """Of a log-parameter: searches that end nearer to each other have found the same place."""
@@ -209,6 +209,24 @@ def fit(
     begun = _widely(BegunFit(composition, error, (), OF_BASE, workers, tell), begins)
     found = begun.carried().finished(profile=profile)
     return replace(found, seeds=(*found.seeds, *origins))
+
+
+@linear_algebra_alone()
+def local_fit(recording: Recording, valve: ValveFile) -> Fit:
+    """Fit a valve by the one search that begins where the valve file is, intervals by the derivatives.
+
+    It takes a fifth of the time of `fit`. As no other search can agree it is never trusted: who takes it judges by the
+    error that it leaves, and asks `fit` where that is not at the floor.
+
+    Raises:
+        InputError: the recording holds too little, other units than SI, or an unknown effect.
+    """
+    record = _fittable(recording, valve)
+    composition = Composition.from_file(valve)
+    error = _error(composition, record, None, False, sampling(record, valve.valve))
+    begun = BegunFit(composition, error, (), OF_ONE, 1, lambda _: None)
+    here = Place(error.coordinates(composition.theta), "valve file")
+    return _widely(begun, [here]).carried().finished(profile=False)
 
 
 @linear_algebra_alone()

@@ -14,4 +14,5 @@ Its files:
     model_changes       what changed of the valves since a time
     tables              results for other programs, as Parquet
     fleet_report        the ranking as a page
+    drill_down          the diagnosis reports behind it
 """

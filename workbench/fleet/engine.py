@@ -2,7 +2,9 @@
 
 Each valve is a course of examinations, one after another; valves go on side by side. A task is a recording's path and a
 model, it reads and computes and writes nothing: a worker that is killed has its tasks given to another, and a recording
-that kills three workers is given up with its reason. What comes back is taken by the client alone.
+that kills three workers is given up with its reason. So is one that takes longer than a limit: its worker is restarted,
+as a thread that computes can be stopped by nobody. No more is sent than there are threads: what waited at a worker
+behind another would be lost with it. What comes back is taken by the client alone.
 
 A cluster of this machine listens on 127.0.0.1 and speaks TLS with certificates made for this run: what a scheduler is
 sent, it executes.
@@ -11,10 +13,13 @@ sent, it executes.
 import logging
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib.metadata import version
+from threading import Event, Thread
 from typing import Any, Protocol
 
 from config.errors import CommandFailed, InputError
@@ -23,6 +28,12 @@ from workbench.fleet.examination import Examination, Request, examine, unreadabl
 
 WHO = "positioner fleet"
 CONNECT_WITHIN_S = 10
+TIME_LIMIT_S = 900.0
+RESTART_WITHIN_S = 60
+LOOK_EVERY_S = 1.0
+"""At what is under way; with a limit of less than twenty of these, oftener."""
+SETTINGS = {"distributed.scheduler.http.routes": [], "distributed.deploy.lost-worker-timeout": "10 minutes"}
+"""The scheduler serves no pages; a worker that was killed is waited for, however slowly one starts anew."""
 GONE = "the scheduler is gone; what was examined is kept: the same command goes on from there"
 
 
@@ -47,6 +58,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         ModuleNotFoundError: Dask is not installed; names the extra.
     """
     distributed = needed("distributed", WHO)
+    needed("dask", WHO).config.set(SETTINGS)
     if scheduler is not None:
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a scheduler that goes is told in one line
         try:
@@ -64,7 +76,8 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             threads_per_worker=1,
             host="127.0.0.1",
             security=distributed.Security.temporary(),
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
+            preload=["workbench.fleet.examination"],
             local_directory=folder,
             silence_logs=50,
         ) as local,
@@ -94,30 +107,93 @@ def _require_same_rules(client: Any, scheduler: str) -> None:
         raise InputError(scheduler, f"has {there}; allowed are workers with positioner {own_version()}")
 
 
-def work(client: Any, courses: Sequence[Course]) -> None:
+def work(client: Any, courses: Sequence[Course], time_limit_s: float = TIME_LIMIT_S) -> None:
     """Carry all courses to their ends.
+
+    Args:
+        client: of the cluster.
+        courses: which go on side by side.
+        time_limit_s: for one examination; one that takes longer is given up.
 
     Raises:
         CommandFailed: the scheduler is gone.
     """
     distributed = needed("distributed", WHO)
-    under_way: dict[str, Course] = {}
+    waiting = deque(courses)
+    under_way: dict[str, tuple[Course, Any]] = {}
     answers = distributed.as_completed()
+    count = 0
 
-    def go_on(course: Course) -> None:
-        request = course.following()
-        if request is not None:
-            future = client.submit(examine, request, key=f"{len(under_way)}-{id(course)}-{request.key}", pure=False)
-            under_way[future.key] = course
-            answers.add(future)
+    def fill() -> None:
+        nonlocal count
+        most = max(sum(client.nthreads().values()), 1)
+        while waiting and len(under_way) < most:
+            course = waiting.popleft()
+            request = course.following()
+            if request is not None:
+                count += 1
+                future = client.submit(examine, request, key=f"examine-{count}-{request.key}", pure=False)
+                under_way[future.key] = course, future
+                answers.add(future)
 
-    with _told_when_gone():
-        for course in courses:
-            go_on(course)
+    with _told_when_gone(), _limited(client, time_limit_s, lambda key: under_way[key][1].cancel()) as overdue:
+        fill()
         for future in answers:
-            course = under_way[future.key]
-            course.take(_answer(future))
-            go_on(course)
+            course, _ = under_way.pop(future.key)
+            course.take(_answer(future, overdue, time_limit_s))
+            waiting.appendleft(course)
+            fill()
+
+
+@contextmanager
+def _limited(client: Any, time_limit_s: float, give_up: Callable[[str], None]) -> Iterator[set[str]]:
+    """Give up what is under way for longer than a limit, on a thread of its own; gives the keys of what was."""
+    clocks, overdue, ended = _Clocks(), set[str](), Event()
+
+    def look() -> None:
+        clocks.look(client.processing(), client.nthreads(), time.monotonic())
+        for worker, key in clocks.late(time.monotonic() - time_limit_s):
+            overdue.add(key)
+            give_up(key)
+            client.restart_workers([worker], timeout=RESTART_WITHIN_S, raise_for_error=False)
+
+    def watch() -> None:
+        while not ended.wait(min(LOOK_EVERY_S, time_limit_s / 20.0)):
+            try:
+                look()
+            except (OSError, CancelledError, KeyError, ValueError):  # a scheduler or a worker is gone: others tell
+                continue
+
+    thread = Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield overdue
+    finally:
+        ended.set()
+        thread.join(CONNECT_WITHIN_S)
+
+
+class _Clocks:
+    """Since when each task runs: of those at a worker, as many as it has threads, those that came first."""
+
+    def __init__(self) -> None:
+        self._came_s: dict[tuple[str, str], float] = {}
+        self._runs_since_s: dict[tuple[str, str], float] = {}
+
+    def look(self, at_workers: Mapping[str, Sequence[str]], threads: Mapping[str, int], now_s: float) -> None:
+        """See which tasks are at which worker."""
+        there = [(worker, key) for worker, keys in at_workers.items() for key in keys]
+        self._came_s = {each: self._came_s.get(each, now_s) for each in there}
+        running = [
+            each
+            for worker, count in threads.items()
+            for each in sorted((each for each in there if each[0] == worker), key=self._came_s.__getitem__)[:count]
+        ]
+        self._runs_since_s = {each: self._runs_since_s.get(each, now_s) for each in running}
+
+    def late(self, time_s: float) -> list[tuple[str, str]]:
+        """Return worker and key of what runs since before a time."""
+        return [each for each, since_s in self._runs_since_s.items() if since_s < time_s]
 
 
 @contextmanager
@@ -133,10 +209,12 @@ def _told_when_gone() -> Iterator[None]:
         raise CommandFailed(GONE) from None
 
 
-def _answer(future: Any) -> Examination:
+def _answer(future: Any, overdue: set[str], time_limit_s: float) -> Examination:
     if future.status == "finished":
         found: Examination = future.result()
         return found
+    if future.key in overdue:
+        return unreadable(f"not examined within {time_limit_s:g} s")
     if future.status in {"cancelled", "lost"}:
         raise CancelledError
     error = future.exception()

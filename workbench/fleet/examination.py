@@ -1,15 +1,18 @@
 """One recording held against one model, as far as it takes: looked at, refitted, diagnosed.
 
-    look      the model in free run against the measured position (`workbench.compare`): adequate, and no more is done
-    refit     spring and friction fitted anew; if the valve then explains the recording, it has only changed
+    look      the model in free run against the measured position (`workbench.compare`): explained, and no more is done
+    refit     spring and friction fitted anew, by one search, by all if that is not at the floor; if the valve then
+              explains the recording, it has changed, or is as before where its parameters are
     diagnose  all else: which effect is missing
 
-The rules of "adequate" and "missing" are those of `compare` and `diagnose`; none is made here. The same recording and
-model give the same examination, on whatever machine it runs.
+Explained is what `compare` calls adequate, and closer (AT_FLOOR): what a refit bends itself round would be missed. The
+rules of "missing" are those of `diagnose`. The same recording and model give the same examination, on
+whatever machine it runs.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -21,16 +24,19 @@ from config.loading import Schema
 from config.recording import Recording
 from config.valve_file import ValveFile
 from config.writing import valve_toml
-from workbench.compare.comparison import Comparison, compare
+from workbench.compare.comparison import NUMERICAL, Comparison, compare
 from workbench.fit.fitted_parameter import Fitted
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fitting import Fit, fit, local_fit, profiled
 from workbench.select.diagnosis import Diagnosis, diagnose
 
-RULES = 1
+RULES = 2
 """To be raised when an examination would come out differently: what was kept is then made anew."""
 UNREADABLE, AS_BEFORE, CHANGED, UNTOLD = "unreadable", "as_before", "changed", "untold"
 LEAST_CHANGE = 0.05
 """Of a parameter: what differs by less has not changed, however narrow its interval."""
+AT_FLOOR = 1.2
+"""Times the floor that a look or a refit may leave; more is diagnosed. `python -m benchmarks.fleet_triage` has what
+each value misses."""
 MOST_CANDIDATES = 5
 
 
@@ -41,8 +47,13 @@ class Request:
     key: str
     recording: str
     model: ValveFile
-    is_first: bool
-    """It is the valve's first: what was known of the valve before is a drawing."""
+    known_by: str | None = None
+    """The recording by which the model was accepted, or the drawing confirmed; None: it is a mere drawing."""
+
+    @property
+    def is_first(self) -> bool:
+        """Whether what was known of the valve before is a drawing."""
+        return self.known_by is None
 
 
 class Change(Schema):
@@ -81,6 +92,11 @@ class Examination(Schema):
     error_after_m: float | None = None
     """Of the model that explains the recording best."""
     floor_m: float | None = None
+    dead_band_share: float | None = None
+    """Of the stroke, 2 F_c / k_s: how far the stem's place depends on which way it came, by the model that explains the
+    recording best."""
+    jump_share: float | None = None
+    """Of the stroke, (F_s - F_c) / k_s: how far it jumps at break-away."""
     effects: tuple[str, ...] = ()
     """What is missing in the model, or one of what may be."""
     rivals: tuple[str, ...] = ()
@@ -112,8 +128,14 @@ def _examined(request: Request) -> Examination:
     recording = Recording.read(Path(request.recording))
     looked = compare(recording, request.model)
     figures = _figures(looked, request.model)
-    if looked.adequate:
-        return Examination(outcome=AS_BEFORE, sentence="as the last model says", error_after_m=looked.rms_m, **figures)
+    if is_at_floor(looked, request.model):
+        return Examination(
+            outcome=AS_BEFORE,
+            sentence="as the last model says",
+            error_after_m=looked.rms_m,
+            **_friction(request.model),
+            **figures,
+        )
     try:
         return _explained(recording, request, figures)
     except InputError as error:
@@ -122,11 +144,36 @@ def _examined(request: Request) -> Examination:
 
 
 def _explained(recording: Recording, request: Request, figures: Mapping[str, Any]) -> Examination:
-    refitted = fit(recording, request.model, workers=1)
-    again = compare(recording, refitted.valve)
-    if again.adequate:
-        return _changed(refitted, again, request, figures)
+    refitted = refit(recording, request.model)
+    if refitted is not None:
+        return _refitted(recording, *refitted, request, figures)
     return _diagnosed(diagnose(recording, request.model, workers=1), request, figures)
+
+
+def refit(recording: Recording, model: ValveFile) -> tuple[Fit, Comparison] | None:
+    """Return the valve refitted, and how it compares; None: no refit explains the recording.
+
+    Raises:
+        InputError: the recording holds too little.
+    """
+    return next((each for each in refits(recording, model) if is_at_floor(each[1], model)), None)
+
+
+def refits(recording: Recording, model: ValveFile) -> Iterator[tuple[Fit, Comparison]]:
+    """Yield the valve refitted, and how it compares: by one search, then by all.
+
+    Raises:
+        InputError: the recording holds too little.
+    """
+    for fitted in (local_fit, partial(fit, workers=1)):
+        found = fitted(recording, model)
+        yield found, compare(recording, found.valve)
+
+
+def is_at_floor(comparison: Comparison, model: ValveFile) -> bool:
+    """Whether a model explains a recording, so that nothing need be diagnosed."""
+    most_m = max(AT_FLOOR * (comparison.floor_m or 0.0), NUMERICAL * model.valve.stroke_m)
+    return comparison.adequate and comparison.rms_m <= most_m
 
 
 def _figures(looked: Comparison, model: ValveFile) -> dict[str, Any]:
@@ -143,17 +190,41 @@ def _figures(looked: Comparison, model: ValveFile) -> dict[str, Any]:
     }
 
 
-def _changed(refitted: Fit, again: Comparison, request: Request, figures: Mapping[str, Any]) -> Examination:
-    changes = changes_of(request.model, refitted.parameters)
-    told = "; ".join(f"{each.name} {_percent(each)}" for each in changes) or "its parameters moved a little"
+def _friction(file: ValveFile) -> dict[str, Any]:
+    valve = file.valve
+    if valve.spring_n_per_m == 0.0:
+        return {}
+    per_n = 1.0 / (valve.spring_n_per_m * valve.stroke_m)
+    return {"dead_band_share": 2.0 * valve.coulomb_n * per_n, "jump_share": (valve.static_n - valve.coulomb_n) * per_n}
+
+
+def _refitted(
+    recording: Recording, found: Fit, again: Comparison, request: Request, figures: Mapping[str, Any]
+) -> Examination:
+    changes = changes_of(request.model, found.parameters)
+    if changes and not request.is_first:
+        changes = _beyond_what_was_known(changes_of(request.model, profiled(found, recording).parameters), request)
     return Examination(
-        outcome=CHANGED,
-        sentence=f"first fitted: {told}" if request.is_first else f"changed: {told}",
+        **_outcome_of_refit(changes, request),
         error_after_m=again.rms_m,
         changes=changes,
-        model=valve_toml(refitted.valve),
+        model=valve_toml(found.valve) if changes or request.is_first else None,
+        **_friction(found.valve),
         **figures,
     )
+
+
+def _outcome_of_refit(changes: Sequence[Change], request: Request) -> dict[str, Any]:
+    """Say what a refit that explains the recording means.
+
+    Where nothing changed the model stays: parameters that crept along with each refit would hide a drift for ever.
+    """
+    told = "; ".join(f"{each.name} {_percent(each)}" for each in changes)
+    if request.is_first:
+        return {"outcome": CHANGED, "sentence": f"first fitted: {told or 'as the drawing says'}"}
+    if changes:
+        return {"outcome": CHANGED, "sentence": f"changed: {told}"}
+    return {"outcome": AS_BEFORE, "sentence": "as the last model says, its parameters within what they were known to"}
 
 
 def changes_of(model: ValveFile, parameters: Mapping[str, Fitted]) -> tuple[Change, ...]:
@@ -167,6 +238,22 @@ def changes_of(model: ValveFile, parameters: Mapping[str, Fitted]) -> tuple[Chan
             bounds = [bound if isfinite(bound) else each.value for bound in (each.lower, each.upper)]
             found.append(Change(name=name, before=before, now=each.value, lower=bounds[0], upper=bounds[1]))
     return tuple(found)
+
+
+def _beyond_what_was_known(changes: Sequence[Change], request: Request) -> tuple[Change, ...]:
+    """Return the changes of which the recording behind the model knew better; of most, it left an interval open."""
+    if not changes or request.known_by is None:
+        return tuple(changes)
+    try:
+        recording = Recording.read(Path(request.known_by))
+        known = profiled(local_fit(recording, request.model), recording).parameters
+    except InputError:  # it is gone by now, or too short for a fit: the model stands as it is
+        return tuple(changes)
+    return tuple(
+        each
+        for each in changes
+        if each.name not in known or each.upper < known[each.name].lower or known[each.name].upper < each.lower
+    )
 
 
 def _percent(change: Change) -> str:
@@ -183,20 +270,26 @@ def _diagnosed(diagnosis: Diagnosis, request: Request, figures: Mapping[str, Any
         (each.tried for each in diagnosis.steps[0].candidates),
         key=lambda each: np.inf if each.test is None else each.test,
     )
+    changes = changes_of(request.model, diagnosis.base.fit.parameters) if accepted else ()
+    said: dict[str, Any] = {"outcome": diagnosis.verdict, "sentence": diagnosis.sentence}
+    if diagnosis.verdict == "adequate":
+        changes = _beyond_what_was_known(changes, request)
+        said = _outcome_of_refit(changes, request)
+        accepted = bool(changes) or request.is_first
     return Examination(
-        outcome=CHANGED if diagnosis.verdict == "adequate" else diagnosis.verdict,
-        sentence=diagnosis.sentence,
+        **said,
         error_after_m=_known(diagnosis.best.errors.test_rmse_m),
         effects=diagnosis.missing,
         rivals=tuple(name for names in diagnosis.indistinguishable for name in names if name not in diagnosis.missing),
         evidence=_known(gain.bic) if gain else None,
         standard_errors=_known(gain.standard_errors) if gain else None,
-        changes=changes_of(request.model, diagnosis.base.fit.parameters) if accepted else (),
+        changes=changes,
         candidates=tuple(
             Tried(name=each.name, held_out_m=each.test, remark=each.rejection_reason)
             for each in tried[:MOST_CANDIDATES]
         ),
         model=valve_toml(diagnosis.best.fit.valve) if accepted else None,
+        **_friction(diagnosis.best.fit.valve),
         **figures,
     )
 

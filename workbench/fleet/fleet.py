@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from config.errors import InputError
-from config.loading import validated
 from config.results.block import Block, Table
 from config.results.result import Result
-from config.valve_file import ValveFile, find_valve, load_valve
-from workbench.fleet.engine import cluster, work
-from workbench.fleet.examination import UNREADABLE, Examination, Request, unreadable
+from config.valve_file import find_valve, load_valve
+from workbench.fleet.engine import TIME_LIMIT_S, cluster, work
+from workbench.fleet.examination import AS_BEFORE, UNREADABLE, Examination, Request, unreadable
 from workbench.fleet.manifest import Entry, Manifest, read_manifest
+from workbench.fleet.model_changes import ModelChanges, changed_since
 from workbench.fleet.store import Store, request_key
-from workbench.fleet.valve_course import ValveCourse
+from workbench.fleet.valve_course import ValveCourse, valve_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +32,8 @@ class Fleet(Result):
     examined: int
     """Recordings examined in this run; all others were kept from before."""
     count: int
+    folder: Path
+    """From which the recordings' paths count."""
 
     @property
     def complaining(self) -> tuple[ValveCourse, ...]:
@@ -47,6 +49,25 @@ class Fleet(Result):
             for entry, found in course.examined
             if found.outcome == UNREADABLE
         ]
+
+    def changed_since(self, time: datetime) -> ModelChanges:
+        """Return what changed of the valves since a time; with an offset if the manifest's times have one.
+
+        Raises:
+            InputError: it has an offset and they have none, or the other way round.
+        """
+        entries = [entry for course in self.courses for entry, _ in course.examined]
+        if entries and (entries[0].time.tzinfo is None) != (time.tzinfo is None):
+            wanted = (
+                "no offset, as the manifest's times" if time.tzinfo else "an offset, as the manifest's times: +00:00"
+            )
+            raise InputError(time.isoformat(), f"must have {wanted}")
+        return changed_since(self.courses, time)
+
+    @property
+    def unknown(self) -> tuple[ValveCourse, ...]:
+        """The valves of which no recording could be examined."""
+        return tuple(each for each in self.courses if not each.readable)
 
     def blocks(self) -> list[Block]:
         """Say how many valves deserve a look, which, and which recordings could not be read."""
@@ -90,6 +111,7 @@ def fleet(
     *,
     scheduler: str | None = None,
     workers: int | None = None,
+    time_limit_s: float = TIME_LIMIT_S,
     told: Told | None = None,
 ) -> Fleet:
     """Rank the valves of a manifest; what was examined before is not examined again.
@@ -100,6 +122,7 @@ def fleet(
         scheduler: address of a Dask scheduler, whose workers see the recordings under the same paths; without one,
             workers of this machine.
         workers: how many of these, by default one a core.
+        time_limit_s: for one recording; one that takes longer is listed as unreadable, and tried again next time.
         told: called with valve, recording and what came of it, as it comes.
 
     Raises:
@@ -112,9 +135,9 @@ def fleet(
     waiting = [each for each in running if not each.is_through()]
     if waiting:
         with cluster(scheduler, workers) as client:
-            work(client, waiting)
+            work(client, waiting, time_limit_s)
     courses = tuple(sorted((each.course for each in running), key=ValveCourse.order))
-    return Fleet(courses, sum(each.examined for each in running), read.count)
+    return Fleet(courses, sum(each.examined for each in running), read.count, read.folder)
 
 
 class _Running:
@@ -125,13 +148,15 @@ class _Running:
     ) -> None:
         self._entries, self._folder, self._store, self._told = entries, manifest.folder, store, told
         self._asked: Request | None = None
+        self._known: tuple[str, str] | None = None
+        """Key and recording of the examination by which the model was accepted, or the drawing confirmed."""
         self.examined = 0
         self.course = ValveCourse(name)
         try:
             self._model = self.course.given = load_valve(_valve_path(entries[0].file, manifest.folder))
         except InputError as error:
             for entry in entries:
-                self._tell(entry, unreadable(str(error)))
+                self._tell(entry, unreadable(f"valve file {entry.file}: {error.problem}"))
 
     def is_through(self) -> bool:
         """Take all that is kept; return whether that was all."""
@@ -146,12 +171,14 @@ class _Running:
     def take(self, found: Examination) -> None:
         """Keep what came of it."""
         assert self._asked
-        key, self._asked = self._asked.key, None
+        asked, self._asked = self._asked, None
         self.examined += 1
         entry = self._entries[len(self.course.examined)]
+        # As the manifest writes it: where the folder lies is no part of what came of it.
+        found = found.model_copy(update={"sentence": found.sentence.replace(asked.recording, entry.recording)})
         if found.outcome != UNREADABLE:  # what could not be read, or killed its worker, is tried again
-            self._store.put(key, found)
-        self._tell(entry, found)
+            self._store.put(asked.key, found)
+        self._go_on(asked.key, entry, found)
 
     def _next(self) -> Request | None:
         """Return the next recording that was not examined before; what was, is taken as it was kept."""
@@ -159,28 +186,30 @@ class _Running:
             entry = self._entries[len(self.course.examined)]
             path = self._folder / entry.recording
             try:
-                key = request_key(path, self._model, not self.course.readable)
+                key = request_key(path, self._model, self._known[0] if self._known else "")
             except OSError as error:
                 self._tell(entry, unreadable(f"cannot be read: {error.strerror}"))
                 continue
+            except InputError as error:  # an effect of one's own that is not there, or in no folder that is allowed
+                self._tell(entry, unreadable(str(error)))
+                continue
             kept = self._store.get(key)
             if kept is None:
-                return Request(key, str(path.resolve()), self._model, not self.course.readable)
-            self._tell(entry, kept)
+                return Request(key, str(path.resolve()), self._model, self._known[1] if self._known else None)
+            self._go_on(key, entry, kept)
         return None
+
+    def _go_on(self, key: str, entry: Entry, found: Examination) -> None:
+        if found.model is not None:
+            self._model = valve_in(found.model)
+        if found.model is not None or (self._known is None and found.outcome == AS_BEFORE):
+            self._known = key, str((self._folder / entry.recording).resolve())
+        self._tell(entry, found)
 
     def _tell(self, entry: Entry, found: Examination) -> None:
         self.course.take(entry, found)
-        if found.model is not None:
-            self._model = _valve_in(found.model)
         if self._told:
             self._told(self.course.name, entry, found)
-
-
-def _valve_in(text: str) -> ValveFile:
-    import tomllib
-
-    return validated(ValveFile, tomllib.loads(text), "model")
 
 
 def _valve_path(written: str, folder: Path) -> Path:

@@ -1,20 +1,24 @@
 """The ranking as one page: a line a valve with a sparkline, and what is behind it folded under the line.
 
-The diagnosis report of a valve has five megabytes, of plots: the page has the command that makes it instead.
+The diagnosis report of a valve has five megabytes, of plots: it is a file of its own (`drill_down`), to which the page
+leads; for a valve without one it has the command that makes it.
 """
 
+from collections.abc import Mapping
 from html import escape
+from os.path import relpath
 from pathlib import Path
 
 from workbench.fleet.examination import Examination
 from workbench.fleet.fleet import Fleet
+from workbench.fleet.manifest import Entry
 from workbench.fleet.valve_course import ValveCourse
 from workbench.report.page import (
     Html,
     Row,
-    bullets,
     folded,
     heading_alone,
+    linked,
     preformatted,
     section,
     table,
@@ -28,35 +32,60 @@ LEAST_RATIO, MOST_RATIO = 1.0, 100.0
 """Of error to floor, between which a sparkline goes, by its logarithm."""
 
 
-def report_fleet(fleet: Fleet, path: Path, manifest: str) -> None:
+def report_fleet(fleet: Fleet, path: Path, manifest: str, reports: Mapping[str, Path] | None = None) -> None:
     """Write the page; the same fleet, the same bytes.
+
+    Args:
+        fleet: the ranked valves.
+        path: of the page.
+        manifest: its name.
+        reports: diagnosis reports by valve, to which the page leads.
 
     Raises:
         InputError: the file cannot be written.
     """
     facts = f"{len(fleet.courses)} valves, {fleet.count} recordings, {len(fleet.bad)} unreadable"
     parts = [heading_alone(f"Fleet of {manifest}", facts), _ranking(fleet)]
-    parts += [_drill_down(rank, course) for rank, course in enumerate(fleet.complaining, start=1)]
+    seen_from = path.resolve().parent
+    links = {name: relpath(each.resolve(), seen_from) for name, each in (reports or {}).items()}
+    parts += [
+        _drill_down(rank, course, links.get(course.name)) for rank, course in enumerate(fleet.complaining, start=1)
+    ]
     if fleet.bad:
-        bad = [f"{name}: {entry.recording}: {reason}" for name, entry, reason in fleet.bad]
-        parts.append(section("unreadable", "Recordings that could not be examined", bullets(bad)))
-    well = [course.name for course in fleet.courses if not course.gravest]
+        bad = table("bad", ("valve", "recording", "why"), [Row(_bad(*each)) for each in fleet.bad], words=(0, 1, 2))
+        parts.append(section("unreadable", "Recordings that could not be examined", bad))
+    nothing_known = {course.name for course in fleet.unknown}
+    well = [each.name for each in fleet.courses if not each.gravest and each.name not in nothing_known]
     parts.append(section("well", "As their models say", text(", ".join(well) or "none")))
+    if nothing_known:
+        parts.append(section("unknown", "Nothing is known of", text(", ".join(sorted(nothing_known)))))
     write_without_plots(path, f"Fleet of {manifest}", parts)
+
+
+def _bad(name: str, entry: Entry, reason: str) -> tuple[str, str, str]:
+    return name, entry.recording, reason
 
 
 def _ranking(fleet: Fleet) -> Html:
     rows = [
-        Row((str(rank), course.name, course.kind, _since(course), _share(course), course.sure), kind="over")
+        Row(
+            (str(rank), course.name, course.kind, _since(course), _share(course), course.sure, ""),
+            kind="over",
+            picture=linked(f"#history-{rank}", sparkline(course)),
+        )
         for rank, course in enumerate(fleet.complaining, start=1)
     ]
     if not rows:
         return section("ranking", "Valves that deserve a look", text("None: all are as their last models say."))
-    head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure")
-    return section("ranking", "Valves that deserve a look", table("ranked", head, rows, words=(1, 2, 3, 5)))
+    head = ("rank", "valve", "what", "since", "off by, % of stroke", "sure", "error over time")
+    legend = (
+        "Error over time: of the model that held, in floors, by its logarithm; low is well. It leads to what is known."
+    )
+    ranked = table("ranked", head, rows, words=(1, 2, 3, 5, 6))
+    return section("ranking", "Valves that deserve a look", ranked, text(legend))
 
 
-def _drill_down(rank: int, course: ValveCourse) -> Html:
+def _drill_down(rank: int, course: ValveCourse, report: str | None) -> Html:
     assert course.gravest
     entry, found = course.gravest
     history = [
@@ -64,13 +93,13 @@ def _drill_down(rank: int, course: ValveCourse) -> Html:
         for each, came in course.examined
     ]
     tried = [Row((each.name, length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
-    models = [Row((f"{each.when:%Y-%m-%d}", each.recording, each.why)) for each in course.models]
+    models = [Row((f"{each.when:%Y-%m-%d}", each.recording, each.found.sentence)) for each in course.models]
     command = f"positioner diagnose {entry.recording} --valve {entry.file} --report {course.name}.html"
     return folded(
         f"valve-{rank}",
         f"{rank}. {course.name}: {course.kind}",
-        sparkline(course),
         text(found.sentence),
+        linked(report, Html("The diagnosis report")) if report else Html(""),
         table(f"history-{rank}", ("when", "recording", "came of it", "error before, mm"), history, words=(0, 1, 2)),
         table(f"models-{rank}", ("model from", "by", "why"), models, words=(0, 1, 2)) if models else Html(""),
         table(f"tried-{rank}", ("effect", "held out, mm", ""), tried, words=(0, 2)) if tried else Html(""),

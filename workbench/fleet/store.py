@@ -72,8 +72,13 @@ def _require_form(marker: Path) -> None:
         raise InputError(str(marker), f"form: is {form}, allowed is {FORM}: choose another folder, or remove this one")
 
 
-def request_key(recording: Path, model: ValveFile, is_first: bool) -> str:
+def request_key(recording: Path, model: ValveFile, known_by: str) -> str:
     """Return the name of an examination: of the bytes of the recording and of all that judges it.
+
+    Args:
+        recording: the file.
+        model: what it is held against.
+        known_by: the name of the examination by which the model was accepted; empty for a drawing.
 
     Raises:
         OSError: the recording cannot be read.
@@ -82,7 +87,7 @@ def request_key(recording: Path, model: ValveFile, is_first: bool) -> str:
     judges: Sequence[object] = [
         RULES,
         version("positioner"),
-        is_first,
+        known_by,
         valve_toml(model),
         *(each.source for each in own),
     ]

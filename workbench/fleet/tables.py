@@ -1,35 +1,114 @@
-"""A fleet as tables for other programs (Parquet): valves, recordings, models. docs/fleet.md says what each column is.
+"""A fleet as tables for other programs (Parquet): valves, recordings, models. `TABLES` says what each column is.
 
-They are made of the examinations alone and hold no time of their making: the same inputs, the same tables.
+The columns have the same types whatever was found; each says what it means in its field's metadata. They are made of
+the examinations alone and hold no time of their making: the same inputs, the same tables.
+
+    python -m workbench.fleet.tables
+
+prints the columns as docs/fleet.md has them.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from config.errors import InputError
 from config.extras import needed
 from workbench.fleet.examination import Examination
-from workbench.fleet.valve_course import ValveCourse
+from workbench.fleet.valve_course import Model, ValveCourse
 
+Rows = list[Mapping[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column: its type (text, number, count, time), what it means, and its unit where it has one."""
+
+    name: str
+    kind: str
+    meaning: str
+
+
+ARROW = {"text": "string", "number": "float64", "count": "int64"}
+VALVE = Column("valve", "text", "the valve's name in the manifest")
+WHEN = Column("when", "time", "when the recording was made, as the manifest says; UTC where that has an offset")
+RECORDING = Column("recording", "text", "its file, as the manifest writes it")
+EFFECTS = Column("effects", "text", "what is missing in the model, joined by commas; of `one_of` one that may be")
+RIVALS = Column("rivals", "text", "what explains as much")
+SENTENCE = Column("sentence", "text", "the same in words")
 FIGURES = (
-    "samples",
-    "duration_s",
-    "valid_share",
-    "travel_share",
-    "slips",
-    "error_before_m",
-    "error_after_m",
-    "floor_m",
-    "evidence",
-    "standard_errors",
+    Column("samples", "count", "rows"),
+    Column("duration_s", "number", "from first to last sample, s"),
+    Column("valid_share", "number", "of the samples"),
+    Column("travel_share", "number", "what the stem swept, of the stroke"),
+    Column("slips", "count", "times it began to move"),
+    Column("error_before_m", "number", "of the model as it was, rms, m"),
+    Column("error_after_m", "number", "of the model that explains the recording best, rms, m"),
+    Column("floor_m", "number", "what no model undercuts, rms, m"),
+    Column("dead_band_share", "number", "2 F_c / k_s of that model, of the stroke"),
+    Column("jump_share", "number", "(F_s - F_c) / k_s of that model, of the stroke"),
+    Column("evidence", "number", "gain of the effect added first, robust BIC; above 10 it counts"),
+    Column("standard_errors", "number", "by which the held-out error fell with it"),
 )
 """Of an examination, as they stand there."""
+CHANGES = Column("changes", "text", "JSON: parameter to [then, now, lower and upper end of the 95 % interval of now]")
+TABLES: Mapping[str, tuple[str, tuple[Column, ...]]] = {
+    "valves": (
+        "a valve, in the order of the ranking",
+        (
+            Column("rank", "count", "1 is the gravest"),
+            VALVE,
+            Column("kind", "text", "what an engineer calls it; empty: nothing is wrong"),
+            Column("outcome", "text", "of its gravest recording, see `recordings`"),
+            EFFECTS,
+            RIVALS,
+            Column("since", "time", "the recording that shows it; null: nothing is wrong"),
+            Column("sure", "text", "sure, one of several, or not sure what"),
+            Column(
+                "cost_share", "number", "how far the stem is from where the last good model has it, rms, of the stroke"
+            ),
+            *(each for each in FIGURES if each.name in ("dead_band_share", "evidence", "standard_errors")),
+            Column("drifting", "text", "parameters that changed more than once, always one way"),
+            SENTENCE,
+            Column("recordings", "count", "of the valve"),
+            Column("bad", "count", "of them, could not be examined"),
+        ),
+    ),
+    "recordings": (
+        "a recording, valve by valve, in the order of time",
+        (
+            VALVE,
+            RECORDING,
+            WHEN,
+            Column("outcome", "text", "as_before, changed, untold, unreadable, or a diagnosis' verdict"),
+            SENTENCE,
+            EFFECTS,
+            RIVALS,
+            CHANGES,
+            *FIGURES,
+        ),
+    ),
+    "models": (
+        "a model that was accepted: the valve's journal",
+        (
+            VALVE,
+            WHEN,
+            RECORDING,
+            Column("why", "text", "in words"),
+            EFFECTS,
+            CHANGES,
+            *(each for each in FIGURES if each.name.startswith(("error", "floor", "evidence", "standard"))),
+            Column("text", "text", "the valve file"),
+        ),
+    ),
+}
 
 
 def write_tables(courses: Sequence[ValveCourse], folder: Path) -> None:
-    """Write valves.parquet, recordings.parquet and models.parquet.
+    """Write valves.parquet, recordings.parquet and models.parquet; each whole, or not at all.
 
     Raises:
         InputError: the folder cannot be written.
@@ -37,82 +116,124 @@ def write_tables(courses: Sequence[ValveCourse], folder: Path) -> None:
     """
     arrow = needed("pyarrow", "positioner fleet")
     parquet = needed("pyarrow.parquet", "positioner fleet")
-    tables = {"valves": valve_columns, "recordings": recording_columns, "models": model_columns}
-    for name, columns in tables.items():
+    offset = any(entry.time.tzinfo for course in courses for entry, _ in course.examined)
+    for name, (_, columns) in TABLES.items():
         path = folder / f"{name}.parquet"
+        rows = ROWS[name](courses)
+        schema = arrow.schema(
+            [arrow.field(each.name, _type(arrow, each, offset), metadata={"meaning": each.meaning}) for each in columns]
+        )
+        beside = path.with_name(path.name + ".new")
         try:
-            parquet.write_table(arrow.table(columns(courses)), path)
+            parquet.write_table(arrow.Table.from_pylist([_in_utc(row) for row in rows], schema), beside)
+            beside.replace(path)
         except OSError as error:
             raise InputError(str(path), f"cannot be written: {error.strerror or error}") from None
 
 
 def valve_columns(courses: Sequence[ValveCourse]) -> dict[str, list[Any]]:
     """Return a row a valve, in the order of the ranking."""
-    return _columns(_valves(courses), VALVES)
+    rows = _valves(courses)
+    return {each.name: [row[each.name] for row in rows] for each in TABLES["valves"][1]}
 
 
-def recording_columns(courses: Sequence[ValveCourse]) -> dict[str, list[Any]]:
-    """Return a row a recording, valve by valve, each in the order of time."""
-    return _columns(_recordings(courses), RECORDINGS)
+def _type(arrow: Any, column: Column, offset: bool) -> Any:
+    if column.kind == "time":
+        return arrow.timestamp("us", tz="UTC" if offset else None)
+    return getattr(arrow, ARROW[column.kind])()
 
 
-def model_columns(courses: Sequence[ValveCourse]) -> dict[str, list[Any]]:
-    """Return a row a model that was accepted, valve by valve, each in the order of time."""
-    return _columns(_models(courses), MODELS)
+def _in_utc(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: value.astimezone(UTC) if isinstance(value, datetime) and value.tzinfo else value
+        for name, value in row.items()
+    }
 
 
-VALVES = ("rank", "valve", "kind", "outcome", "effects", "since", "sure", "cost_share", "sentence", "recordings", "bad")
-RECORDINGS = ("valve", "recording", "when", "outcome", "sentence", "effects", "rivals", "changes", *FIGURES)
-MODELS = ("valve", "when", "recording", "why", "effects", "text")
+def _valves(courses: Sequence[ValveCourse]) -> Rows:
+    return [_valve(rank, course) for rank, course in enumerate(courses, start=1)]
 
 
-def _valves(courses: Sequence[ValveCourse]) -> Iterator[Mapping[str, Any]]:
-    for rank, course in enumerate(courses, start=1):
-        entry, found = course.gravest or (None, Examination(outcome="as_before", sentence=""))
-        yield {
-            "rank": rank,
+def _valve(rank: int, course: ValveCourse) -> Mapping[str, Any]:
+    entry, found = course.gravest or (None, Examination(outcome="as_before", sentence=""))
+    latest = next((each for _, each in reversed(course.readable)), found)
+    return {
+        "rank": rank,
+        "valve": course.name,
+        "kind": course.kind,
+        **_said(found),
+        "since": entry.time if entry else None,
+        "sure": course.sure,
+        "cost_share": course.cost_share,
+        **_figures(found),
+        "dead_band_share": latest.dead_band_share,
+        "drifting": ", ".join(course.drifting),
+        "recordings": len(course.examined),
+        "bad": len(course.examined) - len(course.readable),
+    }
+
+
+def _recordings(courses: Sequence[ValveCourse]) -> Rows:
+    return [
+        {
             "valve": course.name,
-            "kind": course.kind,
-            "outcome": found.outcome,
-            "effects": ", ".join(found.effects),
-            "since": entry.time.isoformat() if entry else "",
-            "sure": course.sure,
-            "cost_share": course.cost_share,
-            "sentence": found.sentence,
-            "recordings": len(course.examined),
-            "bad": len(course.examined) - len(course.readable),
+            "recording": entry.recording,
+            "when": entry.time,
+            **_said(found),
+            **_figures(found),
         }
+        for course in courses
+        for entry, found in course.examined
+    ]
 
 
-def _recordings(courses: Sequence[ValveCourse]) -> Iterator[Mapping[str, Any]]:
-    for course in courses:
-        for entry, found in course.examined:
-            yield {
-                "valve": course.name,
-                "recording": entry.recording,
-                "when": entry.time.isoformat(),
-                "outcome": found.outcome,
-                "sentence": found.sentence,
-                "effects": ", ".join(found.effects),
-                "rivals": ", ".join(found.rivals),
-                "changes": json.dumps({each.name: [each.before, each.now] for each in found.changes}),
-                **{name: getattr(found, name) for name in FIGURES},
-            }
+def _models(courses: Sequence[ValveCourse]) -> Rows:
+    return [_model(course, each) for course in courses for each in course.models]
 
 
-def _models(courses: Sequence[ValveCourse]) -> Iterator[Mapping[str, Any]]:
-    for course in courses:
-        for each in course.models:
-            yield {
-                "valve": course.name,
-                "when": each.when.isoformat(),
-                "recording": each.recording,
-                "why": each.why,
-                "effects": ", ".join(each.effects),
-                "text": each.text,
-            }
+def _model(course: ValveCourse, model: Model) -> Mapping[str, Any]:
+    return {
+        "valve": course.name,
+        "when": model.when,
+        "recording": model.recording,
+        "why": model.found.sentence,
+        **_said(model.found),
+        **_figures(model.found),
+        "text": model.text,
+    }
 
 
-def _columns(rows: Iterator[Mapping[str, Any]], names: Sequence[str]) -> dict[str, list[Any]]:
-    listed = list(rows)
-    return {name: [row[name] for row in listed] for name in names}
+def _said(found: Examination) -> dict[str, str]:
+    changes = {each.name: [each.before, each.now, each.lower, each.upper] for each in found.changes}
+    return {
+        "outcome": found.outcome,
+        "sentence": found.sentence,
+        "effects": ", ".join(found.effects),
+        "rivals": ", ".join(found.rivals),
+        "changes": json.dumps(changes),
+    }
+
+
+def _figures(found: Examination) -> dict[str, Any]:
+    return {each.name: getattr(found, each.name) for each in FIGURES}
+
+
+ROWS: Mapping[str, Callable[[Sequence[ValveCourse]], Rows]] = {
+    "valves": _valves,
+    "recordings": _recordings,
+    "models": _models,
+}
+
+
+def columns_told() -> str:
+    """Return the columns of all tables, as Markdown."""
+    lines = []
+    for name, (row, columns) in TABLES.items():
+        lines += [f"`{name}.parquet`, a row {row}:", "", "| column | type | what it is |", "|---|---|---|"]
+        lines += [f"| `{each.name}` | {each.kind} | {each.meaning} |" for each in columns]
+        lines.append("")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(columns_told())

@@ -7,12 +7,14 @@ missing                 the valve with the effect is
 one of, unexplained, untold   the model stays: nobody knows what it is
 """
 
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
+from config.loading import validated
 from config.valve_file import ValveFile
-from workbench.fleet.examination import CHANGED, UNREADABLE, UNTOLD, Examination
+from workbench.fleet.examination import AS_BEFORE, CHANGED, UNREADABLE, UNTOLD, Change, Examination
 from workbench.fleet.manifest import Entry
 
 KINDS: Mapping[str, tuple[str, ...]] = {
@@ -39,6 +41,11 @@ KINDS: Mapping[str, tuple[str, ...]] = {
 }
 """What an engineer calls it, by the effect that is missing or the parameter that changed."""
 UNKNOWN_KIND = "something new"
+SPRING, COULOMB = "spring_n_per_m", "coulomb_n"
+LIKE = 0.05
+"""Relative difference of two factors that are taken for one."""
+LEAST_STEPS = 2
+"""Changes one way, one after the other, that are a drift."""
 GRAVEST = ("missing", "one_of", "unexplained", "untrusted", "unjudged", "unfinished", UNTOLD, CHANGED)
 """Outcomes that are complaints, the gravest first."""
 SURE = {"missing": "sure", "one_of": "one of several", CHANGED: "sure"}
@@ -50,9 +57,8 @@ class Model:
 
     when: datetime
     recording: str
-    why: str
-    effects: tuple[str, ...]
-    """Added to it by that recording."""
+    found: Examination
+    """By which it was accepted."""
     text: str
 
 
@@ -70,8 +76,7 @@ class ValveCourse:
         """Go on with what came of the next recording."""
         self.examined.append((entry, found))
         if found.model is not None:
-            model = Model(entry.time, entry.recording, found.sentence, found.effects, found.model)
-            self.models.append(model)
+            self.models.append(Model(entry.time, entry.recording, found, found.model))
 
     @property
     def readable(self) -> list[tuple[Entry, Examination]]:
@@ -80,11 +85,11 @@ class ValveCourse:
 
     def complaints(self) -> Iterator[tuple[Entry, Examination]]:
         """Yield the recordings that changed what is known; that a drawing was first fitted is none."""
-        first = True
+        is_known = False
         for entry, found in self.readable:
-            if found.outcome in GRAVEST and not (first and found.outcome == CHANGED):
+            if found.outcome in GRAVEST and (is_known or found.outcome != CHANGED):
                 yield entry, found
-            first = False
+            is_known = is_known or found.model is not None or found.outcome == AS_BEFORE
 
     @property
     def gravest(self) -> tuple[Entry, Examination] | None:
@@ -98,8 +103,17 @@ class ValveCourse:
         if self.gravest is None:
             return ""
         _, found = self.gravest
-        names = found.effects or tuple(each.name for each in found.changes)
-        return ", ".join(dict.fromkeys(map(kind_of, names))) or UNKNOWN_KIND
+        kinds = [kind_of(name) for name in found.effects] or kinds_of_changes(found.changes)
+        return ", ".join(dict.fromkeys([*(["drifts"] if self.drifting else []), *kinds])) or UNKNOWN_KIND
+
+    @property
+    def drifting(self) -> tuple[str, ...]:
+        """Parameters that changed LEAST_STEPS times or more, always one way."""
+        ways: dict[str, list[bool]] = {}
+        for _, found in self.complaints():
+            for each in found.changes if found.outcome == CHANGED else ():
+                ways.setdefault(each.name, []).append(each.now > each.before)
+        return tuple(name for name, each in ways.items() if len(each) >= LEAST_STEPS and len(set(each)) == 1)
 
     @property
     def sure(self) -> str:
@@ -118,6 +132,19 @@ class ValveCourse:
         place = GRAVEST.index(self.gravest[1].outcome) if self.gravest else len(GRAVEST)
         return place, -self.cost_share, self.name
 
+    def model_before(self, time: datetime) -> ValveFile:
+        """Return the model that the recording of a time was held against.
+
+        Raises:
+            LookupError: the valve's file cannot be read.
+        """
+        text = next((each.text for each in reversed(self.models) if each.when < time), None)
+        if text is not None:
+            return valve_in(text)
+        if self.given is None:
+            raise LookupError(self.name)
+        return self.given
+
     def model_at(self, time: datetime) -> str | None:
         """Return the text of the model that held at a time; None: still the given file."""
         return next((each.text for each in reversed(self.models) if each.when <= time), None)
@@ -127,3 +154,24 @@ def kind_of(name: str) -> str:
     """Return what an engineer calls an effect, or a parameter that changed."""
     effect = name.partition(".")[0]
     return next((kind for kind, names in KINDS.items() if effect in names), UNKNOWN_KIND)
+
+
+def kinds_of_changes(changes: Sequence[Change]) -> list[str]:
+    """Return what an engineer calls parameters that changed.
+
+    A spring does not change by itself. Where it seems to and friction with it, by one factor, the pressure that arrives
+    is another than was asked for: it is the only force that all others are measured by. Where it seems to alone, the
+    position is measured by another scale, or the spring or the diaphragm is another.
+    """
+    factors = {each.name: each.now / each.before for each in changes if each.before}
+    if SPRING not in factors:
+        return [kind_of(each.name) for each in changes]
+    if COULOMB in factors and abs(factors[COULOMB] / factors[SPRING] - 1.0) < LIKE:
+        return ["air supply or leak"]
+    others = [kind_of(each.name) for each in changes if each.name != SPRING]
+    return ["lost calibration", "spring or diaphragm", *others]
+
+
+def valve_in(text: str) -> ValveFile:
+    """Return the valve file of a model's text."""
+    return validated(ValveFile, tomllib.loads(text), "model")

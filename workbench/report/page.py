@@ -39,11 +39,13 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of a table, `remark` small under its first cell; `kind` marks it: over, good, set, or nothing."""
+    """A row of a table, `remark` small under its first cell; `kind` marks it: over, good, set, or nothing; `picture` is
+    drawn in its last."""
 
     cells: Sequence[str | Shown]
     remark: str = ""
     kind: str = ""
+    picture: Html = Html("")
 
 
 def require_plotly(path: Path) -> str:
@@ -135,6 +137,11 @@ def folded(name: str, title: str, *parts: Html) -> Html:
     return Html(f'<details id="{name}"><summary>{escape(title)}</summary>\n{_lines(parts)}\n</details>')
 
 
+def linked(address: str, shown: Html) -> Html:
+    """Return what leads to an address."""
+    return Html(f'<a href="{escape(address)}">{shown}</a>')
+
+
 def pair(*parts: Html) -> Html:
     """Return figures side by side where there is room."""
     return Html(f'<div class="pair">{_lines(parts)}</div>')
@@ -187,10 +194,13 @@ def sentence(words: str) -> str:
 
 
 def _cells(row: Row, left: set[int]) -> str:
-    remarks = [row.remark, *[""] * (len(row.cells) - 1)]
+    last = len(row.cells) - 1
+    beside = [_small(row.remark) if i == 0 else "" for i in range(last)] + [
+        row.picture or _small(row.remark * (not last))
+    ]
     return "".join(
-        f"<td{_class(i in left)}{_si(value)}>{escape(value.text)}{_small(remark)}</td>"
-        for i, (value, remark) in enumerate(zip(map(_shown, row.cells), remarks, strict=True))
+        f"<td{_class(i in left)}{_si(value)}>{escape(value.text)}{more}</td>"
+        for i, (value, more) in enumerate(zip(map(_shown, row.cells), beside, strict=True))
     )
 
 
