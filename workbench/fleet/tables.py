@@ -229,7 +229,7 @@ def columns_told() -> str:
     """Return the columns of all tables, as Markdown."""
     lines = []
     for name, (row, columns) in TABLES.items():
-        lines += [f"`{name}.parquet`, a row {row}:", "", "| column | type | what it is |", "|---|---|---|"]
+        lines += [f"**{name}.parquet**, a row {row}:", "", "| column | type | what it is |", "|---|---|---|"]
         lines += [f"| `{each.name}` | {each.kind} | {each.meaning} |" for each in columns]
         lines.append("")
     return "\n".join(lines)
