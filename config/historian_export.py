@@ -32,7 +32,7 @@ from config.exports.header_search import Header, begins_number, find_header
 from config.exports.number_notation import decimal_sign, is_numeral, number
 from config.exports.raw_table import Cell, raw_tables
 from config.exports.time_order import in_order
-from config.exports.time_stamps import has_date, seconds_of
+from config.exports.time_stamps import clock_unit, has_date, seconds_of
 from config.recording import REQUIRED, Column, Recording
 
 PLAIN = ExportOptions()
@@ -159,6 +159,9 @@ def _samples(path: Path, header: Header, notes: Counter[str]) -> Iterator[tuple[
         if header.line and [str(cell) for cell in row] == again:
             notes["header lines again"] += 1
             continue
+        if width > 1 and _is_remark(row, width):
+            notes["rows of words alone, left out"] += 1
+            continue
         if len(row) > width and any(cell != "" for cell in row[width:]):
             raise InputError(
                 str(path),
@@ -166,6 +169,13 @@ def _samples(path: Path, header: Header, notes: Counter[str]) -> Iterator[tuple[
                 "and begin decimals? Then export it with semicolons or decimal points",
             )
         yield line, row
+
+
+def _is_remark(row: Sequence[Cell], width: int) -> bool:
+    """Return whether a row is words in its first field and nothing else, or a comment."""
+    if row[0] == "" or begins_number(row[0]):
+        return False
+    return all(cell == "" for cell in row[1:]) or (str(row[0]).startswith("#") and len(row) < width)
 
 
 def _drop_last(cells: dict[str, list[Cell]], lines: "array[int]") -> None:
@@ -221,6 +231,12 @@ def _unit(path: Path, source: Source, export: _Export) -> str:
             )
         return source.unit or unit
     if unknown := export.header.unknown.get(source.theirs):
+        if source.unit is None and ending != "_s":
+            raise InputError(
+                str(path),
+                f"column {source.theirs!r} has {unknown!r} where its unit stands, which is none that is known: "
+                f"type --column {source.name}={source.theirs}:UNIT, of {', '.join(allowed_units(ending))}",
+            )
         export.notes[f"unit of {source.theirs}, not known"] = unknown
     return source.unit or SI[ending]
 
@@ -306,11 +322,15 @@ def _time(
     _cut(export, source.theirs, len(cells))
     first = next((cell for cell in cells if cell != ""), "")
     stamped = unit == "iso" or options.time_format is not None or (isinstance(first, str) and not is_numeral(first))
+    stamped = stamped and not (isinstance(first, str) and _behind_numbers(export, source))
     if stamped and all(isinstance(cell, str) for cell in cells):
         texts = [str(cell) for cell in cells]
         seconds, local_from_s = seconds_of(path, texts, export.lines, options.time_format)
         return seconds, True, local_from_s
     seconds = np.array([cell if isinstance(cell, float) else _second(cell, decimal) for cell in cells])
+    if source.unit is None and (likely := clock_unit(seconds)) is not None and unit == "s":
+        problem = f"{cells[0]!r} in {source.theirs!r} is no time in seconds"
+        raise InputError(str(path), f"{problem}: type --column time_s={source.theirs}:{likely[0]}, {likely[1]}")
     if np.isnan(seconds).any():
         row = int(np.isnan(seconds).argmax())
         raise InputError(
@@ -335,7 +355,8 @@ def _cut(export: _Export, clock: str, kept: int) -> None:
 
 
 def _second(cell: Cell, decimal: str) -> float:
-    value = number(str(cell), decimal)
+    match = _WITH_UNIT.fullmatch(str(cell))
+    value = number(match[1] if match and unit_named(match[2]) else str(cell), decimal)
     return np.nan if value is None else value
 
 

@@ -205,7 +205,8 @@ def _read(
         raise InputError(str(path), f"is not whole: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         hint = f"; `positioner import {path}` says how to read another program's export"
-        raise InputError(str(path), f"is not a CSV file of ours: {error}{hint}") from None
+        what = "no text" if isinstance(error, UnicodeDecodeError) else str(error)
+        raise InputError(str(path), f"is not a CSV file of ours: {what}{hint}") from None
     if not columns["time_s"].size:
         raise InputError(str(path), "holds no samples")
     _require_increasing_time(path, columns["time_s"], first_line, clock_steps)

@@ -56,8 +56,10 @@ def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
     names = [each.name for each in sources]
     required = REQUIRED if "command_pa" in names or "reference_m" not in names else BEHIND_POSITIONER
     for name in (*required, *names):
-        if names.count(name) != 1:
-            raise InputError("--column", f"{name} is given {names.count(name)} times; once is required")
+        if name not in names:
+            raise InputError("--column", f"{name} is not given: add --column {name}=THEIRS:UNIT")
+        if names.count(name) > 1:
+            raise InputError("--column", f"{name} is given {names.count(name)} times: give it once")
     return sources
 
 

@@ -4,29 +4,33 @@ The proposal goes by what columns are commonly called and by what is in them. It
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
 from config.errors import InputError
 from config.exports.export_units import allowed_units, ending_of, unit_named
-from config.exports.header_search import begins_number, guess_header
+from config.exports.header_search import Header, begins_number, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
 from config.exports.raw_table import Cell, raw_tables
-from config.exports.time_stamps import proposed_formats
+from config.exports.time_stamps import clock_unit, proposed_formats
 from config.results.block import Block, Table, as_text
 
 LOOKED_AT = 200
 FIRST = 3
+MOST_SIGNALS = 20
 WIDEST = 24
 COMMON = {
-    "time_s": r"time|zeit|stamp|date|datum|^ts?$|uhr",
-    "position_m": r"position|^pos|_pos$|travel|stroke|hub|lift|stem|\bpv\b|ist|zt|feedback|^x$|_pv$|\.pv$|rückm",
-    "command_pa": r"command|^cmd|_cmd$|\bout\b|\bop\b|\bmv\b|output|stell|signal|demand|^u$|drive|pressure|druck|soll|"
+    "time_s": r"time|zeit|stamp|date|datum|^ts?\b|uhr",
+    "position_m": r"position|\bpos|travel|stroke|hub|lift|stem|\bpv\b|\bist|\bzt|feedback|^x\b|rückm|opening|öffnung|"
+    r"stellung",
+    "command_pa": r"command|cmd|\bout\b|\bop\b|\bmv\b|\bao\b|output|stell|signal|demand|^u\b|drive|pressure|druck|soll|"
     r"\bsp\b",
 }
-"""What columns are called, by ours."""
+"""What columns are called, by ours; names are taken apart at _, . and - and where capitals follow small letters."""
 STAMP = r"\d{4}-\d\d-\d\d"
 _STATUS = re.compile(r"status|quality|qualität|güte", re.IGNORECASE)
 
@@ -108,12 +112,14 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
     what = header.table.what
     if header.table.sheet and len(tables) > 1:
         what += f" of {', '.join(repr(each.sheet) for each in tables)}"
-    place = f"{header.table.place} {header.line} names the columns" if header.line else "no line names the columns"
-    words, open_ = _proposal(columns, header.table.separator)
+    place = f"{header.table.place} {header.line} names the columns"
+    if not header.line:
+        place = "no line names the columns" if header.names[0] == "#1" else "its columns"
+    words, open_ = _proposal(columns, header)
     return ExportPreview(what, place, columns, words, open_)
 
 
-def _proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[str, ...], tuple[str, ...]]:
     words: list[str] = []
     open_: list[str] = []
     left = list(columns)
@@ -125,32 +131,59 @@ def _proposal(columns: Sequence[ColumnPreview], separator: str) -> tuple[tuple[s
             open_.append(f"{ours} is open: no column is called like it")
             continue
         left.remove(chosen)
-        if ours == "time_s" and (joined := _with_time_of_day(chosen, left)):
-            left.remove(joined)
-            chosen = ColumnPreview(
-                f"{chosen.name}+{joined.name}",
-                None,
-                tuple(f"{day} {time}" for day, time in zip(chosen.cells, joined.cells, strict=True)),
-            )
+        if ours == "time_s":
+            chosen = _whole_clock(chosen, left)
         unit, doubt = _unit_of(ours, chosen)
+        if doubt and (unknown := header.unknown.get(chosen.name)):
+            doubt = [f"the unit of {chosen.name!r} is {unknown!r} by the file, none that is known; {unit} is a guess"]
         words += ["--column", f"{ours}={chosen.name}{unit}"]
         open_ += doubt
         if ours == "time_s" and not chosen.numbers:
             words += _time_words(chosen, open_)
+    open_ += _doubts(columns, left, header.table.separator)
+    if any(word.endswith(":%") and word.startswith("position") for word in words):
+        words += ["--stroke-m", "M"]
+    return tuple(words), tuple(open_)
+
+
+def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], separator: str) -> Iterator[str]:
+    """Yield what a person must look at beyond the columns that were chosen."""
     for each in left:
         if _STATUS.search(each.name) and not each.numbers:
             held = ", ".join(sorted({str(cell) for cell in each.cells if cell != ""})[:5])
-            open_.append(
-                f"{each.name!r} holds {held}: --status {_quoted(each.name + '=GOOD')} leaves the other rows out"
-            )
+            yield f"{each.name!r} holds {held}: --status {_quoted(each.name + '=GOOD')} leaves the other rows out"
+    if said := _row_a_value(columns):
+        yield said
     texts = [cell for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
     try:
         decimal_sign("", texts, separator)
     except InputError as error:
-        open_.append(error.problem)
-    if any(word.endswith(":%") and word.startswith("position") for word in words):
-        words += ["--stroke-m", "M"]
-    return tuple(words), tuple(open_)
+        yield error.problem
+
+
+def _row_a_value(columns: Sequence[ColumnPreview]) -> str | None:
+    """Return what to say of a table in which a column of few words, in turn, says whose the only number is."""
+    numbers = [each for each in columns if each.numbers and not _looks_like("time_s", each)]
+    if len(numbers) != 1:
+        return None
+    for each in columns:
+        held = list(dict.fromkeys(map(str, each.cells)))
+        words = not each.numbers and not _STATUS.search(each.name) and not any(map(begins_number, held))
+        if words and 1 < len(held) <= min(MOST_SIGNALS, len(each.cells) // 4):
+            return (
+                f"{each.name!r} holds {', '.join(held[:5])}: a row a value; turn it into a column a signal first, "
+                f"as pandas' DataFrame.pivot(columns={each.name!r}) does"
+            )
+    return None
+
+
+def _whole_clock(clock: ColumnPreview, left: list[ColumnPreview]) -> ColumnPreview:
+    """Return the clock, joined with the time of day that is then no longer left, if it needs one."""
+    if (joined := _with_time_of_day(clock, left)) is None:
+        return clock
+    left.remove(joined)
+    cells = tuple(f"{day} {time}" for day, time in zip(clock.cells, joined.cells, strict=True))
+    return ColumnPreview(f"{clock.name}+{joined.name}", None, cells)
 
 
 def _with_time_of_day(day: ColumnPreview, others: Sequence[ColumnPreview]) -> ColumnPreview | None:
@@ -167,12 +200,16 @@ def _most_are(cells: Sequence[Cell], pattern: str) -> bool:
 
 def _looks_like(ours: str, column: ColumnPreview) -> bool:
     # Of a structure's field, log.t, the field's own name counts as well.
-    names = (column.name, column.name.rpartition(".")[2])
+    names = tuple(_taken_apart(each) for each in (column.name, column.name.rpartition(".")[2]))
     if not any(re.search(COMMON[ours], each, re.IGNORECASE) for each in names) or _STATUS.search(column.name):
         return False
     if ours == "time_s":
         return any(begins_number(cell) and cell != "" for cell in column.cells)
     return column.numbers and (column.unit is None or column.unit in allowed_units(ending_of(ours)))
+
+
+def _taken_apart(name: str) -> str:
+    return re.sub(r"[_.-]+|(?<=[a-zäöü0-9])(?=[A-Z])", " ", name).strip()
 
 
 def _unit_of(ours: str, column: ColumnPreview) -> tuple[str, list[str]]:
@@ -186,9 +223,19 @@ def _unit_of(ours: str, column: ColumnPreview) -> tuple[str, list[str]]:
         return f":{unit}", []
     if unit := _at_the_end(ours, column.name):
         return f":{unit}", [f"the unit of {column.name!r} is taken from its name: {unit}"]
-    if ours == "time_s":
-        return "", [f"the unit of {column.name!r} is open: s is taken; :ms, :min, :d are others"]
-    return ":%", [f"the unit of {column.name!r} is open: % is a guess"]
+    return (
+        _unit_of_clock(column) if ours == "time_s" else (":%", [f"the unit of {column.name!r} is open: % is a guess"])
+    )
+
+
+def _unit_of_clock(column: ColumnPreview) -> tuple[str, list[str]]:
+    if clock := clock_unit(np.array([float(cell) for cell in column.cells if _is_plain(cell)])):
+        return f":{clock[0]}", [f"{column.name!r} is taken for {clock[1]}"]
+    return "", [f"the unit of {column.name!r} is open: s is taken; :ms, :min, :d are others"]
+
+
+def _is_plain(cell: Cell) -> bool:
+    return isinstance(cell, float) or re.fullmatch(r"\d+(\.\d+)?", cell) is not None
 
 
 def _at_the_end(ours: str, name: str) -> str | None:

@@ -56,7 +56,7 @@ _ALIASES = {
     "µm μm micron": "um",
     'inch inches "': "in",
     "newton": "N",
-    "percent pct prozent %open %offen": "%",
+    "percent pct prozent %open %offen %travel %oftravel %stroke %ofstroke %hub %span %ofspan %fs": "%",
     "pu p.u": "p.u.",
     "milliampere ma(dc)": "mA",
 }
@@ -88,9 +88,11 @@ def unit_in_header(name: str) -> tuple[str, str | None]:
 
     >>> unit_in_header("Hub [mm]"), unit_in_header("P1, bar"), unit_in_header("PV (Ist)")
     (('Hub', 'mm'), ('P1', 'bar'), ('PV (Ist)', None))
+    >>> unit_in_header("PV:mm")
+    ('PV', 'mm')
     """
     match = re.fullmatch(
-        r"(.*\S)\s*(?:[\[(<]\s*([^\[\]()<>]+(?:\([^()]*\))?)\s*[\])>]|[,/]\s*(\S+)|\s(%))", name, re.DOTALL
+        r"(.*\S)\s*(?:[\[(<]\s*([^\[\]()<>]+(?:\([^()]*\))?)\s*[\])>]|[,/:]\s*(\S+)|\s(%))", name, re.DOTALL
     )
     unit = unit_named(match[2] or match[3] or match[4]) if match else None
     return (match[1].rstrip(), unit) if match and unit else (name, None)

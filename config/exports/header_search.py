@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 
 from config.errors import InputError
@@ -20,6 +20,8 @@ SEARCHED = 300
 """Rows among which the header must be."""
 BELOW = 3
 """Rows between the header and the samples at most."""
+ROW_A_COLUMN = 10
+"""Cells of a row, from which on one that begins with a name is taken for a signal."""
 SHOWN = 30
 """Names that a message lists at most."""
 _NUMBER_BEGINS = re.compile("[+\u2212-]?[.,]?\\d")
@@ -154,16 +156,35 @@ def _missing(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -> I
     if guess is None:
         return InputError(str(path), f"holds no table: no two of its first {SEARCHED} lines have the same columns")
     parts = [part for each in wanted for part in ([each] if "+" not in each else each.split("+"))]
-    missing = next((each for each in parts if not _matches(guess.names, each)), parts[0])
-    if not guess.line:
+    absent = [each for each in parts if not _matches(guess.names, each)] or parts[:1]
+    missing = absent[0]
+    if said := next((said for each in absent if (said := _in_the_rows(guess, each))), None):
+        return InputError(str(path), said)
+    if not guess.line and guess.names[0] == "#1":
         return InputError(
             str(path), f"column {missing!r} is missing: no line names columns; call them #1 to #{len(guess.names)}"
         )
     named = ", ".join(name for name in guess.names[:SHOWN] if name)
     more = f" and {len(guess.names) - SHOWN} more" if len(guess.names) > SHOWN else ""
-    return InputError(
-        str(path), f"column {missing!r} is missing; {guess.table.place} {guess.line} names: {named}{more}"
-    )
+    where = f"{guess.table.place} {guess.line} names" if guess.line else "there are"
+    return InputError(str(path), f"column {missing!r} is missing; {where}: {named}{more}")
+
+
+def _in_the_rows(guess: Header, name: str) -> str | None:
+    """Return what to say where a name that is missing stands in a row: the table is turned, or a value is a row."""
+    for line, cells in islice(guess.table.rows(), SEARCHED):
+        at = [index for index, cell in enumerate(cells) if line != guess.line and str(cell).strip() == name]
+        if at and at[0] == 0 and _width(cells) > ROW_A_COLUMN:
+            return (
+                f"{name!r} begins {guess.table.place} {line}: a row a signal; turn the table, a column a signal, "
+                "as Excel's Paste Special, Transpose does"
+            )
+        if at and guess.line and at[0] < len(guess.names):
+            return (
+                f"{name!r} stands in {guess.table.place} {line} under {guess.names[at[0]]!r}: a row a value; "
+                "turn it into a column a signal, as pandas' DataFrame.pivot does"
+            )
+    return None
 
 
 def guess_header(tables: Sequence[RawTable]) -> Header | None:
@@ -180,15 +201,36 @@ def _guess(table: RawTable) -> tuple[tuple[bool, int, int], Header] | None:
         rows = [(line, cells) for line, cells in islice(table.rows(), SEARCHED) if any(cell != "" for cell in cells)]
     except InputError:
         return None
-    widths = Counter(len(cells) for _, cells in rows if len(cells) > 1)
+    widths = Counter(width for _, cells in rows if (width := _width(cells)) > 1)
     if not widths:
         return None
     width, count = max(widths.items(), key=lambda each: (each[1], each[0]))
-    line, cells = next(row for row in rows if len(row[1]) == width)
-    words = [cell for cell in cells if cell != "" and not begins_number(cell)]
-    named = 2 * len(words) > sum(cell != "" for cell in cells)
+    line, cells = _names(rows, width)
+    named = _is_words(cells)
     names = tuple(str(cell) if named else f"#{index}" for index, cell in enumerate(cells, start=1))
     at = {name: (index,) for index, name in enumerate(names) if name}
     before = max((number for number, _ in rows if number < line), default=0)
     header = Header(table, line if named else 0, names, at, line if named else before)
     return (named, count, width), _with_units(header)
+
+
+def _names(rows: Sequence[tuple[int, list[Cell]]], width: int) -> tuple[int, list[Cell]]:
+    """Return the row that names the most of the columns that samples have; it may name some that hold nothing.
+
+    Of several it is one of just as many columns, and of these the first. A file without names: its first sample.
+    """
+    wide = [row for row in rows if _width(row[1]) >= width]
+    above = list(takewhile(lambda row: _is_words(row[1]), wide))
+    if not above:
+        return next(row for row in rows if _width(row[1]) == width)
+    return max(above, key=lambda row: (sum(cell != "" for cell in row[1][:width]), _width(row[1]) == width))
+
+
+def _is_words(cells: Sequence[Cell]) -> bool:
+    words = [cell for cell in cells if cell != "" and not begins_number(cell)]
+    return 2 * len(words) > sum(cell != "" for cell in cells)
+
+
+def _width(cells: Sequence[Cell]) -> int:
+    """Return how many cells there are up to the last that holds something."""
+    return max((index for index, cell in enumerate(cells, start=1) if cell != ""), default=0)

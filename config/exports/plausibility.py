@@ -20,6 +20,8 @@ MISSING = 0.05
 """Share of a column without a value that is worth a word."""
 RESPONDS_TOO_EARLY = 0.2
 """Share of the command's changes that the stem may have followed by the same row."""
+FAR = 5.0
+"""Spans of all other positions between them and one that is no position."""
 GAP_PERIODS = 20.0
 MOVED = 0.02
 """Of the span of the positions: what counts as a move, and of the commands: as a change."""
@@ -47,7 +49,9 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
 def _of_size(position_m: Column, stroke_m: float | None) -> Iterator[str]:
     low, high = _ends(position_m)
     far = max(abs(low), abs(high))
-    if far > LONGEST_STROKE_M:
+    if said := _stands_for_none(position_m):
+        yield said
+    elif far > LONGEST_STROKE_M:
         yield f"positions go to {far:.4g} m: are they in mm, or in %? Then position_m=THEIRS:mm, or :%"
     elif stroke_m is not None and far > 1.5 * stroke_m:
         yield f"positions go to {1e3 * far:.4g} mm, of a stroke of {1e3 * stroke_m:.4g} mm: is one wrong?"
@@ -58,10 +62,27 @@ def _of_size(position_m: Column, stroke_m: float | None) -> Iterator[str]:
         )
 
 
+def _stands_for_none(position_m: Column) -> str | None:
+    """Return what to say of one number far from all others that stands again and again: a device's word for none."""
+    finite = position_m[np.isfinite(position_m)]
+    for extreme in (float(finite.min()), float(finite.max())) if finite.size else ():
+        others = finite[finite != extreme]
+        count = finite.size - others.size
+        if count > 1 and others.size > count:
+            low, high = float(others.min()), float(others.max())
+            if high > low and min(abs(extreme - low), abs(extreme - high)) > FAR * (high - low):
+                return (
+                    f"{count} positions are {extreme:.4g} m, all others {low:.4g} to {high:.4g} m: does this number "
+                    "stand for no value? Then leave these cells empty"
+                )
+    return None
+
+
 def _of_rows(recording: Recording) -> Iterator[str]:
     count = len(recording)
     if count < FEWEST_ROWS:
-        yield f"{count} rows are too few to fit anything to; some hundred are needed in which the stem moves"
+        rows = "1 row is" if count == 1 else f"{count} rows are"
+        yield f"{rows} too few to fit anything to; some hundred are needed in which the stem moves"
     for name, column in recording.columns.items():
         missing = float((~np.isfinite(column)).mean())
         if missing > MISSING:

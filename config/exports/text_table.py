@@ -1,13 +1,16 @@
 """Tables as text: UTF-8 with or without a byte order mark, UTF-16, else Windows-1252; any ends of lines.
 
 Separators are tried, tab, semicolon, bar, comma: the header says which it is, for it must hold all names that are asked
-for. Quotation marks are read strictly, so that one that is never closed is found and not swallowed to the end.
+for. Where most lines hold none of these, it is spaces, one or many. Quotation marks are read strictly, so that one that
+is never closed is found and not swallowed to the end.
 """
 
 import csv
 import io
+import re
 from collections.abc import Iterator
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 from config.errors import InputError
@@ -15,6 +18,15 @@ from config.exports.raw_table import Cell, RawTable
 from config.plain_file import MOST_COLUMNS
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "bar", ",": "comma"}
+SPACES = " "
+LOOKED_AT = 50
+"""Lines by which it is told whether spaces separate, and whether every line stands in quotation marks."""
+NO_TABLES = {
+    r"\s*<(!doctype|html|table)\b": "is a web page: export the numbers as CSV",
+    r"\s*<\?xml\b": "is XML: export the numbers as CSV or .xlsx",
+    r'\s*(\[\s*)?\{\s*"|\s*\[\s*\[': "is JSON: save it as CSV, as pandas.read_json(FILE).to_csv does",
+}
+"""How a text begins that is no table, and what to do."""
 ANNOTATIONS = ("#group", "#datatype", "#default")
 """Lines in which InfluxDB says what the columns of a CSV file are, before the one that names them."""
 LONG = frozenset({"_time", "_value", "_field"})
@@ -38,11 +50,20 @@ def text_tables(path: Path) -> list[RawTable]:
     text, encoding = decoded(path)
     if not text.strip():
         raise InputError(str(path), "holds no samples: it is empty")
+    for begin, problem in NO_TABLES.items():
+        if re.match(begin, text, re.IGNORECASE):
+            raise InputError(str(path), problem)
     text = _without_annotations(path, text)
+    first = [line.strip() for line in islice(io.StringIO(text), 4 * LOOKED_AT) if line.strip()][:LOOKED_AT]
+    _require_fields(path, first)
     notes = () if encoding.startswith("utf-8") else (("encoding", encoding),)
     ended = text.endswith(("\n", "\r"))
     length = text.count("\n") or text.count("\r")
     found = [each for each in SEPARATORS if each in text] or [","]
+    if 2 * sum(_has_spaces_alone(line) for line in first) > len(first):
+        return [
+            RawTable("fields separated by spaces", "line", partial(_spaced, text), SPACES, "", ended, notes, length)
+        ]
     return [
         RawTable(
             f"fields separated by {SEPARATORS[each]}",
@@ -55,6 +76,29 @@ def text_tables(path: Path) -> list[RawTable]:
         )
         for each in found
     ]
+
+
+def _require_fields(path: Path, lines: list[str]) -> None:
+    """Check that it is not every line as a whole that stands in quotation marks, as after a table saved twice.
+
+    Raises:
+        InputError: it is.
+    """
+    whole = [line[:1] == line[-1:] == '"' and '"' not in line[1:-1].replace('""', "") for line in lines]
+    if len(lines) > 1 and all(whole) and any(each in line for line in lines for each in SEPARATORS):
+        problem = "every line stands in quotation marks as a whole, so that nothing separates its fields"
+        raise InputError(str(path), f"{problem}: take them away, sed 's/^\"//; s/\"$//' FILE > export.csv")
+
+
+def _has_spaces_alone(line: str) -> bool:
+    """Return whether nothing but spaces can separate a line's fields, and the last of several begins as a number."""
+    *before, last = line.split()
+    return bool(before) and not any(each in line for each in SEPARATORS) and last.lstrip("+-.")[:1].isdigit()
+
+
+def _spaced(text: str) -> Iterator[tuple[int, list[Cell]]]:
+    for number, line in enumerate(io.StringIO(text), start=1):
+        yield number, [cell.strip('"') for cell in line.split()]
 
 
 def _without_annotations(path: Path, text: str) -> str:
@@ -86,6 +130,8 @@ def decoded(path: Path) -> tuple[str, str]:
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
+        if b"\0" in data[:1000]:
+            raise InputError(str(path), "is no text, and of no kind that is read: export it as CSV or .xlsx") from None
         raise InputError(str(path), f"is no text: byte {error.start + 1} is not {encoding}; save it as UTF-8") from None
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1

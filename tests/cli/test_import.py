@@ -96,7 +96,7 @@ def test_the_words_that_import_proposes_lead_to_a_verdict(
     ("words", "said"),
     [
         (["-o", "rec.csv"], "-o: needs to know the columns: --column"),
-        (["--column", "time_s=t"], "command_pa is given 0 times"),
+        (["--column", "time_s=t"], "command_pa is not given: add --column command_pa=THEIRS:UNIT"),
         (
             ["--column", "time_s=t", "--column", "position_m=x:mm", "--column", "command_pa=u:bar", "--stroke-m", "-1"],
             "--stroke-m",

@@ -6,6 +6,7 @@ Every file below holds the same sixty samples, as some program would have writte
 import csv
 import datetime
 import io
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ import pytest
 from config.errors import InputError
 from config.exports.column_mapping import ExportOptions, Status, read_mapping
 from config.exports.export_preview import preview
+from config.exports.plausibility import oddities
 from config.historian_export import PLAIN, read_export
 from config.recording import Recording
 
@@ -259,6 +261,32 @@ READ = {
     "a name with a line break": Good(
         text(['t,"PV\n(FV-101)",OUT', *rows()[1:]]), ("time_s=t", "position_m=PV (FV-101):%", "command_pa=OUT:bar")
     ),
+    "spaces": Good(text(rows(" "))),
+    "columns aligned with spaces": Good(
+        text(
+            [
+                "#  logger 7",
+                "      t      PV     OUT",
+                *(f" {t:8.2f}  {x:7.2f} {u:7.3f}" for t, x, u in zip(T, PV, OUT, strict=True)),
+            ]
+        )
+    ),
+    "a unit in words, and a column of remarks that holds nothing": Good(
+        text(["t;PV;OUT;Comment", ";% of stroke;bar;", *(f"{line};" for line in rows(";")[1:])]),
+        ("time_s=t", "position_m=PV", "command_pa=OUT"),
+    ),
+    "units behind a colon": Good(
+        text(rows(header="t:s,PV:%,OUT:bar")), ("time_s=t", "position_m=PV", "command_pa=OUT")
+    ),
+    "seconds with their unit behind each": Good(text(rows(time=[f"{t:.1f} s" for t in T]))),
+    "milliseconds since 1970": Good(
+        text(rows(time=[f"{1e3 * (1_772_612_100 + t):.0f}" for t in T])), ("time_s=t:ms", *WORDS[1:])
+    ),
+    "a workbook's days": Good(text(rows(time=[f"{46085.25 + t / 86400:.10f}" for t in T])), ("time_s=t:d", *WORDS[1:])),
+    "comments and events between the samples": Good(
+        text([*rows()[:20], "# restarted, by op", *rows()[20:40], "*** valve tripped ***,,", *rows()[40:]]),
+        said="rows of words alone, left out: 2",
+    ),
     "columns that are not asked for": Good(
         text([f"{line},{'x' if i else 'Note'},{'äöü' if i else 'More'}" for i, line in enumerate(rows())])
     ),
@@ -279,7 +307,9 @@ def test_it_is_read_right_and_told(kind: str, tmp_path: Path) -> None:
     for name, column in expected.items():
         got = recording.columns[name]
         whole = np.setdiff1d(np.arange(N), missing if name == "position_m" or "Q" in str(case.options) else [])
-        whole = whole if name != "time_s" else np.arange(N)
+        if name == "time_s":
+            np.testing.assert_allclose(got - got[0], column, rtol=1e-6, atol=1e-5)
+            continue
         np.testing.assert_allclose(got[whole], column[whole], rtol=1e-6, atol=1e-9)
     assert np.isnan(recording.position_m[missing]).all()
     said = "; ".join(f"{key}: {value}" for key, value in recording.metadata.items())
@@ -408,6 +438,47 @@ REFUSED = {
     "old Excel": Bad(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old Excel .*: save it as .xlsx or CSV"),
     "MATLAB 7.3": Bad(b"MATLAB 7.3 MAT-file, Platform: GLNXA64", "MATLAB 7.3 file: save it with the option -v7"),
     "a PDF": Bad(b"%PDF-1.7\n", "is a PDF"),
+    "bzip2": Bad(b"BZh91AY&SY", "compressed with bzip2: unpack it"),
+    "xz": Bad(b"\xfd7zXZ\0", "compressed with xz: unpack it"),
+    "Zstandard": Bad(b"\x28\xb5\x2f\xfd", "compressed with Zstandard: unpack it"),
+    "7-Zip": Bad(b"7z\xbc\xaf\x27\x1c", "7-Zip archive: unpack it"),
+    "RAR": Bad(b"Rar!\x1a\x07", "RAR archive: unpack it"),
+    "SQLite": Bad(b"SQLite format 3\0" + bytes(range(256)), "SQLite database: sqlite3 -header -csv FILE"),
+    "Feather": Bad(b"ARROW1\0\0", "Arrow .Feather. file: save it as Parquet or CSV"),
+    "a NumPy array": Bad(b"\x93NUMPY\x01", "NumPy array without names: save it as CSV"),
+    "TDMS": Bad(b"TDSm" + bytes(8), "TDMS file: export it as CSV"),
+    "MDF": Bad(b"MDF     4.10    ", "MDF file: export it as CSV"),
+    "a document": Bad(b"{\\rtf1\\ansi t,PV,OUT}", "is a document: export the numbers"),
+    "a screenshot": Bad(b"\x89PNG\r\n\x1a\n", "is a picture: export the numbers"),
+    "another kind of bytes": Bad(bytes(range(256)) * 4, "no text, and of no kind that is read: export it as CSV"),
+    "a web page named .xls": Bad(b"\n<Table border=1><tr><td>t</td></tr></table>", "is a web page: export the numbers"),
+    "a web page in UTF-16": Bad(b"\xff\xfe" + "<html>".encode("utf-16-le"), "is a web page"),
+    "XML": Bad(b'<?xml version="1.0"?><trend/>', "is XML: export the numbers"),
+    "JSON": Bad(b'[{"t": 0.0, "PV": 50.0}]', "is JSON: save it as CSV"),
+    "JSON, a line a sample": Bad(b'{"t": 0.0}\n{"t": 0.5}\n', "is JSON: save it as CSV"),
+    "lines in quotation marks": Bad(
+        text([f'"{line}"' for line in rows()]), "every line stands in quotation marks as a whole.*: take them away"
+    ),
+    "a row a value": Bad(
+        text(["Tag;Time;Value", *(f"{tag};{t};1.5" for t in T for tag in ("t", "PV", "OUT"))]),
+        "'t' stands in line 2 under 'Tag': a row a value; turn it into a column a signal",
+    ),
+    "a row a signal": Bad(
+        text([",".join([name, *map(str, each)]) for name, each in (("t", T), ("PV", PV), ("OUT", OUT))]),
+        "'t' begins line 1: a row a signal; turn the table",
+    ),
+    "milliseconds since 1970, not said": Bad(
+        text(rows(time=[f"{1e3 * (1_772_612_100 + t):.0f}" for t in T])),
+        "'1772612100000' in 't' is no time in seconds: type --column time_s=t:ms",
+    ),
+    "a workbook's days, not said": Bad(
+        text(rows(time=[f"{46085.25 + t / 86400:.10f}" for t in T])), "type --column time_s=t:d, days of a workbook"
+    ),
+    "a unit that nobody knows": Bad(
+        text([rows()[0], "s,furlong,bar", *rows()[1:]]),
+        "'PV' has 'furlong' where its unit stands, .* type --column position_m=PV:UNIT, of m, cm, mm",
+        ("time_s=t", "position_m=PV", "command_pa=OUT"),
+    ),
     "a truncated workbook": Bad(b"PK\x03\x04" + b"\x00" * 100, "begins as a workbook and is not whole"),
     "a truncated Parquet file": Bad(b"PAR1" + b"\x15" * 100, "is a damaged Parquet file"),
     "a truncated MATLAB file": Bad(
@@ -428,6 +499,66 @@ def test_it_is_refused_in_one_line_that_says_what_to_do(kind: str, tmp_path: Pat
         read_export(path, read_mapping(case.words), case.stroke_m, options=case.options)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 600
+
+
+ODD = {
+    "mm taken for m": (rows(pv=[f"{0.4 * x:.2f}" for x in PV]), "position_m=PV", "are they in mm, or in %?"),
+    "shares taken for %": (rows(pv=[f"{0.01 * x:.4f}" for x in PV]), "position_m=PV:%", "are they shares of 1"),
+    "a valve that air closes": (rows(pv=[f"{100 - x:.2f}" for x in PV]), "position_m=PV:%", "air closes this valve"),
+    "constant position": (rows(pv=["50.0"] * N), "position_m=PV:%", "a stem that never moves says nothing"),
+    "constant command": (rows(out=["0.6"] * N), "position_m=PV:%", "a stem that is not driven says nothing"),
+    "five rows": (rows()[:6], "position_m=PV:%", "5 rows are too few"),
+    "a number for no value": (
+        rows(pv=["-9999" if i in (3, 4, 5) else f"{x:.2f}" for i, x in enumerate(PV)]),
+        "position_m=PV:%",
+        "3 positions are -4 m, all others 0.0114. to 0.0285. m: does this number stand for no value?",
+    ),
+    "the hour that summer time takes": (
+        rows(time=[f"{t + 3600.0 * (t > 15.0):.1f}" for t in T]),
+        "position_m=PV:%",
+        "a clock change in spring",
+    ),
+    "half of it missing": (rows(pv=["" if i % 2 else f"{x:.2f}" for i, x in enumerate(PV)]), "position_m=PV:%", "50 %"),
+}
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_what_is_odd_is_said_before_anything_is_fitted(kind: str, tmp_path: Path) -> None:
+    lines, word, said = ODD[kind]
+    (tmp_path / "export.csv").write_bytes(text(lines))
+    mapping = read_mapping(("time_s=t", word, "command_pa=OUT:bar"))
+    recording = read_export(tmp_path / "export.csv", mapping, STROKE_M)
+    assert re.search(said, "; ".join(oddities(recording, STROKE_M)))
+
+
+PROPOSED = {
+    "units in words over a shorter table": (
+        ["Report;FV-101", "", "Timestamp;FV-101 Travel;FV-101 I/P output;Comment", ";% of stroke;kPa;"]
+        + [f"{stamp};{x};{u};" for stamp, x, u in zip(ISO, PV, OUT, strict=True)],
+        "--column time_s=Timestamp --column position_m=FV-101 Travel:% --column command_pa=FV-101 I/P output:kPa",
+    ),
+    "names in capitals and small letters": (
+        rows(header="LogTime,stemPos_mm,actuatorCmd_bar"),
+        "--column time_s=LogTime --column position_m=stemPos_mm:mm --column command_pa=actuatorCmd_bar:bar",
+    ),
+    "a clock in milliseconds": (
+        rows(time=[f"{1e3 * (1_772_612_100 + t):.0f}" for t in T], header="ts,PV,OP"),
+        "--column time_s=ts:ms --column position_m=PV:% --column command_pa=OP:%",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", PROPOSED)
+def test_the_words_that_read_it_are_proposed(kind: str, tmp_path: Path) -> None:
+    lines, words = PROPOSED[kind]
+    (tmp_path / "export.csv").write_bytes(text(lines))
+    assert " ".join(preview(tmp_path / "export.csv").words).removesuffix(" --stroke-m M") == words
+
+
+def test_a_table_with_a_row_a_value_is_told_to_be_turned(tmp_path: Path) -> None:
+    lines = ["Tag;Time;Value", *(f"{tag};{stamp};1.5" for stamp in ISO for tag in ("PV", "OUT"))]
+    (tmp_path / "export.csv").write_bytes(text(lines))
+    assert any("'Tag' holds PV, OUT: a row a value" in each for each in preview(tmp_path / "export.csv").open)
 
 
 def by_pandas(path: Path, write: Callable[["object"], None]) -> None:

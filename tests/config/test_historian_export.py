@@ -39,7 +39,7 @@ def test_per_cent_of_a_pressure_range_and_seconds(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (MAPPING[:2], "command_pa is given 0 times"),
+        (MAPPING[:2], "command_pa is not given: add --column command_pa=THEIRS:UNIT"),
         ((*MAPPING, "position_m=SP"), "position_m is given 2 times"),
         (
             (*MAPPING[:2], "command_pa=OUT:furlong"),

@@ -32,7 +32,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         help="where a column comes from, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar; -%% from the "
         "other end; #2 is the second column, Date+Time two",
     )
-    export.add_argument("--stroke-m", type=float, metavar="M", help="100 %% of a position (the valve file's stroke)")
+    export.add_argument("--stroke-m", type=_stroke, metavar="M", help="100 %% of a position (the valve file's stroke)")
     export.add_argument(
         "--range-pa", type=float, nargs=2, metavar=("AT0", "AT100"), help="0 %% and 100 %% of a pressure (20e3 100e3)"
     )
@@ -50,6 +50,15 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         help="a column of words; rows of others than these hold no values",
     )
     export.add_argument("--sheet", metavar="NAME", help="of a workbook (else the one that has the columns)")
+
+
+def _stroke(word: str) -> float:
+    """Read a stroke; `M`, as `import` proposes it, is a word for one that only a person knows."""
+    try:
+        return float(word)
+    except ValueError:
+        problem = f"{word!r} must be the stroke in metres, a number: 0.04 is 40 mm"
+        raise argparse.ArgumentTypeError(problem) from None
 
 
 def export_words(arguments: argparse.Namespace) -> list[str]:
