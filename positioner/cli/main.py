@@ -5,6 +5,7 @@ by Ctrl-C and when nobody reads what is printed any more (`| head`).
 """
 
 import argparse
+import gc
 import importlib
 import os
 import select
@@ -53,10 +54,14 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     from positioner.own_packages import in_the_way
 
-    if said := in_the_way():
-        print(f"positioner: {said}", file=sys.stderr)
-        return 2
-    return _done(words)
+    try:
+        if said := in_the_way():
+            print(f"positioner: {said}", file=sys.stderr)
+            return 2
+        return _done(words)
+    except KeyboardInterrupt:
+        gc.freeze()  # else the interpreter looks through all that is left before it ends: half a second
+        return 130
 
 
 def _done(words: Sequence[str] | None) -> int:
@@ -80,8 +85,6 @@ def _done(words: Sequence[str] | None) -> int:
             print(said, file=sys.stderr)
             return 2
         raise
-    except KeyboardInterrupt:
-        return 130
     except BrokenPipeError:
         if not _unread():
             raise

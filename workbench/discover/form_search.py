@@ -1,6 +1,7 @@
 """The search for a form: ranked, fitted, judged as effects are, the nearest taken further.
 
-The forms of a turn race: one whose searches are far behind another's waits, and is told by what it had come to. Where
+The forms of a turn race: one whose searches are far behind another's waits, or that makes nothing of the valve as it is
+better, and is told by what it had come to. Where
 the best of a turn is accepted and leaves something to explain, its curve is tried: the same place and variable with a
 free shape. The forms of the second turn are fitted only where none of this explains the recordings.
 """
@@ -33,6 +34,9 @@ FIRST, MOST = 5, 15
 IN_RACE = 3.0
 """Factor on the cost of the best of a turn at the same stage, above which a form waits; beside those that are fitted
 already it is `OUT_OF_RACE`: on the way costs are higher than where searches stay."""
+GAINED = 0.98
+"""Factor on the cost of the valve as it is: a form that comes through the middling scale above it is not brought to
+where it stays, nor taken further: what it left there would have to be believed for a fiftieth."""
 CURVED_BELOW = 0.5
 """Factor on the cost of the valve as it is, below which a form is near enough for its curve to be tried."""
 ROUNDS, NEAREST = 2, 2
@@ -117,7 +121,7 @@ class FormSearch:
         waiting: dict[str, BegunFit] = {}
         stages: tuple[Callable[[BegunFit], BegunFit], ...] = (BegunFit.carried, lambda each: each.settled(1))
         for i, further in enumerate(stages):
-            fast, slower = _parted(fast, least)
+            fast, slower = _parted(fast, least, inf if i == 0 else GAINED)
             waiting |= slower
             fast = self._each(further, fast, what, 0.4 + 0.2 * i, 0.6 + 0.2 * i)
         ended = min((each.cost for each in fast.values()), default=inf)
@@ -163,8 +167,12 @@ class FormSearch:
         self, tried: "_Tried", models: Mapping[str, EvaluatedModel | str]
     ) -> dict[str, EvaluatedModel | str]:
         """Search again for the forms that came nearest, from where they came to: a stair may have held them up."""
-        fitted = {name: each for name, each in models.items() if isinstance(each, EvaluatedModel)}
         base = tried.step.before
+        fitted = {
+            name: each
+            for name, each in models.items()
+            if isinstance(each, EvaluatedModel) and each.fit.cost <= GAINED * base.fit.cost
+        }
         nearest = sorted(fitted, key=lambda name: fitted[name].fit.cost)[:NEAREST]
 
         def again(name: str) -> EvaluatedModel:
@@ -224,11 +232,13 @@ def _least(models: Mapping[str, EvaluatedModel | str]) -> float:
     return min((each.fit.cost for each in models.values() if isinstance(each, EvaluatedModel)), default=inf)
 
 
-def _parted(racers: Mapping[str, BegunFit], least: float) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:
-    """Return those that are in the race on their way, and those that are not."""
+def _parted(
+    racers: Mapping[str, BegunFit], least: float, gained: float
+) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:
+    """Return those that are in the race on their way and gain something, and those that are not."""
     here = {name: each.screening_cost for name, each in racers.items()}
     limit = min(IN_RACE * min(here.values(), default=inf), OUT_OF_RACE * least)
-    fast = {name: each for name, each in racers.items() if here[name] <= limit}
+    fast = {name: each for name, each in racers.items() if here[name] <= limit and each.gain <= gained}
     return fast, {name: each for name, each in racers.items() if name not in fast}
 
 

@@ -27,6 +27,7 @@ from sim.interpreted import interpreted
 from workbench.data.held_out import Split
 from workbench.discover.added_force import Landing, landings
 from workbench.discover.grammar import Form
+from workbench.fit.breaking_off import go_on
 from workbench.fit.descent import NARROW
 from workbench.fit.fitting import Fit
 from workbench.fit.objective import FINAL, SimulationError, root_weights
@@ -133,6 +134,7 @@ class _Tangents:
         extended = _with_form(self._base.valve, effect)
         run = FreeRun(extended, self._record, from_pressure=self._base.from_pressure, accuracy=ROUGH, by=self._base.by)
         for values in points:
+            go_on()
             theta = np.concatenate([extended.theta[: -len(values)], values])
             change_m = np.nan_to_num(run.position_m(theta) - self._bare_m)[self._rows]
             t = self._without(self._weights * change_m)

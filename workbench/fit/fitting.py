@@ -430,6 +430,12 @@ class BegunFit:
         """Cost by which searches are compared on their way, that of the best of them."""
         return min(self.error.rough.cost(place.z, MIDDLE) for place in self.places)
 
+    @property
+    def gain(self) -> float:
+        """The cost by which searches are compared on their way, over that with next to nothing of what is added."""
+        assert self.weakest is not None
+        return self.screening_cost / self.error.rough.cost(self.weakest.z, MIDDLE)
+
     def landed(self) -> "BegunFit":
         """Begin the searches from landings, which take more to begin than others, if they are not there yet."""
         if not self.waiting:
