@@ -64,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.report import Subject, report_diagnosis, require_plotly
     from workbench.select.diagnosis import diagnose
     from workbench.select.diagnosis_json import as_json
+    from workbench.select.kept_mass import kept_mass
 
     for option in ("json", "report", "experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
@@ -90,8 +91,11 @@ def run(arguments: argparse.Namespace) -> int:
             progress=progress,
             over=(lambda: time.monotonic() - began_s > budget_s),
         )
+        mass = kept_mass(diagnosis, seed=arguments.seed) if time.monotonic() - began_s < budget_s else None
     commands = extend_commands(diagnosis, arguments)
     print(diagnosis.summary())
+    if mass is not None:
+        print(f"look: {mass.sentence}")
     _tell_experiment(diagnosis, arguments.experiment)
     for command in commands:
         print(f"to add it: {command}" if len(commands) == 1 else f"one of: {command}")

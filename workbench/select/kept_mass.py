@@ -1,0 +1,68 @@
+"""The mass, which a fit keeps as the valve file says: what would be left of the error if it were fitted, too.
+
+Plate, stem and plug seldom show: the damping holds them. Where they do, a mass that was assumed leaves an error that no
+effect explains. Asked where a diagnosis leaves something; what it finds is said, never used: a mass is weighed.
+"""
+
+from dataclasses import dataclass
+
+from config.results.result import Brief
+from workbench.fit.fitting import fit
+from workbench.model.sampling import Motion
+from workbench.select.diagnosis import Diagnosis
+from workbench.select.effect_acceptance import gain
+from workbench.select.effect_candidates import EvaluatedModel
+from workbench.select.effect_search import evaluated
+
+MASS = "mass_kg"
+BEGINS = (1.0, 0.2)
+"""Shares of the valve file's mass at which fits begin: one that is too heavy hides that a light one does better."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class KeptMass(Brief):
+    """A mass beside which the best model of a diagnosis leaves less."""
+
+    kept_kg: float
+    fitted_kg: float
+    kept_rmse_m: float
+    """Held out, with the mass as the valve file says."""
+    fitted_rmse_m: float
+
+    @property
+    def sentence(self) -> str:
+        """What to do about it, in one sentence."""
+        return (
+            f"the mass is kept at {self.kept_kg:.3g} kg; were it {self.fitted_kg:.3g}, the held-out error would be "
+            f"{1e3 * self.fitted_rmse_m:.3g} in place of {1e3 * self.kept_rmse_m:.3g} mm: weigh plate, stem and plug, "
+            "or put this mass_kg into the valve file, and diagnose again"
+        )
+
+
+def kept_mass(diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None) -> KeptMass | None:
+    """Return which mass leaves less than the valve file's; None where none does, or nothing is left to explain.
+
+    Args:
+        diagnosis: what was found with the mass as it is.
+        seed: of the fits' draws.
+        workers: threads, by default one a core.
+    """
+    best, recording = diagnosis.best, diagnosis.split.train.recording
+    before = best.fit
+    if best.explained or before.by.motion is not Motion.DYNAMIC or MASS in before.parameters:
+        return None
+    kept_kg = before.valve.valve.mass_kg
+    free = [*before.parameters, MASS]
+    models: list[EvaluatedModel] = []
+    for share in BEGINS:
+        valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
+        begin = before.valve.model_copy(update={"valve": valve})
+        found = fit(
+            recording, begin, free=free, seed=seed, workers=workers, from_pressure=before.from_pressure, profile=False
+        )
+        models.append(evaluated(found, diagnosis.split))
+    model = min(models, key=lambda each: each.fit.cost)
+    if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.explained):
+        return None
+    fitted_kg = model.fit.valve.valve.mass_kg
+    return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m)
