@@ -48,6 +48,7 @@ addEventListener("unhandledrejection", (event) => {
 </script>
 """
 """A plot that is hidden or taken away is told its new size all the same, and complains; it needs none."""
+# `ui.dark_mode` would do the same, but anew at each update of anything, and each time all styles are worked out anew.
 DARK_QUERY = 'matchMedia("(prefers-color-scheme: dark)").matches'
 
 
@@ -75,7 +76,6 @@ class Theme:
         ui.add_css(STYLE)
         ui.add_head_html(HIDDEN_PLOTS)
         ui.colors(primary="#1b5e8a", dark_page="#12161b", dark="#1a2027")
-        self._mode = ui.dark_mode(None)
         self._listeners: list[Callable[[], None]] = []
         self.is_dark = False
 
@@ -95,7 +95,7 @@ class Theme:
     def choose(self, dark: bool) -> None:
         """Make it dark or light."""
         self.is_dark = dark
-        self._mode.set_value(dark)
+        ui.run_javascript(f"setDark({str(dark).lower()})")
         for each in self._listeners:
             each()
 

@@ -2,9 +2,10 @@
 
 import asyncio
 
-from nicegui import events, ui
+from nicegui import background_tasks, events, ui
 
 from positioner.pages.parts.figure_view import Figure, FigureView
+from positioner.pages.parts.live_text import LiveText
 from positioner.pages.parts.telling import aside, errors_told
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.desk import SAVED, Desk
@@ -38,6 +39,7 @@ class ComparePanel:
         self._desk = desk
         self._theme = theme
         self._live: LiveModel = desk.live
+        self._to_draw = self._drawing = False
         self._asked = 0
         """How often something was asked for that takes longer than a curve."""
         stroke_m = self._live.valve.valve.stroke_m
@@ -101,10 +103,24 @@ class ComparePanel:
             self._time.redraw()
 
     def _moved(self) -> None:
-        """Draw the new curve; nothing else is worked out while a slider moves."""
-        rms_m = self._show_curve()
-        self._time.move(self._figure.data(MOVED, MOVING), MOVED_LINES)
-        self._error.set_text(self._unit.fine(rms_m))
+        """Draw the new curve, unless one is being drawn: then the newest when that stands, and none between."""
+        self._to_draw = True
+        if not self._drawing:
+            background_tasks.create(self._draw_moves(), name="moves")
+
+    async def _draw_moves(self) -> None:
+        """Draw what is to be drawn; nothing else is worked out while a slider moves."""
+        self._drawing = True
+        try:
+            while self._to_draw and not self._time.plot.is_deleted:
+                self._to_draw = False
+                rms_m = self._show_curve()
+                self._error.show(self._unit.fine(rms_m))
+                await self._time.move(self._figure.data(MOVED, MOVING), MOVED_LINES)
+        except TimeoutError:
+            pass  # the browser is away; what it shows when it is back, `_settled` or the next move draws
+        finally:
+            self._drawing = False
 
     async def _settled(self) -> None:
         """Draw the curve in full; when the hand has come to rest, work out all that hangs on the parameters."""
@@ -137,9 +153,9 @@ class ComparePanel:
             each.redraw()
 
     def _tell(self, compared: Comparison) -> None:
-        self._error.set_text(self._unit.fine(compared.rms_m))
-        self._floor.set_text("unknown" if compared.floor_m is None else self._unit.fine(compared.floor_m))
-        self._fit.set_text(f"{compared.fit_percent:.1f} %")
+        self._error.show(self._unit.fine(compared.rms_m))
+        self._floor.show("unknown" if compared.floor_m is None else self._unit.fine(compared.floor_m))
+        self._fit.show(f"{compared.fit_percent:.1f} %")
         self._findings.show(compared)
 
     def _marked(self) -> None:
@@ -178,7 +194,7 @@ class ComparePanel:
         other.redraw()
 
 
-def _figure_of_merit(what: str, name: str) -> ui.label:
+def _figure_of_merit(what: str, name: str) -> LiveText:
     with ui.column().style("gap: 0"):
         ui.label(what).classes("quiet")
-        return ui.label().classes("figure number").props(f'data-testid="{name}"')
+        return LiveText().classes("figure number").props(f'data-testid="{name}"')

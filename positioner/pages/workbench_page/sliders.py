@@ -4,7 +4,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from nicegui import events, ui
+from nicegui.elements.mixins.value_element import ValueElement
 
+from positioner.pages.parts.live_text import LiveText
 from positioner.pages.parts.telling import heading
 from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.live_model import LiveModel
@@ -14,6 +16,18 @@ from workbench.report.units import parameter as in_words
 
 STEP = 0.0005
 """Of the way of a slider: of a range of a factor 2500 a step is 0.4 %."""
+MOVES_EVERY_S = 0.02
+"""While a slider is dragged: what comes faster is left out by the browser."""
+
+
+class Slider(ValueElement[float]):
+    """A slider from 0 to 1 that goes with the hand, whatever the server is busy with."""
+
+    LOOPBACK = None
+
+    def __init__(self, value: float, name: str, words: str) -> None:
+        super().__init__(tag="q-slider", value=value, throttle=MOVES_EVERY_S)
+        self.props.update({"min": 0.0, "max": 1.0, "step": STEP, "aria-label": words, "data-testid": f"slider-{name}"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,8 +35,8 @@ class Row:
     """What shows one parameter."""
 
     parameter: Parameter
-    slider: ui.slider
-    value: ui.label
+    slider: Slider
+    value: LiveText
     factor: float
     unit: str
 
@@ -73,9 +87,8 @@ class Sliders:
         with ui.column().classes("w-full").style("gap: 0"):
             with ui.row().classes("w-full items-baseline justify-between no-wrap"):
                 ui.label(words)
-                value = ui.label().classes("number").props(f'data-testid="value-{parameter.name}"')
-            slider = ui.slider(min=0.0, max=1.0, step=STEP, value=self._live.share(parameter))
-            slider.props(f'aria-label="{words}" data-testid="slider-{parameter.name}"')
+                value = LiveText().classes("number").props(f'data-testid="value-{parameter.name}"')
+            slider = Slider(self._live.share(parameter), parameter.name, words)
             low, high = (factor * self._live.value_at(parameter, share) for share in (0.0, 1.0))
             told = f"{low:.3g} to {high:.3g} {unit}"
             if fitted is not None:
@@ -83,7 +96,7 @@ class Sliders:
                 told += f"; fitted {factor * fitted.value:.4g} ({interval})"
             ui.label(told).classes("quiet")
         slider.on_value_change(lambda event: self._dragged(parameter, event.value))
-        slider.on("change", lambda event: self._released(parameter, event.args))
+        slider.on("change", lambda event: self._released(parameter, slider, event.args))
         return Row(parameter, slider, value, factor, unit)
 
     def _dragged(self, parameter: Parameter, share: float) -> None:
@@ -99,9 +112,10 @@ class Sliders:
         self._show_values()
         self._moved()
 
-    async def _released(self, parameter: Parameter, share: float) -> None:
+    async def _released(self, parameter: Parameter, slider: Slider, share: float) -> None:
         """Take where the slider was let go: the last move may still be on its way."""
         self._dragged(parameter, share)
+        slider.update()  # the browser moved it by itself: `undo` must find it where it is
         self._held, self._let_go = False, (parameter.name, share)
         self._follow()
         await self._settled()
@@ -132,4 +146,4 @@ class Sliders:
 
     def _show_values(self) -> None:
         for row in self._rows:
-            row.value.set_text(f"{row.factor * self._live.value(row.parameter):.4g} {row.unit}")
+            row.value.show(f"{row.factor * self._live.value(row.parameter):.4g} {row.unit}")
