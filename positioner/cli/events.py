@@ -86,15 +86,14 @@ def _as_json(entry: Any) -> str:
 
 
 def _in_words(entry: Any) -> str:
-    from config.codes import EventKind, Ne107Status
+    from config.codes import Ne107Status
     from positioner.history.entries import Event, Write
 
     if isinstance(entry, Event):
-        kind = EventKind(entry.kind).text if entry.kind in list(EventKind) else entry.name
         return _joined(
             f"{_clock(entry.time_s)}  {entry.number:6}  {entry.valve}",
             f"{Ne107Status(entry.ne107).text:15}",
-            kind + (f": {entry.text}" if entry.text else ""),
+            entry.words,
         )
     if isinstance(entry, Write):
         who = f"{entry.who} ({entry.role}) at {entry.peer}" if entry.who else entry.peer

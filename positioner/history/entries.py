@@ -6,6 +6,8 @@ A number that is not known (NaN) is NULL. Of entries with the same `KEY` the lat
 from dataclasses import dataclass
 from typing import ClassVar
 
+from config.codes import EventKind
+
 Key = tuple[str, ...]
 
 
@@ -29,6 +31,12 @@ class Event:
     """Of the code that goes with the kind, `config.codes.CAUSES`; 0 where there is none."""
     text: str
     """The cause in words."""
+
+    @property
+    def words(self) -> str:
+        """What happened, and its cause; of a kind that this version does not know, its name."""
+        kind = EventKind(self.kind).text if self.kind in list(EventKind) else self.name or f"event {self.kind}"
+        return kind + (f": {self.text}" if self.text else "")
 
 
 @dataclass(frozen=True, slots=True)

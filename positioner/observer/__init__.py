@@ -6,6 +6,7 @@
     freshness                       whether what was read last is still so
     trends                          the last minutes, with their gaps, and the states as bands
     friction_file                   friction against its baseline, kept over restarts
+    happened                        events, from the daemon's history or as served
     words                           codes, causes and estimates in words
     poller                          reads a daemon in a thread of its own
     watched_valves                  the valves that somebody looks at, their pollers and connections

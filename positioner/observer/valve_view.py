@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from threading import Lock
 
 from config.recording import Column
+from positioner.history.entries import Event
 from positioner.observer.freshness import Freshness, FreshnessMemory, after_failure, after_reading, freshness
 from positioner.observer.friction_file import FrictionRow
+from positioner.observer.happened import served_event
 from positioner.observer.trends import Trend
 from positioner.observer.words import code_text
 
@@ -54,7 +56,9 @@ class ValvePicture:
     values: Mapping[str, float]
     restarts: int
     events: tuple[SeenEvent, ...]
-    """Newest first."""
+    """What was seen, newest first."""
+    served: tuple[Event, ...] = ()
+    """What the daemon says has happened, as far as it was read over the bus; oldest first."""
 
     def value(self, register: str) -> float:
         """Return what was read of a register last; NaN where it never was."""
@@ -94,6 +98,7 @@ class ValveView:
         self._friction: deque[FrictionRow] = deque(seen, maxlen=FRICTION_KEPT)
         self._keep = keep
         self._events: deque[SeenEvent] = deque(maxlen=MOST_EVENTS)
+        self._served: deque[Event] = deque(maxlen=MOST_EVENTS)
         self._lock = Lock()
 
     def take(self, time_s: float, values: Mapping[str, float]) -> None:
@@ -105,6 +110,9 @@ class ValveView:
             for text in _changes(before, values):
                 self._events.appendleft(SeenEvent(time_s, text))
             self._values = {**before, **values}
+            event = served_event(self.name, values)
+            if event is not None and (not self._served or self._served[-1] != event):
+                self._served.append(event)
             if "position_m" in values:
                 self._enter(time_s, freshness(memory, time_s))
             if "friction" in values and time_s >= self._friction_due_s:
@@ -125,7 +133,13 @@ class ValveView:
         with self._lock:
             memory = self._memory
             return ValvePicture(
-                self.name, now_s, freshness(memory, now_s), self._values, memory.restarts, tuple(self._events)
+                self.name,
+                now_s,
+                freshness(memory, now_s),
+                self._values,
+                memory.restarts,
+                tuple(self._events),
+                tuple(self._served),
             )
 
     def trend(self, begin_s: float) -> dict[str, Column]:

@@ -27,6 +27,7 @@ class Place:
     unit: int
     stroke_m: float | None = None
     recordings: Path | None = None
+    history: Path | None = None
     tls: Tls | None = None
     """Of an observer."""
     tls_of: Mapping[Role, Tls] = field(default_factory=dict)

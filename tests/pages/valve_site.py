@@ -21,6 +21,8 @@ period_s = 2e-3
 port = {port}
 [recorder]
 folder = "recordings"
+[history]
+folder = "history"
 [law]
 b_over_c_pa_per_m = -814542.6
 k_over_c_pa = -22068.2

@@ -18,6 +18,7 @@ from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told_mm
 from workbench.fit.breaking_off import BrokenOff, ending
+from workbench.fit.fitting import Fit
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table, draw_race
@@ -69,6 +70,17 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
             if each.name != added[i]
         ]
         return (added, *rivals)
+
+    def with_those_before(self, step: int, name: str) -> tuple[str, ...]:
+        """Return the effects of a candidate's model: those that the steps before the `step`-th added, and it."""
+        return (*(each.added.name for each in self.steps[: step - 1] if each.added), name)
+
+    def fit_with(self, effects: Sequence[str]) -> Fit | None:
+        """Return the fit of these effects, added to the valve that it began with; None where none was tried."""
+        for each in self.candidates:
+            if each.model is not None and self.with_those_before(each.step, each.name) == tuple(effects):
+                return each.model.fit
+        return None
 
     @property
     def verdict_line(self) -> str:

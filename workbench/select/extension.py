@@ -20,7 +20,7 @@ from sim.composition import Composition
 from sim.effect import find_effect
 from workbench.data.held_out import Part, Split, residual_m, split
 from workbench.fit.fitted_parameter import parameter_table
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fitting import Fit, fit, profiled
 from workbench.model.free_run import FreeRun
 from workbench.model.sampling import Sampling
 from workbench.select.block_errors import BlockErrors, block_errors
@@ -117,6 +117,7 @@ def extend(
     effects: Sequence[str],
     *,
     test: Recording | None = None,
+    diagnosis: Diagnosis | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
@@ -128,6 +129,7 @@ def extend(
         valve: the valve to be extended.
         effects: names, or paths of own effects' files, to be added together.
         test: held out; by default the last third of the recording.
+        diagnosis: of the same recordings and valve: its fits are gone on from, so that nothing ends worse than there.
         seed: of the searches.
         workers: threads, by default one a core.
         progress: called with what is being done, and the fraction of it done.
@@ -142,7 +144,10 @@ def extend(
     tell = progress or (lambda _what, _done: None)
     on = split([recording] if isinstance(recording, Recording) else recording, test)
     train = on.train.recording
-    before = fit(train, valve, seed=seed, workers=workers, progress=lambda done: tell("fitting without", done))
+    if diagnosis is None:
+        before = fit(train, valve, seed=seed, workers=workers, progress=lambda done: tell("fitting without", done))
+    else:
+        before = diagnosis.base.fit
     after = fit(
         train,
         valve,
@@ -152,6 +157,9 @@ def extend(
         workers=workers,
         progress=lambda done: tell(f"fitting with {', '.join(effects)}", done),
     )
+    there_already = diagnosis.fit_with(effects) if diagnosis else None
+    if there_already is not None and there_already.cost < after.cost:
+        after = profiled(there_already, train)
     before_errors, after_errors = block_errors(before, on), block_errors(after, on)
     return Extension(
         effects=tuple(effects),

@@ -1,11 +1,13 @@
 """What the page says of a valve, a line each: label, text, and what is to be stressed. Pure: no browser, no clock."""
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from config.codes import Fault, Ne107Status
 from config.registers import BY_NAME
+from positioner.observer.happened import Happened
 from positioner.observer.valve_view import ValvePicture
 from positioner.observer.words import EstimateInWords, device_status, estimates_in_words, ne107_causes
 from positioner.pages.parts.units import NO_NUMBER, Unit, Units
@@ -111,6 +113,14 @@ def estimates(picture: ValvePicture) -> Iterator[tuple[str, str, str]]:
     """Yield name, value with its 95 % interval or why it is refused, and what it is, of each estimate."""
     for each in estimates_in_words(picture.values):
         yield each.name, _interval(each), each.text
+
+
+def happened(lines: Iterable[Happened]) -> Iterator[str]:
+    """Yield a line an event: when, by this machine's clock and zone, its NE 107 class unless that is good, and what."""
+    for line in lines:
+        known = math.isfinite(line.time_s)
+        said = [time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(line.time_s))] if known else []
+        yield ", ".join([*said, *([line.ne107] if line.ne107 else []), line.text])
 
 
 def _interval(each: EstimateInWords) -> str:

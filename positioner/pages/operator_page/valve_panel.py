@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from nicegui import ui
 
 from config.results.block import as_html
+from positioner.observer.happened import WhatHappened, what_happened
 from positioner.observer.last_moves import LastMoves, last_moves
 from positioner.observer.valve_view import SeenEvent, ValvePicture
 from positioner.observer.watched_valves import WatchedValve
@@ -23,6 +24,7 @@ from positioner.pages.parts.units import Units
 MOVES_S = 120.0
 """Of which the response figures are worked out."""
 SHOWN_EVENTS = 12
+HISTORY_EVERY_S = 1.0
 LABELS = ("reference", "position", "pressure", "command")
 
 
@@ -55,6 +57,7 @@ class ValvePanel:
         self.valve = valve
         self._units = units
         self._events: tuple[SeenEvent, ...] = ()
+        self._happened: WhatHappened | None = None
         self._stale = ui.label().classes("alarm").props('role="alert" data-testid="stale"')
         with ui.element("div").classes("full-width") as self._body:
             self._body.props('data-testid="live-values"')
@@ -72,7 +75,9 @@ class ValvePanel:
                 with self._wear.card:
                     self._friction = FrictionPlot(theme, valve.view, units)
                 self._cycle = FactsCard("The daemon's cycle", "cycle")
+                self._history_list()
                 self._event_list()
+        ui.timer(HISTORY_EVERY_S, self._read_history)
 
     def tick(self, picture: ValvePicture) -> None:
         """Show what changes by the reading."""
@@ -152,6 +157,26 @@ class ValvePanel:
         self._moves_said.set_content(_told(moves))
         if moves is not None:
             self._recorded.show(moves.recording, self.valve.view.stroke_m)
+
+    def _history_list(self) -> None:
+        with ui.card().classes("full-width").props('data-testid="history"'):
+            heading("What has happened")
+            self._history_source = ui.label().classes("quiet")
+            self._history_rows = ui.element("ul").classes("said")
+
+    async def _read_history(self) -> None:
+        """Show what has happened to the valve, where that is other than before."""
+        place = self.valve.place
+        happened = await aside(what_happened, place.history, place.name, self.valve.picture().served, SHOWN_EVENTS)
+        if happened == self._happened or self._history_rows.is_deleted:
+            return
+        self._happened = happened
+        self._history_source.set_text(happened.source)
+        self._history_rows.clear()
+        with self._history_rows:
+            for line in facts.happened(happened.lines):
+                with ui.element("li"):
+                    ui.label(line)
 
     def _event_list(self) -> None:
         with ui.card().classes("full-width").props('data-testid="events"'):

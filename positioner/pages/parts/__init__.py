@@ -8,5 +8,6 @@ Its files:
     theme                light and dark, colours of page and plots
     telling              errors and sentences, shown
     units, unit_choice   the units that a person reads in, and where they are chosen
+    live_text            a text that changes many times a second
     figure_view          a plotly figure on a page, its colours those of the theme
 """

@@ -168,7 +168,14 @@ def diagnosed(
         raise CommandFailed("the time was over before the valve as it is was fitted: nothing is known") from None
 
 
-def extended(tell: Tell, recording: Recording, valve: ValveFile, limits: Limits, effects: Sequence[str]) -> Extension:
+def extended(
+    tell: Tell,
+    recording: Recording,
+    valve: ValveFile,
+    limits: Limits,
+    effects: Sequence[str],
+    diagnosis: Diagnosis | None,
+) -> Extension:
     """Add effects and refit.
 
     Args:
@@ -177,11 +184,16 @@ def extended(tell: Tell, recording: Recording, valve: ValveFile, limits: Limits,
         valve: that is extended.
         limits: of which the held-out recording counts.
         effects: that are added together.
+        diagnosis: of the same recording and valve, if there is one.
 
     Raises:
         InputError: as `extend`.
     """
-    return extend(recording, valve, effects, test=limits.test, progress=lambda what, done: tell(Progressed(what, done)))
+
+    def progressed(what: str, done: float) -> None:
+        tell(Progressed(what, done))
+
+    return extend(recording, valve, effects, test=limits.test, diagnosis=diagnosis, progress=progressed)
 
 
 def refitted(tell: Tell, recording: Recording, valve: ValveFile, _limits: Limits) -> Fit:

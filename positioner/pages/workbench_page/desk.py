@@ -29,6 +29,7 @@ from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
 from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import Fit
+from workbench.select.diagnosis import Diagnosis
 from workbench.select.extension import Extension
 from workbench.select.extension_journal import Journal, write_extended
 
@@ -225,8 +226,17 @@ class Desk:
         own = self.folder / EFFECTS
         limits = Limits(self.held_out.recording if self.held_out else None, self.budget_s)
         given = (self.opened.recording, valve, limits, *arguments)
-        self.search = Search(what, valve, len(self.journal), Work(task, *given, own_effects=own))
+        self.search = Search(what, valve, self.held_out, len(self.journal), Work(task, *given, own_effects=own))
         return self.search
+
+    @property
+    def diagnosis(self) -> Diagnosis | None:
+        """The last diagnosis, if it is of what lies here now."""
+        found, live = self.found, self.live
+        if found is None or live is None or found.valve != live.valve or found.held_out is not self.held_out:
+            return None
+        diagnosis: Diagnosis = found.result
+        return diagnosis
 
     def stop(self) -> None:
         """Stop what is under way."""

@@ -5,6 +5,7 @@ from typing import Any
 
 from config.valve_file import ValveFile
 from positioner.pages.workbench_page.background import Failed, Finished, Previewed, Progressed, Raced, Work
+from positioner.pages.workbench_page.opening import Opened
 from workbench.select.tangent_preview import TangentScore
 
 PREVIEWED = 5
@@ -16,6 +17,8 @@ class Search:
 
     what: str
     valve: ValveFile
+    held_out: Opened | None
+    """The recording that no fit of it sees."""
     journal: int
     """How many steps the journal had when it began: what it found goes with that valve."""
     work: Work

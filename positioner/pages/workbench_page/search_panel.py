@@ -83,7 +83,7 @@ class SearchPanel:
 
     def _extend(self, effects: Sequence[str]) -> None:
         with errors_told():
-            self._desk.begin("extend", extended, tuple(effects))
+            self._desk.begin("extend", extended, tuple(effects), self._desk.diagnosis)
         self._began()
 
     def _began(self) -> None:
@@ -194,14 +194,14 @@ class SearchPanel:
                 ui.label(f"step {number}: {length(step.before.errors.test_rmse_m).text} mm held out before").classes(
                     "quiet"
                 )
-                self._candidates(step.candidates, may_add=may_add)
+                self._candidates(diagnosis, step.candidates, may_add=may_add)
 
-    def _candidates(self, candidates: Sequence[EffectCandidate], *, may_add: bool) -> None:
+    def _candidates(self, diagnosis: Diagnosis, candidates: Sequence[EffectCandidate], *, may_add: bool) -> None:
         heads = {"effect": "effect", "fitted": "fitted, mm", "test": "held out, mm", "bic": "evidence", "why": ""}
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         rows = [
             {
-                "name": each.name,
+                "effects": diagnosis.with_those_before(each.step, each.name),
                 "effect": self._desk.plain(each.name),
                 "fitted": length(each.model.errors.train_rmse_m).text if each.model else "–",
                 "test": length(each.model.errors.test_rmse_m).text if each.model else "–",
@@ -213,7 +213,7 @@ class SearchPanel:
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full")
         if may_add:
-            table.on("row-click", lambda event: self._extend([event.args[1]["name"]]))
+            table.on("row-click", lambda event: self._extend(event.args[1]["effects"]))
             ui.label("click an effect to add it all the same").classes("quiet")
 
     async def _add(self, search: Search, effects: Sequence[str]) -> None:
