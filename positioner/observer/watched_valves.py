@@ -27,7 +27,6 @@ class Place:
     unit: int
     stroke_m: float | None = None
     recordings: Path | None = None
-    history: Path | None = None
     tls: Tls | None = None
     """Of an observer."""
     tls_of: Mapping[Role, Tls] = field(default_factory=dict)
@@ -37,6 +36,8 @@ class Place:
     """Of the commands."""
     keep: Path | None = None
     """The folder that keeps what the page has seen of friction."""
+    history: Path | None = None
+    """The folder of the daemon's history."""
 
     def connection(self, role: Role) -> Dcs:
         """Return a closed connection for a role.
