@@ -41,11 +41,13 @@ def refusal_for(role: Role, *registers: str) -> str | None:
 
     >>> refusal_for(Role.OPERATOR, "reference"), refusal_for(Role.OPERATOR, "mode")
     (None, 'mode needs the role engineer')
+    >>> refusal_for(Role.OBSERVER, *EXCITATION)
+    'identification needs the role engineer'
     """
     for name in registers:
         needed = register_named(name).writer
         if role < needed:
-            return f"{name} needs the role {needed.name.lower()}"
+            return f"{'identification' if name in EXCITATION else name} needs the role {needed.name.lower()}"
     return None
 
 

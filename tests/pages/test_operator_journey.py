@@ -44,6 +44,21 @@ def test_an_operator_watches_signs_in_moves_the_valve_and_is_told_what_dies(tmp_
             expect(page.get_by_test_id("stale")).to_contain_text("Not live: no connection")
             expect(page.get_by_test_id("live-values")).to_have_class(re.compile(r"\bstale\b"))
             expect(page.get_by_test_id("set-reference")).to_be_disabled()
+            wrong_five_times(page)
+
+
+def wrong_five_times(page: Page) -> None:
+    """After five wrong passwords in a row none is looked at for a while."""
+    page.get_by_test_id("door").click()
+    page.get_by_test_id("door").click()
+    for _ in range(5):
+        page.get_by_test_id("password").fill("guessed")
+        page.get_by_test_id("enter").click()
+        expect(page.get_by_test_id("password")).to_have_value("")
+    expect(page.get_by_test_id("sign-in-said")).to_have_text("wrong password")
+    page.get_by_test_id("password").fill(PASSWORDS["engineer"])
+    page.get_by_test_id("enter").click()
+    expect(page.get_by_test_id("sign-in-said")).to_have_text(re.compile(r"too many wrong passwords: try again in \d+ s"))
 
 
 def watched(page: Page) -> None:
