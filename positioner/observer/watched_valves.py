@@ -36,8 +36,6 @@ class Place:
     """Of the commands."""
     keep: Path | None = None
     """The folder that keeps what the page has seen of friction."""
-    history: Path | None = None
-    """The folder of the daemon's history."""
 
     def connection(self, role: Role) -> Dcs:
         """Return a closed connection for a role.

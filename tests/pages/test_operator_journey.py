@@ -58,7 +58,9 @@ def wrong_five_times(page: Page) -> None:
     expect(page.get_by_test_id("sign-in-said")).to_have_text("wrong password")
     page.get_by_test_id("password").fill(PASSWORDS["engineer"])
     page.get_by_test_id("enter").click()
-    expect(page.get_by_test_id("sign-in-said")).to_have_text(re.compile(r"too many wrong passwords: try again in \d+ s"))
+    expect(page.get_by_test_id("sign-in-said")).to_have_text(
+        re.compile(r"too many wrong passwords: try again in \d+ s")
+    )
 
 
 def watched(page: Page) -> None:

@@ -37,6 +37,7 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .jump:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
 h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; }
 *:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
+.body--dark .q-btn.text-negative { color: #ff8a80 !important; }
 .body--dark .q-uploader__header { background: #1b5e8a; }
 @media (max-width: 599px) { .panel { padding: 8px 8px 24px; } .q-header { padding: 4px 8px; gap: 4px; } }
 """

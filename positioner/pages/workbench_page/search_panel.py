@@ -165,7 +165,7 @@ class SearchPanel:
             "data": [bars],
             "layout": layout(
                 margin={"l": 10, "r": 10, "t": 8, "b": 40},
-                xaxis=axis(f"step {step}: fitted error with this effect added, mm rms", type="log", dtick="D2"),
+                xaxis=axis(f"step {step}: fitted error, mm rms", type="log", dtick="D2", tickformat="~g"),
                 yaxis=axis("", tickfont={"size": 11}),
                 shapes=[] if floor_m is None else [marked(1e3 * floor_m, MEASURED)],
                 showlegend=False,
