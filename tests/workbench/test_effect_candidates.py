@@ -1,5 +1,6 @@
 """A forward step judged, on models made by hand: what is added, what is refused and why, and what does as well."""
 
+from dataclasses import replace
 from math import log
 
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, fitted, model_of
@@ -33,6 +34,20 @@ def test_of_those_accepted_the_one_with_most_evidence_is_added_and_all_stand_by_
     assert reasons(step)["ip_lag"] == reasons(step)["sensor_lag"] == ""
     assert step.added is step.candidates[0]
     assert names(step) == ("ip_lag",), "the other is four times as far off in every second"
+
+
+def test_of_those_that_the_fitted_part_does_not_tell_the_one_that_explains_what_was_held_out_is_added() -> None:
+    missed = model_of("preload", cost=0.999 * AT_FLOOR)
+    missed = replace(missed, at_floor=False, errors=replace(missed.errors, test_rest_rmse_m=50.0 * FLOOR_M))
+    step = judged(POOR, preload=missed, asymmetric_friction=model_of("asymmetric_friction"))
+    assert step.candidates[0].name == "preload", "by a hair"
+    assert step.added
+    assert step.added.name == "asymmetric_friction"
+    assert "preload" in names(step), "typical seconds do not tell them"
+    evident = model_of("preload", cost=0.9 * AT_FLOOR)
+    step = judged(POOR, preload=replace(missed, fit=evident.fit), asymmetric_friction=model_of("asymmetric_friction"))
+    assert step.added
+    assert step.added.name == "preload"
 
 
 def test_what_comes_after_another_and_does_no_better_is_neither_added_nor_a_rival() -> None:

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from config.recording import Column
+from config.recording import Column, Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
@@ -18,11 +18,14 @@ from workbench.select.knife_edges import KnifeEdge, knife_edges, rms_without
 TRUE = drawn_valve(np.random.default_rng(19))
 
 
-@pytest.fixture(scope="module")
-def part() -> Part:
-    recording = record_of(TRUE, 19)
+def whole(recording: Recording) -> Part:
     record = ready(recording)
     return Part(recording, record, record.valid)
+
+
+@pytest.fixture(scope="module")
+def part() -> Part:
+    return whole(record_of(TRUE, 19))
 
 
 def error_of(valve: ValveFile, part: Part) -> Column:
@@ -79,20 +82,27 @@ def test_many_mistimed_slips_are_the_models_fault(part: Part) -> None:
 def test_another_friction_than_was_fitted_is_no_knife_edge(part: Part) -> None:
     """One change puts every slip right, but what was fitted tells that friction better."""
     other = changed(static_n=1.0 / 1.01)
-    fitted = record_of(other, 20)
-    record = ready(fitted)
     both = partial(knife_edges, other, part=part, error_m=error_of(other, part), floor_m=NOISE_M, from_pressure=False)
-    assert both(fitted=Part(fitted, record, record.valid)) == ()
+    assert both(fitted=whole(record_of(other, 20))) == ()
     assert len(both(fitted=part)) > 3, "where what was fitted allows the change, all of them are"
+
+
+def test_few_slips_leave_static_friction_a_wide_interval(part: Part) -> None:
+    """Of four seconds fitted 5 % more static friction makes the same slips: what was held out may ask for either."""
+    higher = changed(static_n=1.0 / 0.95)
+    error_m = error_of(higher, part)
+    edges = knife_edges(higher, whole(record_of(TRUE, 23, 400)), part, error_m, NOISE_M, from_pressure=False)
+    assert {(each.parameter, each.change) for each in edges} == {("static_n", -0.05)}
+    assert "static friction 5 % lower, allowed by what was fitted, puts it right" in edges[0].sentence
+    assert rms_without(part.record.time_s, error_m, edges) < 1.1 * NOISE_M
+    assert knife_edges(higher, whole(record_of(higher, 20)), part, error_m, NOISE_M, from_pressure=False) == ()
 
 
 def test_a_stretch_of_many_slips_is_no_knife_edge(part: Part) -> None:
     other = changed(coulomb_n=1.0 / 1.02)
     assert np.nanstd(error_of(other, part)) > 3.0 * NOISE_M
-    fitted = record_of(other, 20)
-    record = ready(fitted)
     error_m = error_of(other, part)
-    assert knife_edges(other, Part(fitted, record, record.valid), part, error_m, NOISE_M, from_pressure=False) == ()
+    assert knife_edges(other, whole(record_of(other, 20)), part, error_m, NOISE_M, from_pressure=False) == ()
 
 
 def test_the_rms_without_leaves_out_the_stretches_and_nothing_else() -> None:

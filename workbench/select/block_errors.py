@@ -122,7 +122,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         return found
     if not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
-    edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure, slow=fit.by.slow)
+    edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
     return replace(found, knife_edges=edges, test_rest_rmse_m=rms_without(test.record.time_s, held_out_m, edges))
 
 

@@ -166,11 +166,17 @@ def _best(
     accepted = {each.name: each for each in ordered if each.accepted}
     if not accepted:
         return ordered, None
-    best, first = next(iter(accepted.values())), accepted[min(classes(accepted, library)[0])]
+    best = next(iter(accepted.values()))
+    assert best.model
+    as_evident = [each for each in accepted.values() if each.model and each.evidence > best.evidence - LEAST_BIC]
+    # What was fitted does not tell these; what was held out does, if one of them explains that.
+    best = next((each for each in as_evident if each.model and each.model.explained), best)
+    first = accepted[min(algebraic_class(best.name, library) & accepted.keys())]
     assert best.model
     assert first.model
     # A class is not ranked inside, but a search that failed is no reason to go on from there.
-    return ordered, first if first.model.fit.cost < SAME_COST * best.model.fit.cost else best
+    as_good = first.model.fit.cost < SAME_COST * best.model.fit.cost and first.model.explained == best.model.explained
+    return ordered, first if as_good else best
 
 
 def _bare_equivalent(
