@@ -13,7 +13,7 @@ from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench.data.held_out import Part, residual_m
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
-from workbench.select.knife_edges import KnifeEdge, knife_edges, rms_without
+from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 
 TRUE = drawn_valve(np.random.default_rng(19))
 
@@ -26,6 +26,10 @@ def whole(recording: Recording) -> Part:
 @pytest.fixture(scope="module")
 def part() -> Part:
     return whole(record_of(TRUE, 19))
+
+
+def rms_without(time_s: Column, error_m: Column, edges: tuple[KnifeEdge, ...]) -> float:
+    return rms(error_without(time_s, error_m, edges))
 
 
 def error_of(valve: ValveFile, part: Part) -> Column:

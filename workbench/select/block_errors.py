@@ -20,7 +20,7 @@ from config.recording import Column
 from config.results.result import Brief
 from workbench.data.held_out import Part, Split, residual_m
 from workbench.fit.fitting import Fit
-from workbench.select.knife_edges import KnifeEdge, knife_edges, rms_without
+from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 from workbench.select.residual_structure import clipped, structure
 
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
@@ -60,7 +60,7 @@ class BlockErrors(Brief):
     all_logs: Column
     """l_b of the fitted and the held-out blocks, (blocks,)."""
     structure: float
-    """How much of the residual hangs on the state, fitted or held out, whichever is more (`residual_structure`)."""
+    """How much of the residual, without knife edges, hangs on the state, fitted or held out, whichever is more."""
     independent_share: float
     """Share of the fitted samples that are independent."""
     knife_edges: tuple[KnifeEdge, ...]
@@ -103,6 +103,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m, _block_s(train))
     logs = block_logs(test.record.time_s, held_out_m, negligible_m, _block_s(test))
     test_rmse_m = float(np.sqrt(np.mean(held_out_m[rows] ** 2)))
+    fitted_structure = structure(train.record, fitted_m, negligible_m)
     found = BlockErrors(
         train_rmse_m=fit.rms_m,
         test_rmse_m=test_rmse_m,
@@ -110,9 +111,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         test_block_m=float(np.exp(np.median(logs))),
         logs=logs,
         all_logs=np.concatenate([fitted_logs, logs]),
-        structure=max(
-            structure(train.record, fitted_m, negligible_m), structure(test.record, held_out_m, negligible_m)
-        ),
+        structure=max(fitted_structure, structure(test.record, held_out_m, negligible_m)),
         independent_share=independent_share(fitted_m),
         knife_edges=(),
         test_rest_rmse_m=test_rmse_m,
@@ -123,7 +122,11 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     if not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
     edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
-    return replace(found, knife_edges=edges, test_rest_rmse_m=rms_without(test.record.time_s, held_out_m, edges))
+    if not edges:
+        return found
+    rest_m = error_without(test.record.time_s, held_out_m, edges)
+    left = max(fitted_structure, structure(test.record, rest_m, negligible_m))
+    return replace(found, knife_edges=edges, test_rest_rmse_m=rms(rest_m), structure=left)
 
 
 def _block_s(part: Part) -> float:

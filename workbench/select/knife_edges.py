@@ -100,13 +100,13 @@ def knife_edges(
         right = {
             (first, end): KnifeEdge(float(time_s[first]), float(time_s[end - 1]), name, change)
             for first, end in stretches
-            if _rms(other_m[first:end]) <= max(AT_MOST * floor_m, FELL * _rms(error_m[first:end]))
+            if rms(other_m[first:end]) <= max(AT_MOST * floor_m, FELL * rms(error_m[first:end]))
         }
         new, all_right = right.keys() - found, len(right) == len(stretches)
         if not (new or all_right):
             continue
         needs_leave = all_right or abs(change) > CHANGES[-1]
-        allowed = needs_leave and _rms(_error_m(changed, fitted, from_pressure)) <= AT_MOST * floor_m
+        allowed = needs_leave and rms(_error_m(changed, fitted, from_pressure)) <= AT_MOST * floor_m
         if all_right and allowed:
             return tuple(right.values())
         if allowed or abs(change) <= CHANGES[-1]:
@@ -120,12 +120,12 @@ def _few(stretches: Collection[tuple[int, int]], slip_rows: Sequence[int]) -> bo
     return sum(max(1, each - 1) for each in held) <= max(1, int(MOST_SHARE * len(slip_rows)))
 
 
-def rms_without(time_s: Column, error_m: Column, edges: tuple[KnifeEdge, ...]) -> float:
-    """Return the rms, m, of an error, (n,), NaN where it does not count, without the stretches of knife edges."""
+def error_without(time_s: Column, error_m: Column, edges: tuple[KnifeEdge, ...]) -> Column:
+    """Return an error, m, (n,), that does not count, NaN, in the stretches of knife edges."""
     kept = np.isfinite(error_m)
     for each in edges:
         kept &= (time_s < each.from_s) | (time_s > each.to_s)
-    return _rms(error_m[kept])
+    return np.where(kept, error_m, np.nan)
 
 
 def _changes() -> Iterator[tuple[str, float]]:
@@ -169,6 +169,7 @@ def _slips(part: Part) -> list[int]:
     return [first + each.first for first, end in record.segments for each in slips(counted[first:end], record.scale_m)]
 
 
-def _rms(values: Column) -> float:
+def rms(values: Column) -> float:
+    """Return the rms of what is a number; 0 of nothing."""
     finite = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
