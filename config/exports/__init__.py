@@ -5,6 +5,7 @@ From the file to the recording:
     raw_table                               rows of cells before anything is understood; which kind of file it is
     text_table                              encodings, separators, quotation marks
     typed_tables                            Excel workbooks, MATLAB files, Parquet
+    measurement_files                       HDF5, MATLAB 7.3, TDMS, MDF4
     line_protocol                           InfluxDB's line protocol
     export_units                            units, by all the names people give them
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read
@@ -15,4 +16,5 @@ From the file to the recording:
     own_format                              whether it is a recording of our own already
     plausibility                            what is odd about a recording, before anything is fitted to it
     export_preview                          what a file holds, and the words that would read it
+    import_questions, mapping_file          what they leave open, asked; the answers, kept in a file for next time
 """

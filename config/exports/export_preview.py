@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from config.errors import InputError
-from config.exports.export_units import allowed_units, ending_of, unit_named
+from config.exports.export_units import allowed_units, ending_of, unit_in_header, unit_named
 from config.exports.header_search import Header, begins_number, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
 from config.exports.raw_table import Cell, raw_tables
@@ -32,7 +32,8 @@ COMMON = {
 }
 """What columns are called, by ours; names are taken apart at _, . and - and where capitals follow small letters."""
 STAMP = r"\d{4}-\d\d-\d\d"
-_STATUS = re.compile(r"status|quality|qualität|güte", re.IGNORECASE)
+STATUS = re.compile(r"status|quality|qualität|güte", re.IGNORECASE)
+"""What columns are called that say which rows are good."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +150,7 @@ def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[s
 def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], separator: str) -> Iterator[str]:
     """Yield what a person must look at beyond the columns that were chosen."""
     for each in left:
-        if _STATUS.search(each.name) and not each.numbers:
+        if STATUS.search(each.name) and not each.numbers:
             held = ", ".join(sorted({str(cell) for cell in each.cells if cell != ""})[:5])
             yield f"{each.name!r} holds {held}: --status {_quoted(each.name + '=GOOD')} leaves the other rows out"
     if said := _row_a_value(columns):
@@ -168,7 +169,7 @@ def _row_a_value(columns: Sequence[ColumnPreview]) -> str | None:
         return None
     for each in columns:
         held = list(dict.fromkeys(map(str, each.cells)))
-        words = not each.numbers and not _STATUS.search(each.name) and not any(map(begins_number, held))
+        words = not each.numbers and not STATUS.search(each.name) and not any(map(begins_number, held))
         if words and 1 < len(held) <= min(MOST_SIGNALS, len(each.cells) // 4):
             return (
                 f"{each.name!r} holds {', '.join(held[:5])}: a row a value; turn it into a column a signal first, "
@@ -199,9 +200,10 @@ def _most_are(cells: Sequence[Cell], pattern: str) -> bool:
 
 
 def _looks_like(ours: str, column: ColumnPreview) -> bool:
-    # Of a structure's field, log.t, the field's own name counts as well.
-    names = tuple(_taken_apart(each) for each in (column.name, column.name.rpartition(".")[2]))
-    if not any(re.search(COMMON[ours], each, re.IGNORECASE) for each in names) or _STATUS.search(column.name):
+    # Of a structure's field, log.t, the field's own name counts as well; the unit behind a name does not.
+    plain = unit_in_header(column.name)[0]
+    names = tuple(_taken_apart(each) for each in (column.name, plain, plain.rpartition(".")[2]))
+    if not any(re.search(COMMON[ours], each, re.IGNORECASE) for each in names) or STATUS.search(column.name):
         return False
     if ours == "time_s":
         return any(begins_number(cell) and cell != "" for cell in column.cells)

@@ -54,7 +54,7 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
     for magic, problem in REFUSED.items():
         if begin.startswith(magic):
             raise InputError(str(path), problem)
-    from config.exports import line_protocol, text_table, typed_tables
+    from config.exports import line_protocol, measurement_files, text_table, typed_tables
 
     if begin.startswith(b"PK\x03\x04"):
         return typed_tables.workbook(path, sheet)
@@ -62,8 +62,15 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
         raise InputError("--sheet", f"goes with an Excel workbook, and {path} is none")
     if begin.startswith(b"MATLAB 5.0 MAT-file"):
         return typed_tables.matlab(path)
-    if begin.startswith(b"PAR1"):
-        return typed_tables.parquet(path)
+    for magic, read in (
+        (b"PAR1", typed_tables.parquet),
+        (b"MATLAB 7.3 MAT-file", measurement_files.hdf5),
+        (b"\x89HDF", measurement_files.hdf5),
+        (b"TDSm", measurement_files.tdms),
+        (b"MDF     ", measurement_files.mdf4),
+    ):
+        if begin.startswith(magic):
+            return read(path)
     if line_protocol.is_line_protocol(begin):
         return line_protocol.line_protocol(path)
     return text_table.text_tables(path)
@@ -71,8 +78,6 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
 
 REFUSED = {
     b"\xd0\xcf\x11\xe0": "is a workbook of old Excel (.xls): save it as .xlsx or CSV",
-    b"MATLAB 7.3 MAT-file": "is a MATLAB 7.3 file: save it with the option -v7",
-    b"\x89HDF": "is an HDF5 file: save it as CSV, or from MATLAB with the option -v7",
     b"\x1f\x8b": "is compressed with gzip: unpack it first",
     b"BZh": "is compressed with bzip2: unpack it first",
     b"\xfd7zXZ": "is compressed with xz: unpack it first",

@@ -35,7 +35,7 @@ def workbook(path: Path, sheet: str | None = None) -> list[RawTable]:
             names = [each.title for each in book.worksheets]
             book.close()
     except Exception as error:  # whatever a damaged archive makes of XML, zip and openpyxl
-        raise InputError(str(path), f"is a damaged workbook: {_first_line(error)}") from None
+        raise InputError(str(path), f"is a damaged workbook: {first_line(error)}") from None
     if sheet is not None and sheet not in names:
         raise InputError("--sheet", f"{path} has no sheet {sheet!r}; it has: {', '.join(names)}")
     return [
@@ -54,7 +54,7 @@ def _sheet_rows(path: Path, openpyxl: Any, sheet: str) -> Iterator[tuple[int, li
             for number, row in enumerate(page.iter_rows(values_only=True), start=1):
                 yield number, [_cell(value) for value in row]
         except (zipfile.BadZipFile, KeyError, ValueError, SyntaxError, EOFError, OSError) as error:
-            raise InputError(str(path), f"is a damaged workbook: {_first_line(error)}") from None
+            raise InputError(str(path), f"is a damaged workbook: {first_line(error)}") from None
         finally:
             book.close()
 
@@ -85,7 +85,7 @@ def matlab(path: Path) -> list[RawTable]:
         with warnings.catch_warnings(action="ignore"):
             found = io.loadmat(path, simplify_cells=True)
     except Exception as error:  # a damaged file fails anywhere in scipy's reader
-        raise InputError(str(path), f"is a damaged MATLAB file: {_first_line(error)}") from None
+        raise InputError(str(path), f"is a damaged MATLAB file: {first_line(error)}") from None
     columns = dict(_vectors({name: value for name, value in found.items() if not name.startswith("__")}))
     lengths = sorted({len(each) for each in columns.values()}, reverse=True)
     if not lengths:
@@ -93,7 +93,7 @@ def matlab(path: Path) -> list[RawTable]:
     tables = []
     for length in lengths:
         chosen = {name: each for name, each in columns.items() if len(each) == length}
-        tables.append(RawTable(f"vectors of {length}", "row", partial(_column_rows, chosen)))
+        tables.append(RawTable(f"vectors of {length}", "row", partial(column_rows, chosen)))
     return tables
 
 
@@ -124,16 +124,18 @@ def parquet(path: Path) -> list[RawTable]:
     except InputError:
         raise
     except Exception as error:  # a damaged file fails in any of Arrow's ways
-        raise InputError(str(path), f"is a damaged Parquet file: {_first_line(error)}") from None
+        raise InputError(str(path), f"is a damaged Parquet file: {first_line(error)}") from None
     columns = {name: [_cell(value) for value in table[name].to_pylist()] for name in table.column_names}
-    return [RawTable("Parquet", "row", partial(_column_rows, columns))]
+    return [RawTable("Parquet", "row", partial(column_rows, columns))]
 
 
-def _column_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, list[Cell]]]:
-    yield 0, list(columns)
-    for number, row in enumerate(zip(*columns.values(), strict=True), start=1):
+def column_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, list[Cell]]]:
+    """Yield the rows of columns of one length, their names first."""
+    yield 1, list(columns)
+    for number, row in enumerate(zip(*columns.values(), strict=True), start=2):
         yield number, list(row)
 
 
-def _first_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
+    """Return what a library complains of, in one line."""
     return (str(error).splitlines() or [type(error).__name__])[0]

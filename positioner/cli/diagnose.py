@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.export_arguments import add_export_arguments, read_any
+from positioner.cli.parts.export_arguments import add_export_arguments, read_any, take_mapping
 from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 
@@ -68,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     for option in ("json", "report", "experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
+    take_mapping(arguments)
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
 

@@ -1,5 +1,6 @@
 """`positioner import` and `valve`, and exports in the other commands: from a file of another program to figures."""
 
+import io
 import re
 import shlex
 from collections.abc import Callable
@@ -192,3 +193,73 @@ def test_units_at_the_end_of_names_and_a_clock_of_another_name_are_proposed(tmp_
     assert main(["import", str(path)]) == 0
     said = capsys.readouterr().out
     assert "command_pa=drive_in:%" in said  # an input, and no inch
+
+
+SCADA = "Zeit;Hub;Stell;Status\n" + "".join(
+    f"{0.1 * k:.1f};{50 + k % 7};{0.4 + 0.01 * (k % 9):.2f};{'Bad' if k == 5 else 'Good'}\n" for k in range(40)
+)
+
+
+def inspected(path: Path, answers: str, monkeypatch: pytest.MonkeyPatch) -> int:
+    path.write_text(SCADA)
+    monkeypatch.setattr("sys.stdin", io.StringIO(answers))
+    return main(["import", "--inspect", str(path)])
+
+
+def test_what_a_file_leaves_open_is_asked_and_written_down_for_next_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "trend.csv", tmp_path / "rec.csv"
+    assert inspected(path, "s\n%\nbar\nGood\n0.04\n", monkeypatch) == 0
+    said = capsys.readouterr().out
+    for question in ("unit of 'Zeit'", "unit of 'Hub'", "unit of 'Stell'", "'Status' holds Bad, Good", "the stroke"):
+        assert question in said
+    mapping = tmp_path / "trend.csv.mapping.toml"
+    assert 'command_pa=Stell:bar"' in mapping.read_text()
+    assert main(["import", str(path), "--mapping", str(mapping), "-o", str(out)]) == 0
+    read = Recording.read(out)
+    assert read.position_m[0] == pytest.approx(0.5 * 0.04)
+    assert read.columns["command_pa"][0] == pytest.approx(40e3)
+    assert np.isnan(read.position_m[5]), "a row that is not good has no value"
+    assert inspected(path, "s\n%\nbar\nGood\n0.04\n", monkeypatch) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ("s\n%\n", "--inspect: the answers ended before the questions; nothing was written"),
+        ("s\n%\nbar\n\nforty\n", "stroke: must be a length in m"),
+        ("s\nfathom\nbar\n\n", "unknown unit 'fathom'"),
+    ],
+)
+def test_a_wrong_answer_is_one_line_and_nothing_is_written(
+    answers: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert inspected(tmp_path / "trend.csv", answers, monkeypatch) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "trend.csv.mapping.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[export]\n", "export.column"),
+        ("[export]\ncolumn = ['position_m=PV']\n", "export.column: time_s is given 0 times"),
+        ("[export]\ncolumn = ['time_s=t', 'position_m=PV:ell', 'command_pa=u']\n", "unknown unit 'ell'"),
+        ("[export]\ncolumns = ['time_s=t']\n", "export.columns"),
+    ],
+)
+def test_a_mapping_file_at_fault_is_one_line(
+    text: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(text)
+    (tmp_path / "trend.csv").write_text(SCADA)
+    assert main(["import", str(tmp_path / "trend.csv"), "--mapping", str(mapping)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"positioner import: {mapping}: ")
+    assert said in error
+    assert error.count("\n") == 1

@@ -32,6 +32,9 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         help="where a column comes from, once for each: time_s=Time position_m=PV:%% command_pa=OUT:bar; -%% from the "
         "other end; #2 is the second column, Date+Time two",
     )
+    export.add_argument(
+        "--mapping", type=Path, metavar="MAP.toml", help="all of these words from a file; what is typed goes before"
+    )
     export.add_argument("--stroke-m", type=_stroke, metavar="M", help="100 %% of a position (the valve file's stroke)")
     export.add_argument(
         "--range-pa", type=float, nargs=2, metavar=("AT0", "AT100"), help="0 %% and 100 %% of a pressure (20e3 100e3)"
@@ -64,13 +67,29 @@ def _stroke(word: str) -> float:
 def export_words(arguments: argparse.Namespace) -> list[str]:
     """Return the words of these arguments as they were given, for a command that reads the same files."""
     words: list[str] = []
-    for name in ("from_s", "to_s", "column", *BESIDES):
+    for name in ("from_s", "to_s", "column", "mapping", *BESIDES):
         given, flag = getattr(arguments, name), f"--{name.replace('_', '-')}"
         if name in ("column", "status"):
             words += [word for each in given for word in (flag, each)]
         elif given is not None:
             words += [flag, *map(str, given if isinstance(given, list) else [given])]
     return words
+
+
+def take_mapping(arguments: argparse.Namespace) -> None:
+    """Fill in what the file of `--mapping` says and nobody typed.
+
+    Raises:
+        InputError: a fault in that file.
+    """
+    from config.exports.mapping_file import read_mapping_file
+
+    if arguments.mapping is None:
+        return
+    for name, value in read_mapping_file(arguments.mapping).model_dump().items():
+        if not getattr(arguments, name):
+            setattr(arguments, name, list(value) if isinstance(value, tuple) else value)
+    arguments.mapping = None
 
 
 def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) -> "Recording":
@@ -86,6 +105,7 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     from config.recording import Recording
     from positioner.cli.parts.progress import Progress
 
+    take_mapping(arguments)
     if path.is_file() and path.stat().st_size > LARGE:
         print(f"reading {path}, {path.stat().st_size / 1e6:.0f} MB", file=sys.stderr, flush=True)
     if arguments.column:

@@ -1,0 +1,75 @@
+"""What an export leaves open, asked one thing at a time: columns, units, the stroke, which rows are good."""
+
+import re
+from collections.abc import Callable
+
+from config.errors import InputError
+from config.exports.column_mapping import Source, read_mapping
+from config.exports.export_preview import COMMON, STATUS, ColumnPreview, ExportPreview
+from config.exports.export_units import SHARES
+from config.exports.mapping_file import MappingTable
+
+Ask = Callable[[str, str], str]
+"""Given a question and what is taken where nothing is answered; returns the answer."""
+NEEDED = ("time_s", "position_m")
+
+
+def answered(found: ExportPreview, ask: Ask) -> MappingTable:
+    """Return the mapping that a file's proposal and a person's answers make.
+
+    Raises:
+        InputError: an answer that is none of those allowed; names the question.
+    """
+    words = _proposed(found)
+    columns = [word for ours in COMMON if (word := _column(ours, words.get(ours), found, ask))]
+    sources = read_mapping(columns)
+    status = [word for each in found.columns if (word := _status(each, ask))]
+    (position,) = (each for each in sources if each.name == "position_m")
+    return MappingTable(
+        column=tuple(columns),
+        stroke_m=_stroke_m(position, ask),
+        time_format=_after(found, "--time-format"),
+        status=tuple(status),
+    )
+
+
+def _proposed(found: ExportPreview) -> dict[str, str]:
+    """Return `THEIRS` or `THEIRS:UNIT` as proposed, by ours."""
+    given = [word for flag, word in zip(found.words, found.words[1:], strict=False) if flag == "--column"]
+    return {word.partition("=")[0]: word.partition("=")[2] for word in given}
+
+
+def _after(found: ExportPreview, flag: str) -> str | None:
+    return found.words[found.words.index(flag) + 1] if flag in found.words else None
+
+
+def _column(ours: str, proposed: str | None, found: ExportPreview, ask: Ask) -> str:
+    if proposed is None:
+        names = ", ".join(each.name for each in found.columns)
+        left_out = "" if ours in NEEDED else "; nothing if none"
+        answer = ask(f"which column is {ours}, NAME or NAME:UNIT{left_out}? There are {names}", "")
+        if not answer and ours in NEEDED:
+            raise InputError(ours, "is needed: a recording has a time and a position")
+        return f"{ours}={answer}" if answer else ""
+    if not any(proposed.rpartition(":")[0] in each and "is open" in each for each in found.open if "unit of" in each):
+        return f"{ours}={proposed}"
+    name, _, unit = proposed.rpartition(":") if ":" in proposed else (proposed, "", "s")
+    return f"{ours}={name}:{ask(f'the unit of {name!r}, for {ours}?', unit)}"
+
+
+def _status(column: ColumnPreview, ask: Ask) -> str:
+    if column.numbers or not STATUS.search(column.name):
+        return ""
+    held = ", ".join(sorted({str(cell) for cell in column.cells if cell != ""})[:5])
+    good = ask(f"{column.name!r} holds {held}: which are good, by commas; nothing if it does not matter?", "")
+    return f"{column.name}={good}" if good else ""
+
+
+def _stroke_m(position: Source, ask: Ask) -> float | None:
+    unit = position.unit or ""
+    if unit.removeprefix("-") not in SHARES and not unit.startswith("-"):
+        return None
+    answer = ask("the stroke, 100 % of the position, in m?", "")
+    if not re.fullmatch(r"\d*\.?\d+(e-?\d+)?", answer) or float(answer) <= 0.0:
+        raise InputError("stroke", f"must be a length in m, as 0.04; got {answer[:40]!r}")
+    return float(answer)

@@ -1,0 +1,201 @@
+"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), MDF4 (asammdf).
+
+Each group of channels of one length is a table. A channel is named by its path, joined by points, with its unit behind
+it in brackets where the file says it; a time that is not stored as numbers (TDMS' waveforms, MDF's masters) is
+`time [s]`.
+"""
+
+import gc
+import logging
+import sys
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from config.errors import InputError
+from config.exports.raw_table import RawTable
+from config.exports.typed_tables import column_rows, first_line
+from config.extras import needed
+from config.plain_file import require_moderate
+
+Columns = dict[str, Any]
+NUMBERS = "fiub"
+"""Kinds of numpy's types that are numbers."""
+
+
+def hdf5(path: Path) -> list[RawTable]:
+    """Return the tables that the vectors of an HDF5 or MATLAB 7.3 file make, those of one length each.
+
+    Raises:
+        InputError: it is damaged, or holds no vectors.
+        ModuleNotFoundError: h5py is not installed; names the extra.
+    """
+    h5py = needed("h5py", str(path))
+    try:
+        with h5py.File(path, "r") as file:
+            columns = dict(_datasets(path, h5py, file))
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails anywhere in the HDF5 library
+        raise InputError(str(path), f"is a damaged HDF5 file: {first_line(error)}") from None
+    return _by_length(path, columns)
+
+
+def _datasets(path: Path, h5py: Any, group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name in group:
+        if name.startswith("#"):  # MATLAB's own
+            continue
+        each = group.get(name)
+        if isinstance(each, h5py.Group):
+            yield from _datasets(path, h5py, each, f"{prefix}{name}.")
+        elif isinstance(each, h5py.Dataset) and 0 < len(each.shape) <= 2:
+            require_moderate(path, max(each.shape), min(each.shape) if len(each.shape) == 2 else 1)
+            yield from _channels(prefix + name, each)
+
+
+def _channels(name: str, dataset: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the vectors of a dataset; MATLAB stores a matrix turned round."""
+    kind = dataset.attrs.get("MATLAB_class")
+    if dataset.dtype.names:
+        table = dataset[...].ravel()
+        fields = [each for each in dataset.dtype.names if table[each].dtype.kind in NUMBERS and table[each].ndim == 1]
+        yield from ((f"{name}.{each}", table[each].astype(np.float64)) for each in fields)
+        return
+    if dataset.dtype.kind not in NUMBERS or (kind is not None and bytes(kind) in (b"char", b"cell")):
+        return
+    values = np.asarray(dataset[...], dtype=np.float64)
+    unit = next((_text(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs), "")
+    if values.ndim == 1 or 1 in values.shape:
+        yield _named(name, unit), values.ravel()
+        return
+    for index, column in enumerate(values if kind is not None else values.T, start=1):
+        yield _named(f"{name}(:,{index})", unit), column
+
+
+def tdms(path: Path) -> list[RawTable]:
+    """Return the groups of a TDMS file.
+
+    Raises:
+        InputError: it is damaged, or holds no channels of numbers.
+        ModuleNotFoundError: nptdms is not installed; names the extra.
+    """
+    nptdms = needed("nptdms", str(path))
+    told = _Told()
+    logging.getLogger("nptdms").handlers = [told]
+    try:
+        with warnings.catch_warnings(action="ignore"), nptdms.TdmsFile.open(path) as file:
+            for group in file.groups():
+                require_moderate(path, max((len(each) for each in group.channels()), default=0), len(group.channels()))
+            groups = [(group.name, _tdms_group(group)) for group in file.groups()]
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails anywhere in its reader
+        raise InputError(str(path), f"is a damaged TDMS file: {first_line(error)}") from None
+    notes = (("torn", told.first),) if told.first else ()
+    return [replace(table, notes=notes) for name, columns in groups for table in _tables(columns, name)] or _none(path)
+
+
+class _Told(logging.Handler):
+    """Keeps the first thing that a library complains of."""
+
+    first = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.first = self.first or " ".join(record.getMessage().split())
+
+
+def _tdms_group(group: Any) -> Columns:
+    columns: Columns = {}
+    for channel in group.channels():
+        values = channel[:]
+        if values.dtype.kind == "M":
+            columns[channel.name] = [str(np.datetime_as_string(each, unit="us")) for each in values]
+        elif values.dtype.kind in NUMBERS:
+            if channel.properties.get("wf_increment") and "time [s]" not in columns:
+                columns["time [s]"] = channel.time_track()
+            unit = channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or ""
+            columns[_named(channel.name, str(unit))] = values.astype(np.float64)
+    return columns
+
+
+def mdf4(path: Path) -> list[RawTable]:
+    """Return the channel groups of an MDF file of version 4, as loggers of test rigs write it.
+
+    Raises:
+        InputError: it is of another version, is damaged, or holds no channels of numbers.
+        ModuleNotFoundError: asammdf is not installed; names the extra.
+    """
+    asammdf = needed("asammdf", str(path))
+    try:
+        with warnings.catch_warnings(action="ignore"), _opened_mdf(asammdf, path) as file:
+            if not file.version.startswith("4"):
+                raise InputError(str(path), f"is MDF of version {file.version}, allowed is 4: save it as MDF4")
+            groups = [(f"group {index + 1}", _mdf_group(path, file, index)) for index in range(len(file.groups))]
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails anywhere in its reader
+        raise InputError(str(path), f"is a damaged MDF file: {first_line(error)}") from None
+    return [table for name, columns in groups for table in _tables(columns, name)] or _none(path)
+
+
+def _opened_mdf(asammdf: Any, path: Path) -> Any:
+    """Return a file of asammdf, whose objects, where they were not made, complain of that when they go.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        try:
+            return asammdf.MDF(path)
+        except Exception as error:  # a damaged file fails anywhere in its reader
+            said = first_line(error)
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
+    raise InputError(str(path), f"is a damaged MDF file: {said}")
+
+
+def _mdf_group(path: Path, file: Any, index: int) -> Columns:
+    group = file.groups[index]
+    require_moderate(path, group.channel_group.cycles_nr, len(group.channels))
+    columns: Columns = {}
+    for number, channel in enumerate(group.channels):
+        if number == file.masters_db.get(index):
+            continue
+        signal = file.get(group=index, index=number)
+        if signal.samples.ndim == 1 and signal.samples.dtype.kind in NUMBERS:
+            columns.setdefault("time [s]", np.asarray(signal.timestamps, dtype=np.float64))
+            columns[_named(channel.name, signal.unit or "")] = signal.samples.astype(np.float64)
+    return columns
+
+
+def _tables(columns: Columns, name: str) -> list[RawTable]:
+    """Return a table for each length among columns, the longest first."""
+    lengths = sorted({len(each) for each in columns.values() if len(each) > 1}, reverse=True)
+    by_length = [{key: each for key, each in columns.items() if len(each) == length} for length in lengths]
+    return [
+        RawTable(f"{name}, {length} rows", "row", partial(column_rows, chosen), length=length)
+        for length, chosen in zip(lengths, by_length, strict=True)
+    ]
+
+
+def _by_length(path: Path, columns: Columns) -> list[RawTable]:
+    return _tables(columns, "vectors") or _none(path)
+
+
+def _none(path: Path) -> list[RawTable]:
+    raise InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
+
+
+def _named(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _text(value: object) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -1,0 +1,128 @@
+"""HDF5, MATLAB 7.3, TDMS and MDF4 as their own libraries write them: the same recording out of each."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.exports.column_mapping import read_mapping
+from config.exports.export_preview import preview
+from config.historian_export import read_export
+
+TIME_S = np.arange(0.0, 2.0, 0.01)
+POSITION_MM = 20.0 + 10.0 * np.sin(TIME_S)
+COMMAND_BAR = 0.6 + 0.2 * np.cos(TIME_S)
+
+
+def write_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        group = file.create_group("run 1")
+        for name, values, unit in (("t", TIME_S, "s"), ("PV", POSITION_MM, "mm"), ("OUT", COMMAND_BAR, "bar")):
+            group[name] = values
+            group[name].attrs["units"] = unit
+        group["note"] = "by nobody"
+        group["image"] = np.zeros((3, 4, 5))
+        file["calibration"] = np.arange(7.0)
+
+
+def write_matlab(path: Path) -> None:
+    """As `save -v7.3` writes a structure of column vectors: 512 bytes before, turned round, classes as attributes."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        log = file.create_group("log")
+        log.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in (("t", TIME_S), ("PV", POSITION_MM), ("OUT", COMMAND_BAR)):
+            log.create_dataset(name, data=values[None, :]).attrs["MATLAB_class"] = np.bytes_("double")
+        text = log.create_dataset("who", data=np.frombuffer(b"nobody", np.uint8).astype(np.uint16)[:, None])
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+        file.create_group("#refs#")["a"] = np.arange(9.0)
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Nov 23 06:00:00 2026 HDF5 schema 1.00 ."
+    with path.open("r+b") as file:
+        file.write(head.ljust(124) + b"\x00\x02IM")
+
+
+def write_tdms(path: Path) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    told = {"wf_increment": 0.01, "wf_start_offset": 0.0, "wf_samples": len(TIME_S)}
+    with TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("rig", "PV", POSITION_MM, properties={"unit_string": "mm", **told}),
+                ChannelObject("rig", "OUT", COMMAND_BAR, properties={"unit_string": "bar", **told}),
+                ChannelObject("slow", "temperature", np.arange(3.0)),
+            ]
+        )
+
+
+def write_mdf(path: Path) -> None:
+    import asammdf
+
+    with asammdf.MDF(version="4.10") as file:
+        signals = [
+            asammdf.Signal(samples=values, timestamps=TIME_S, name=name, unit=unit)
+            for name, values, unit in (("PV", POSITION_MM, "mm"), ("OUT", COMMAND_BAR, "bar"))
+        ]
+        file.append(signals)
+        file.append([asammdf.Signal(samples=np.arange(3.0), timestamps=np.arange(3.0), name="temperature")])
+        file.save(path, overwrite=True)
+
+
+FILES: dict[str, tuple[Callable[[Path], None], list[str]]] = {
+    "run.h5": (write_hdf5, ["time_s=run 1.t", "position_m=run 1.PV", "command_pa=run 1.OUT"]),
+    "run.mat": (write_matlab, ["time_s=log.t", "position_m=log.PV:mm", "command_pa=log.OUT:bar"]),
+    "run.tdms": (write_tdms, ["time_s=time", "position_m=PV", "command_pa=OUT"]),
+    "run.mf4": (write_mdf, ["time_s=time", "position_m=PV", "command_pa=OUT"]),
+}
+each_file = pytest.mark.parametrize("name", FILES)
+
+
+@each_file
+def test_it_is_read_as_it_was_measured(name: str, tmp_path: Path) -> None:
+    write, words = FILES[name]
+    write(tmp_path / name)
+    recording = read_export(tmp_path / name, read_mapping(words), None)
+    np.testing.assert_allclose(recording.time_s, TIME_S, atol=1e-12)
+    np.testing.assert_allclose(recording.position_m, 1e-3 * POSITION_MM)
+    np.testing.assert_allclose(recording.columns["command_pa"], 1e5 * COMMAND_BAR)
+
+
+@each_file
+def test_the_proposal_reads_it(name: str, tmp_path: Path) -> None:
+    write, _ = FILES[name]
+    write(tmp_path / name)
+    proposed = preview(tmp_path / name)
+    columns = [word for word in proposed.words if "=" in word]
+    assert [word.partition("=")[0] for word in columns] == ["time_s", "position_m", "command_pa"]
+    assert len(read_export(tmp_path / name, read_mapping(columns), 0.04)) == len(TIME_S)
+
+
+@each_file
+@pytest.mark.parametrize("kept", [0.1, 0.5, 0.9])
+def test_a_torn_file_is_one_line_or_what_is_left_of_it(name: str, kept: float, tmp_path: Path) -> None:
+    write, words = FILES[name]
+    write(tmp_path / name)
+    content = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(content[: round(kept * len(content))])
+    assert said_of(tmp_path / name, words).count("\n") == 0
+
+
+def said_of(path: Path, words: list[str]) -> str:
+    try:
+        return f"{len(read_export(path, read_mapping(words), None))} rows"
+    except InputError as error:
+        return str(error)
+
+
+def test_without_vectors_it_says_so(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "none.h5", "w") as file:
+        file["note"] = "nothing"
+    with pytest.raises(InputError, match="holds no vectors of numbers"):
+        preview(tmp_path / "none.h5")
