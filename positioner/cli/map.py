@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 HELP = "print the supervisory register map"
 EXAMPLE = "positioner map --format md"
 
+FOR_OTHERS = ("telegraf", "modbus-exporter", "home-assistant", "node-red")
+"""Programs that are configured to read it."""
 COLUMNS = (
     *("name", "address", "address_from_1", "type", "word_order", "unit", "minimum", "maximum", "access"),
     *("writer", "text"),  # the role that may write it on a secured connection
@@ -18,9 +20,14 @@ COLUMNS = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("--format", choices=("md", "csv", "json", "telegraf"), default="md")
     parser.add_argument(
-        "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file that --format telegraf is for"
+        "--format",
+        choices=("md", "csv", "json", *FOR_OTHERS, "eds"),
+        default="md",
+        help="md, csv, json: the map; eds: the data sheet of the simulated CANopen device; else a configuration for it",
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="CONFIG.toml", help="the daemon's file that a configuration is for"
     )
     parser.add_argument("--reasons", action="store_true", help="print what the numbers in *_reason mean instead")
 
@@ -31,22 +38,27 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: a configuration for another program, and no daemon's file to say where; or a fault in it.
     """
-    if arguments.format == "telegraf":
-        _telegraf(arguments.config)
+    if arguments.format in FOR_OTHERS:
+        _configuration(arguments.format, arguments.config)
+        return 0
+    if arguments.format == "eds":
+        from fieldbus.canopen.eds import eds_text
+
+        print(eds_text(), end="")
         return 0
     rows = _reasons() if arguments.reasons else _map()
     {"md": _markdown, "csv": _csv, "json": _json}[arguments.format](rows)
     return 0
 
 
-def _telegraf(config: Path | None) -> None:
+def _configuration(reader: str, config: Path | None) -> None:
     from config.daemon_file import load_valves
     from config.errors import InputError
-    from positioner.cli.parts.telegraf import telegraf
+    from positioner.cli.parts.register_readers import configuration
 
     if config is None:
-        raise InputError("--format telegraf", "needs --config, the daemon's file that says where the registers are")
-    print(telegraf(load_valves(config), str(config)), end="")
+        raise InputError(f"--format {reader}", "needs --config, the daemon's file that says where the registers are")
+    print(configuration(reader, load_valves(config), str(config)), end="")
 
 
 def _map() -> list[dict[str, object]]:

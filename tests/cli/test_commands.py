@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import re
 import socket
 import struct
 import subprocess
@@ -14,7 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
+import config
 from config.recording import read_recording
 from config.registers import REGISTERS
 from positioner.cli.main import COMMANDS, main
@@ -183,14 +186,67 @@ def test_telegraf_reads_each_value_where_it_stands_of_every_valve(tmp_path: Path
             assert struct.unpack(f">{letter}", struct.pack(f">{len(words)}H", *words)) == (1.0,)
 
 
-def test_telegraf_needs_to_know_where_and_speaks_no_tls(tmp_path: Path, capsys: Capture) -> None:
-    assert main(["map", "--format", "telegraf"]) == 2
+READERS = {
+    "telegraf": "Telegraf",
+    "modbus-exporter": "modbus_exporter",
+    "home-assistant": "Home",
+    "node-red": "Node-RED",
+}
+
+
+def written_for(reader: str, folder: Path, capsys: Capture) -> str:
+    path = folder / "fleet.toml"
+    valve = "[[valve]]\nname = 'FV-{0}'\nunit = {0}\nstroke_m = 0.1\n[valve.device]\nport = 50{0}\n"
+    path.write_text("".join(valve.format(n) for n in (3, 4)) + "[supervisory]\nport = 5511\n")
+    assert main(["map", "--format", reader, "--config", str(path)]) == 0
+    return capsys.readouterr().out
+
+
+def test_modbus_exporter_reads_every_register_as_the_input_register_that_it_is(tmp_path: Path, capsys: Capture) -> None:
+    text = written_for("modbus-exporter", tmp_path, capsys)
+    assert "# FV-4: /modbus?target=127.0.0.1:5511&sub_target=4&module=positioner" in text
+    (module,) = yaml.safe_load(text)["modules"]
+    read = {each["name"]: (each["address"], each["dataType"], each["endianness"]) for each in module["metrics"]}
+    assert read == {f"positioner_{each.name}": (300_000 + each.address, each.type, "big") for each in REGISTERS}
+
+
+def test_home_assistant_has_a_hub_for_an_address_and_the_sensors_of_each_valve(tmp_path: Path, capsys: Capture) -> None:
+    (hub,) = yaml.safe_load(written_for("home-assistant", tmp_path, capsys))["modbus"]
+    assert (hub["type"], hub["host"], hub["port"]) == ("tcp", "127.0.0.1", 5511)
+    sensors = {each["unique_id"]: each for each in hub["sensors"]}
+    assert len(sensors) == len(hub["sensors"]), "two of one identity"
+    position = sensors["positioner_fv_4_position"]
+    assert (position["slave"], position["address"], position["input_type"]) == (4, 104, "input")
+    assert (position["data_type"], position["unit_of_measurement"], position["precision"]) == ("float32", "p.u.", 6)
+
+
+def test_node_reds_flow_asks_for_every_register_of_every_valve(tmp_path: Path, capsys: Capture) -> None:
+    nodes = {each["id"]: each for each in json.loads(written_for("node-red", tmp_path, capsys))}
+    wires = [to for each in nodes.values() for out in each.get("wires", []) for to in out]
+    assert set(wires) <= nodes.keys()
+    asks = [each for each in nodes.values() if each.get("name") == "ask"]
+    assert [re.search(r"unit = (\d+)", each["func"])[1] for each in asks] == ["3", "4"]  # type: ignore[index]
+    blocks = json.loads(re.search(r"blocks = (.*);", asks[0]["func"])[1])  # type: ignore[index]
+    assert all(count <= 125 for _, count in blocks)
+    for register in REGISTERS:
+        assert any(start <= register.address and register.end <= start + count for start, count in blocks)
+
+
+def test_the_data_sheet_is_the_one_that_is_shipped(capsys: Capture) -> None:
+    assert main(["map", "--format", "eds"]) == 0
+    assert capsys.readouterr().out == (Path(config.__file__).parent / "profiles" / "positioner.eds").read_text()
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_reader_needs_to_know_where_and_speaks_no_tls(reader: str, tmp_path: Path, capsys: Capture) -> None:
+    assert main(["map", "--format", reader]) == 2
     assert "needs --config" in one_line(capsys)
     path = tmp_path / "daemon.toml"
     tls = "authority = 'a.pem'\ncertificate = 'c.pem'\nkey = 'k.pem'\n"
     path.write_text(DAEMON.format(port=5020) + f"[supervisory.tls]\n{tls}")
-    assert main(["map", "--format", "telegraf", "--config", str(path)]) == 2
-    assert "Telegraf speaks no Modbus/TCP Security" in one_line(capsys)
+    assert main(["map", "--format", reader, "--config", str(path)]) == 2
+    assert READERS[reader] in (said := one_line(capsys))
+    assert "speaks no Modbus/TCP Security" in said
 
 
 def test_simulate_holds_each_pressure_until_the_next_time(tmp_path: Path) -> None:

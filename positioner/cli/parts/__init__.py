@@ -13,7 +13,8 @@ A command imports from here what it needs when it runs.
     page_address                                where a page listens
     served_valves                               the valves of daemons' files, and by which certificates they are read
     output_files                                what `--out` and `--json` ask for
-    telegraf                                    the register map as Telegraf's configuration
+    register_readers                            the register map as configurations of programs that read it:
+    telegraf, modbus_exporter, home_assistant, node_red     one each
     sampling                                    when a device samples, for `doctor --nudge-pa`
     authority, progress                         a test certificate authority; progress on a terminal
     breaking_off                                Ctrl-C during long work: what is known is said

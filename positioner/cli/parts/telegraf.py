@@ -8,8 +8,6 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from config.errors import InputError
-
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from config.registers import Register
@@ -17,17 +15,11 @@ if TYPE_CHECKING:
 MEASUREMENT = "positioner"
 
 
-def telegraf(files: "Sequence[DaemonFile]", source: str) -> str:
-    """Return the configuration for the valves of a daemon's file.
-
-    Raises:
-        InputError: the registers are served on TLS, which Telegraf does not speak on Modbus.
-    """
+def telegraf(files: "Sequence[DaemonFile]") -> str:
+    """Return the configuration for the valves of a daemon's file."""
     from config.registers import REGISTERS
 
-    if any(file.supervisory.tls for file in files):
-        raise InputError(source, "supervisory.tls: Telegraf speaks no Modbus/TCP Security; serve it where it runs")
-    return "\n".join(line for file in files for line in _valve(file, REGISTERS))
+    return "".join(f"{line}\n" for file in files for line in _valve(file, REGISTERS))
 
 
 def _valve(file: "DaemonFile", registers: "Sequence[Register]") -> Iterator[str]:
