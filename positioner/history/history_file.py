@@ -201,6 +201,18 @@ def require_ours(path: Path) -> None:
         raise InputError(str(path), f"is a history of version {version}, allowed is {VERSION}; move it away")
 
 
+def require_tables(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse a file whose tables are not those that its version says: it would be read and written in part.
+
+    Raises:
+        InputError: there are others.
+        DatabaseError: it is damaged.
+    """
+    there = {said for (said,) in connection.execute("SELECT sql FROM sqlite_master WHERE type = 'table'")}
+    if there != set(schema()):
+        raise InputError(str(path), f"has other tables than a history of version {VERSION} has; move it away")
+
+
 def _connected(path: Path) -> sqlite3.Connection:
     """Open the file to write.
 
@@ -213,6 +225,7 @@ def _connected(path: Path) -> sqlite3.Connection:
     try:
         if said := connection.execute("PRAGMA quick_check(1)").fetchone()[0].removeprefix("ok"):
             raise sqlite3.DatabaseError(said)
+        require_tables(connection, path)
         connection.execute("PRAGMA journal_mode = WAL").fetchall()
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute(f"PRAGMA wal_autocheckpoint = {WAL_PAGES}").fetchall()

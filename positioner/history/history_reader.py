@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 from config.errors import InputError
 from positioner.history.entries import Entry, Event
-from positioner.history.history_file import FILE_NAME, clock_of, require_ours
+from positioner.history.history_file import FILE_NAME, clock_of, require_ours, require_tables
 
 E = TypeVar("E", bound=Entry)
 
@@ -33,8 +33,14 @@ class HistoryReader:
         require_ours(self.path)
         try:
             self._connection = sqlite3.connect(f"file:{quote(str(self.path))}?mode=ro", uri=True, isolation_level=None)
-            self._connection.execute("SELECT 1 FROM events LIMIT 1").fetchall()
         except sqlite3.Error as error:
+            raise InputError(str(self.path), f"cannot be read: {error}") from None
+        try:
+            require_tables(self._connection, self.path)
+        except (sqlite3.Error, InputError) as error:
+            self._connection.close()
+            if isinstance(error, InputError):
+                raise
             raise InputError(str(self.path), f"cannot be read: {error}") from None
 
     def __enter__(self) -> Self:

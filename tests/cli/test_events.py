@@ -18,7 +18,7 @@ from positioner.history import HistoryReader
 from positioner.history.entries import Write
 from tests.children import child, ended, running
 from tests.cli.test_daemon_process import PATIENT, daemon_file, slave_file
-from tests.history.test_history_file import event, opened, write
+from tests.history.test_history_file import altered, event, opened, write
 
 WITHIN_S = 60.0
 REFERENCE = BY_NAME["reference"]
@@ -123,3 +123,13 @@ def test_two_daemons_with_one_history_are_refused_before_a_device_is_touched(tmp
             done = ended("run", other)
     assert done.status == 2
     assert "history: another daemon keeps its history there" in done.log
+
+
+def test_a_daemon_with_a_history_of_an_older_version_does_not_start_and_leaves_it(tmp_path: Path) -> None:
+    content = altered(tmp_path / "history", "PRAGMA user_version = 0")
+    path = daemon_file(tmp_path, 5020, HISTORY)
+    status, _, log = ended("run", path)
+    assert status == 2
+    (line,) = [each for each in log.splitlines() if "positioner run" in each]
+    assert line.endswith("history.sqlite: is a history of version 0, allowed is 1; move it away")
+    assert (tmp_path / "history" / "history.sqlite").read_bytes() == content

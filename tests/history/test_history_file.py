@@ -235,6 +235,36 @@ def test_another_version_is_refused_in_one_line(tmp_path: Path, version: int) ->
         HistoryReader(tmp_path)
 
 
+def altered(folder: Path, statement: str) -> bytes:
+    """Return the content of a history that somebody changed, no write-ahead log beside it."""
+    with opened(folder) as file:
+        file.append([event(1)])
+    with closing(sqlite3.connect(folder / FILE_NAME)) as other:
+        other.execute("PRAGMA journal_mode = DELETE").fetchall()
+        other.execute(statement)
+        other.commit()
+    return (folder / FILE_NAME).read_bytes()
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "ALTER TABLE health DROP COLUMN friction_pa",
+        "ALTER TABLE events ADD COLUMN colour TEXT",
+        "DROP TABLE writes",
+        "PRAGMA user_version = 0",
+    ],
+)
+def test_what_is_not_whole_of_this_version_is_refused_and_neither_read_in_part_nor_touched(
+    tmp_path: Path, statement: str
+) -> None:
+    content = altered(tmp_path, statement)
+    assert said(tmp_path).endswith("move it away")
+    with pytest.raises(InputError, match="move it away"):
+        HistoryReader(tmp_path)
+    assert (tmp_path / FILE_NAME).read_bytes() == content
+
+
 def test_two_daemons_do_not_share_a_history(tmp_path: Path) -> None:
     with opened(tmp_path):
         assert said(tmp_path) == f"{tmp_path}: another daemon keeps its history there"
