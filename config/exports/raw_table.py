@@ -87,8 +87,6 @@ REFUSED = {
     b"SQLite format 3\0": 'is an SQLite database: sqlite3 -header -csv FILE "select * from TABLE" > export.csv',
     b"ARROW1": "is an Arrow (Feather) file: save it as Parquet or CSV",
     b"\x93NUMPY": "is a NumPy array without names: save it as CSV, numpy.savetxt(.., delimiter=',')",
-    b"TDSm": "is a TDMS file: export it as CSV or .xlsx",
-    b"MDF  ": "is an MDF file: export it as CSV or Parquet",
     b"%PDF": "is a PDF: export the numbers as CSV",
     b"{\\rtf": "is a document: export the numbers as CSV",
     b"\x89PNG": "is a picture: export the numbers as CSV",

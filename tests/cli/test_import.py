@@ -247,7 +247,7 @@ def test_a_wrong_answer_is_one_line_and_nothing_is_written(
     ("text", "said"),
     [
         ("[export]\n", "export.column"),
-        ("[export]\ncolumn = ['position_m=PV']\n", "export.column: time_s is given 0 times"),
+        ("[export]\ncolumn = ['position_m=PV']\n", "export.column: time_s is not given"),
         ("[export]\ncolumn = ['time_s=t', 'position_m=PV:ell', 'command_pa=u']\n", "unknown unit 'ell'"),
         ("[export]\ncolumns = ['time_s=t']\n", "export.columns"),
     ],

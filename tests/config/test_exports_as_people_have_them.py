@@ -449,8 +449,6 @@ REFUSED = {
     "SQLite": Bad(b"SQLite format 3\0" + bytes(range(256)), "SQLite database: sqlite3 -header -csv FILE"),
     "Feather": Bad(b"ARROW1\0\0", "Arrow .Feather. file: save it as Parquet or CSV"),
     "a NumPy array": Bad(b"\x93NUMPY\x01", "NumPy array without names: save it as CSV"),
-    "TDMS": Bad(b"TDSm" + bytes(8), "TDMS file: export it as CSV"),
-    "MDF": Bad(b"MDF     4.10    ", "MDF file: export it as CSV"),
     "a document": Bad(b"{\\rtf1\\ansi t,PV,OUT}", "is a document: export the numbers"),
     "a screenshot": Bad(b"\x89PNG\r\n\x1a\n", "is a picture: export the numbers"),
     "another kind of bytes": Bad(bytes(range(256)) * 4, "no text, and of no kind that is read: export it as CSV"),
