@@ -1,6 +1,7 @@
 """Every fault of device, wire and gateway in every state of the service, on each bus: does it end as documented?
 
     python -m benchmarks.campaign [--buses modbus tls rtu canopen] [--every 1] [--document docs/reliability.md]
+        [--keep FILE]
 
 A case is a bus, a state, a safe action and a fault. The simulated valve is in lockstep, the gateway's clock is given,
 so only time-outs take time. The valve is brought into the state, the fault begins, and after it:
@@ -11,10 +12,11 @@ so only time-outs take time. The valve is brought into the state, the fault begi
     estimates   what an identification applied in spite of it is right within 5 %
     recovery    an acknowledgement moves nothing; mode and reference are followed again
 
-Exit status 1 when a case does otherwise; it is printed.
+Exit status 1 when a case does otherwise; it is printed. With --keep it may be broken off; the same command goes on.
 """
 
 import argparse
+import json
 import logging
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
@@ -389,18 +391,30 @@ def _cell(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     return f"{len(outcomes)}; {', '.join(names)}{most}"
 
 
+def _kept(path: Path | None) -> dict[str, Outcome]:
+    """Return what earlier runs found, by case."""
+    if path is None or not path.exists():
+        return {}
+    lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return {case: Outcome(Fault(fault), cycles, violations) for case, fault, cycles, violations in lines}
+
+
 def main() -> int:
     """Run the cases and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--buses", nargs="+", choices=BUSES, default=BUSES)
     parser.add_argument("--every", type=int, default=1, help="run every n-th case")
+    parser.add_argument("--keep", type=Path, help="a file that keeps what was found")
     parser.add_argument("--document", type=Path, help="write the table between its marks there")
     arguments = parser.parse_args()
     logging.disable(logging.CRITICAL)
-    outcomes = []
+    outcomes, kept = [], _kept(arguments.keep)
     for case in all_cases(arguments.buses)[:: arguments.every]:
-        outcome = run_case(case)
+        outcome = kept.get(str(case)) or run_case(case)
         outcomes.append((case, outcome))
+        if arguments.keep is not None and str(case) not in kept:
+            with arguments.keep.open("a", encoding="utf-8") as file:
+                file.write(json.dumps([str(case), outcome.fault, outcome.cycles, outcome.violations]) + "\n")
         for violation in outcome.violations:
             print(f"{case}: {violation}", flush=True)
     rows = table(outcomes)
