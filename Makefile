@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint browser bench campaign fuzz kills endurance blind journey docs clean
+.PHONY: venv demo test suite lint browser bench campaign fuzz kills endurance blind journey locked sbom docs clean
 
 venv: $(READY)
 
@@ -54,6 +54,21 @@ blind: $(READY)         ## hours, can be broken off: what is missing of the blin
 
 journey: $(READY) browser ## minutes: a dropped recording with a hidden effect, the whole library, to the error at the floor, in a browser
 	$(BIN)/python -m benchmarks.workbench_journey
+
+locked: $(READY)        ## the packages of a gateway, pinned with their hashes: after a change of pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[supply]'
+	$(BIN)/pip-compile --quiet --generate-hashes --strip-extras --no-header --no-annotate --no-emit-index-url \
+	    --no-emit-trusted-host --no-emit-find-links --build-deps-for wheel --extra tls --extra canopen --extra metrics \
+	    --output-file deploy/locked/gateway.txt pyproject.toml
+
+sbom: $(READY)          ## what a gateway installs, as CycloneDX: dist/positioner.cdx.json
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[supply]'
+	$(PYTHON) -m venv --clear build/gateway
+	build/gateway/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r deploy/locked/gateway.txt
+	build/gateway/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation .
+	mkdir -p dist
+	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --of JSON -o dist/positioner.cdx.json \
+	    build/gateway/bin/python
 
 docs: $(READY)          ## the documents' pictures and figures, made anew
 	$(BIN)/positioner reproduce --out docs/img

@@ -1,7 +1,7 @@
 """Every fault of device, wire and gateway in every state of the service, on each bus: does it end as documented?
 
     python -m benchmarks.campaign [--buses modbus tls rtu canopen] [--every 1] [--document docs/reliability.md]
-        [--keep FILE]
+        [--keep FILE...] [--only-kept]
 
 A case is a bus, a state, a safe action and a fault. The simulated valve is in lockstep, the gateway's clock is given,
 so only time-outs take time. The valve is brought into the state, the fault begins, and after it:
@@ -402,9 +402,9 @@ def _cell(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     return f"{len(outcomes)}; {', '.join(names)}{most}"
 
 
-def _kept(path: Path | None) -> dict[str, Outcome]:
+def _kept(path: Path) -> dict[str, Outcome]:
     """Return what earlier runs found, by case."""
-    if path is None or not path.exists():
+    if not path.exists():
         return {}
     lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
     return {case: Outcome(Fault(fault), cycles, violations) for case, fault, cycles, violations in lines}
@@ -415,16 +415,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--buses", nargs="+", choices=BUSES, default=BUSES)
     parser.add_argument("--every", type=int, default=1, help="run every n-th case")
-    parser.add_argument("--keep", type=Path, help="a file that keeps what was found")
+    parser.add_argument("--keep", type=Path, nargs="+", default=(), help="what was found; added to the first")
+    parser.add_argument("--only-kept", action="store_true", help="the table of what was found so far")
     parser.add_argument("--document", type=Path, help="write the table between its marks there")
     arguments = parser.parse_args()
     logging.disable(logging.CRITICAL)
-    outcomes, kept = [], _kept(arguments.keep)
+    outcomes, kept = [], {case: each for path in arguments.keep for case, each in _kept(path).items()}
     for case in all_cases(arguments.buses)[:: arguments.every]:
+        if arguments.only_kept and str(case) not in kept:
+            continue
         outcome = kept.get(str(case)) or run_case(case)
         outcomes.append((case, outcome))
-        if arguments.keep is not None and str(case) not in kept:
-            with arguments.keep.open("a", encoding="utf-8") as file:
+        if arguments.keep and str(case) not in kept:
+            with arguments.keep[0].open("a", encoding="utf-8") as file:
                 file.write(json.dumps([str(case), outcome.fault, outcome.cycles, outcome.violations]) + "\n")
         for violation in outcome.violations:
             print(f"{case}: {violation}", flush=True)

@@ -41,6 +41,7 @@ def _accept(listener: socket.socket, port: int, spoiler: Spoiler) -> None:
 
 
 def _carry(near: socket.socket, port: int, spoiler: Spoiler) -> None:
+    spoiler.forget()
     with near, suppress(OSError), socket.create_connection(("127.0.0.1", port)) as far:
         while frame := _frame(near):
             if spoiler.takes_request():
