@@ -33,7 +33,7 @@ from positioner.daemon.health.health_file import read_record
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
 from positioner.daemon.recorder import files_of
-from positioner.dcs import Dcs
+from positioner.dcs import Dcs, DcsError
 from positioner.estimation.acceptance import Ratios
 from positioner.history.history_reader import HistoryReader
 from tests.children import FORKS, Child, child
@@ -205,10 +205,18 @@ class Run:
     def drive(self) -> bool:
         """Have the stem move; return whether it may be."""
         self.cycles(2)
-        self.dcs.set("acknowledge", 1)
-        self.dcs.set("mode", Mode.AUTOMATIC)
+        may = until(self._automatic)
         self.dcs.set("reference", self._site.by.uniform(0.2, 0.8))
-        return until(lambda: self.dcs.get("mode") == Mode.AUTOMATIC)
+        return may
+
+    def _automatic(self) -> bool:
+        """Acknowledge, for a machine that stood still is a fault, and choose the mode; return whether it is in force."""
+        self.dcs.set("acknowledge", 1)
+        with suppress(DcsError):
+            self.cycles(1)
+            self.dcs.set("mode", Mode.AUTOMATIC)
+            self.cycles(1)
+        return self.dcs.get("mode") == Mode.AUTOMATIC
 
     def is_still(self, held_pa: float, seen: Seen) -> None:
         """Require that it holds what the device held, and follows nothing."""

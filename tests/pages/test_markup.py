@@ -1,4 +1,4 @@
-"""Names and cells of files stay text in the pages: what is given to a page as markup is listed here, with the reason."""
+"""Names and cells of files stay text in the pages: what is given to one as markup is listed here, with the reason."""
 
 import ast
 from pathlib import Path
