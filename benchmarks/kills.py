@@ -210,7 +210,7 @@ class Run:
         return may
 
     def _automatic(self) -> bool:
-        """Acknowledge, for a machine that stood still is a fault, and choose the mode; return whether it is in force."""
+        """Acknowledge, for a machine that stood still is a fault, and choose the mode; return whether it holds."""
         self.dcs.set("acknowledge", 1)
         with suppress(DcsError):
             self.cycles(1)
