@@ -1,14 +1,19 @@
 """The workbench page measured in Debian's Chromium: start-up, memory, a slider's curve, and half a million samples.
 
-python -m benchmarks.workbench_page
+python -m benchmarks.workbench_page [--minutes 10]
+
+Of a slider's curve also the processor time that server and browser take for it, which tells of the page where other
+programs are busy besides. With `--minutes` the page is used for so long in place of the rest: drags, and loaded anew.
 """
 
+import argparse
+import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -16,6 +21,7 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
+from benchmarks.operator_page import cpu
 from config.recording import Recording
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
@@ -24,9 +30,9 @@ SEED = 7
 PERIOD_S = 0.01
 SLIDER_S, LONG_SAMPLES = 60.0, 500_000
 MOVES = 30
-ROUNDS, DRAGS, RELOADS = 3, 5, 5
-"""Of long use."""
-LONGEST_MS = 20_000
+LOOKS = 10
+"""At the server's memory, while it is used for long."""
+LONGEST_MS = 600_000
 TIME_PLOT = "position, error and pressure over time"
 WATCHED = """name => {
     const plot = document.querySelector(`[data-testid="${name}"]`);
@@ -42,10 +48,15 @@ PANNED = """([name, begin, end]) => document.querySelector(`[data-testid="${name
     "plotly_relayout", {"xaxis.range[0]": begin, "xaxis.range[1]": end})"""
 
 
-def main() -> None:
+def main(minutes: float | None) -> None:
     """Print the figures."""
     with tempfile.TemporaryDirectory() as folder:
         seal(Path(folder, "case"), hide(SEED, duration_s=SLIDER_S, period_s=PERIOD_S))
+        if minutes is not None:
+            case, known = (str(Path(folder, "case", name)) for name in ("fit.csv", "valve.toml"))
+            with served(case, "--valve", known) as (address, process, _), page_at(address) as page:
+                _used_for_long(page, process, minutes)
+            return
         case = Path(folder, "case", "fit.csv")
         valve = str(Path(folder, "case", "valve.toml"))
         with served(str(case), "--valve", valve) as (address, process, started_s):
@@ -53,10 +64,8 @@ def main() -> None:
             print(f"server alone: {_resident_mb(process):.0f} MB")
             with page_at(address) as page:
                 print(f"first visit: {_first_visit_s(page):.1f} s until the curves stand")
-                moves = list(_moved_ms(page))
-                print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}")
+                _drag_is_told(page, process)
                 print(f"server with one tab: {_resident_mb(process):.0f} MB")
-                _used_for_long(page, process)
         long = Path(folder, "long.csv")
         _repeated(Recording.read(case), LONG_SAMPLES).write(long)
         with served(str(long), "--valve", valve) as (address, process, _), page_at(address) as page:
@@ -84,15 +93,55 @@ def _moved_ms(page: Page, off_px: int = 0) -> Iterator[float]:
     page.mouse.up()
 
 
-def _used_for_long(page: Page, process: "subprocess.Popen[str]") -> None:
-    """Print what the server takes as one works on: an hour's worth of drags, and the page loaded again and again."""
-    for round_ in range(ROUNDS):
-        moves = [each for _ in range(DRAGS) for each in _moved_ms(page)]
-        for _ in range(RELOADS):
+def _drag_is_told(page: Page, process: "subprocess.Popen[str]") -> None:
+    """Print how soon a curve follows, and the processor time that it takes."""
+    list(_moved_ms(page))  # the first takes what is done once
+    before_s = cpu(process.pid), _browser_cpu_s()
+    moves = list(_moved_ms(page, 1))
+    server_ms, browser_ms = (
+        1e3 * (after_s - each_s) / MOVES
+        for each_s, after_s in zip(before_s, (cpu(process.pid), _browser_cpu_s()), strict=True)
+    )
+    print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}, load {os.getloadavg()[0]:.0f}")
+    print(f"processor time of a move: server {server_ms:.0f} ms, page in the browser {browser_ms:.0f} ms", flush=True)
+
+
+def _browser_cpu_s() -> float:
+    """Return the processor time of the browsers' pages that this process has begun, s."""
+    parents: dict[int, int] = {}
+    pages = set()
+    for folder in Path("/proc").iterdir():
+        with suppress(OSError):
+            if folder.name.isdigit():
+                parents[int(folder.name)] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+                if "--type=renderer" in (folder / "cmdline").read_text():
+                    pages.add(int(folder.name))
+
+    def is_ours(pid: int) -> bool:
+        return pid == os.getpid() or (pid in parents and is_ours(parents[pid]))
+
+    return sum(cpu(pid) for pid in pages if is_ours(pid))
+
+
+def _used_for_long(page: Page, process: "subprocess.Popen[str]", minutes: float) -> None:
+    """Print what the server takes as one works on: a slider dragged, the page loaded again, over and over."""
+    _first_visit_s(page)
+    drags = reloads = 0
+    seen_mb = []
+    begin_s = time.monotonic()
+    for look in range(1, LOOKS + 1):
+        while time.monotonic() - begin_s < 60.0 * minutes * look / LOOKS:
+            for _ in _moved_ms(page, reloads % 2):
+                drags += 1
             page.reload()
-            page.locator(".scatterlayer .trace").first.wait_for()
-        used = f"{len(moves)} moves and {RELOADS} visits"
-        print(f"server after {used} more, round {round_ + 1}: {_resident_mb(process):.0f} MB", flush=True)
+            _first_visit_s(page)
+            reloads += 1
+        seen_mb.append(_resident_mb(process))
+        print(
+            f"{drags} moves, {reloads} visits: server {seen_mb[-1]:.0f} MB, load {os.getloadavg()[0]:.0f}", flush=True
+        )
+    grown = seen_mb[-1] - seen_mb[LOOKS // 2 - 1]
+    print(f"grown in the second half of {minutes:g} min: {grown:+.1f} MB")
 
 
 def _panned_ms(page: Page, begin_s: float, end_s: float) -> float:
@@ -151,4 +200,6 @@ def _told(milliseconds: list[float]) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, help="use one page for so long, and print the server's memory")
+    main(parser.parse_args().minutes)

@@ -23,6 +23,13 @@ def test_it_says_what_compare_says() -> None:
     assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-12)
 
 
+def test_ten_million_samples_are_refused_at_once_as_for_a_fit() -> None:
+    still = np.zeros(10_000_000)
+    recording = Recording({"time_s": 1e-3 * np.arange(still.size), "command_pa": still, "position_m": still})
+    with pytest.raises(InputError, match="10000000 samples would take hours to fit; allowed are 1000000 samples"):
+        LiveModel(recording, HIDDEN.base)
+
+
 def test_a_move_is_a_parameter_of_the_valve_file_and_is_undone() -> None:
     live = LiveModel(HIDDEN.fit, HIDDEN.base)
     given = live.curve().rms_m

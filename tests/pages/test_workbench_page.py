@@ -1,5 +1,6 @@
 """A person's way through the workbench page, in a real browser: from a dropped file to an error at the floor."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from sim.own_effect import EXAMPLE
 from tests.pages.browser import needs_chromium, opened, served
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
@@ -99,6 +101,7 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         expect(page.get_by_test_id("found")).to_have_attribute("data-kind", "good")
         expect(page.get_by_test_id("found-sentence")).to_contain_text("preload")
         expect(page.get_by_test_id("candidates")).to_contain_text("more than 10 needed")
+        expect(page.get_by_role("button", name="add backlash", exact=True)).to_be_enabled()
         page.get_by_test_id("add").click()
         expect(page.get_by_test_id("journal-step")).to_contain_text("falls from")
         expect(page.get_by_test_id("verdict")).to_have_attribute("data-kind", "good")
@@ -144,3 +147,30 @@ def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, case: 
         page.get_by_test_id("confirm").click()
         expect(page.get_by_test_id("opened")).to_contain_text("export.csv: 1001 samples over 10 s")
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+def test_another_recording_is_held_out_and_an_effect_of_ones_own_is_written(address: str, case: Path) -> None:
+    with opened(address) as page:
+        drop(page, "drop", case / "fit.csv")
+        expect(page.get_by_test_id("opened")).to_be_visible()
+        drop(page, "drop-valve", case / "valve.toml")
+        shown(page)
+        page.get_by_test_id("held-out").click()
+        drop(page, "drop-held-out", case / "test.csv")
+        expect(page.get_by_test_id("held-out")).to_contain_text("held out: test.csv")
+
+        # What is wrong with an effect is said with its line; mended, it compiles and may be tried.
+        page.get_by_test_id("own-effect").click()
+        text = EXAMPLE.read_text(encoding="utf-8")
+        page.get_by_test_id("effect-name").fill("tight")
+        page.locator(".cm-content").fill(text.replace("depth = (x", "depth = x)"))
+        page.get_by_test_id("effect-save").click()
+        expect(page.get_by_test_id("effect-said")).to_contain_text("line 30: unmatched ')'")
+        page.locator(".cm-content").fill(text)
+        page.get_by_test_id("effect-save").click()
+        expect(page.get_by_test_id("effect-said")).to_have_text("tight compiles, and joins the race")
+
+        with page.expect_download() as saved:
+            page.get_by_test_id("notebook").click()
+        cells = json.loads(Path(saved.value.path()).read_text())["cells"]
+        assert "test.csv" in "".join(line for cell in cells for line in cell["source"])

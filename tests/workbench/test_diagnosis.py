@@ -20,7 +20,7 @@ from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.fit.fitting import fit
 from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.experiment import MENU, experiment
-from workbench.select.extension import extension_of
+from workbench.select.extension import extend, extension_of
 from workbench.select.extension_journal import Journal, write_extended
 
 BARE = drawn_valve(np.random.default_rng(11))
@@ -50,6 +50,17 @@ def test_the_best_is_listed_first_and_the_preview_ranks_all(diagnosed: Diagnosis
     assert diagnosed.candidates[0].name == "ip_lag"
     assert {each.name for each in diagnosed.preview} == {"ip_lag", "sensor_lag"}
     assert diagnosed.preview[0].score >= diagnosed.preview[1].score
+
+
+def test_what_is_added_by_hand_goes_on_from_the_fits_of_the_diagnosis(
+    lagging: tuple[Recording, Recording], diagnosed: Diagnosis
+) -> None:
+    there = diagnosed.fit_with(("sensor_lag",))
+    assert there is not None
+    assert diagnosed.fit_with(("sensor_lag", "ip_lag")) is None
+    added = extend(lagging[0], SEED, ("sensor_lag",), test=lagging[1], diagnosis=diagnosed)
+    assert added.refitted is diagnosed.base.fit
+    assert added.extended.cost <= there.cost
 
 
 def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, tmp_path: Path) -> None:

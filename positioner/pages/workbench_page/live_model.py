@@ -16,7 +16,7 @@ from sim.karnopp import Vector
 from workbench.compare.comparison import Comparison, compare
 from workbench.compare.friction_balance import Forces, forces
 from workbench.compare.measures import rms, valid_rows
-from workbench.data.record import Record, ready, require_units
+from workbench.data.record import Record, ready, require_few_samples, require_units
 from workbench.model.free_run import FreeRun, Run
 from workbench.model.parameters import Parameter, free_parameters
 
@@ -43,10 +43,11 @@ class Curve:
 
 
 class LiveModel:
-    """Raises InputError as `compare` does."""
+    """Raises InputError as `compare` does, and of more samples than may be fitted."""
 
     def __init__(self, recording: Recording, valve: ValveFile) -> None:
         self.recording = recording
+        require_few_samples(recording)
         self.record: Record = ready(recording)
         require_units(self.record, valve.valve)
         self._composition = Composition.from_file(valve)

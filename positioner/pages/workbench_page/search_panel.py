@@ -22,6 +22,9 @@ from workbench.select.effect_candidates import EffectCandidate
 from workbench.select.extension import Extension, extension_of
 
 LOOK_S = 0.2
+ADDING = """<q-td :props="props"><q-btn flat dense no-caps icon="add" color="primary" :label="props.value"
+    :aria-label="`add ${props.value}`" @click="() => $parent.$emit('add', props.row)" /></q-td>"""
+"""A candidate's cell: a button, so that a keyboard reaches it."""
 ROW_PX, FRAME_PX = 18, 70
 
 
@@ -213,8 +216,9 @@ class SearchPanel:
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full")
         if may_add:
-            table.on("row-click", lambda event: self._extend(event.args[1]["effects"]))
-            ui.label("click an effect to add it all the same").classes("quiet")
+            table.add_slot("body-cell-effect", ADDING)
+            table.on("add", lambda event: self._extend(event.args["effects"]))
+            ui.label("press an effect to add it all the same").classes("quiet")
 
     async def _add(self, search: Search, effects: Sequence[str]) -> None:
         """Add what was found: what is sure is not fitted again, one of several is."""
