@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -96,31 +96,18 @@ def _moved_ms(page: Page, off_px: int = 0) -> Iterator[float]:
 def _drag_is_told(page: Page, process: "subprocess.Popen[str]") -> None:
     """Print how soon a curve follows, and the processor time that it takes."""
     list(_moved_ms(page))  # the first takes what is done once
-    before_s = cpu(process.pid), _browser_cpu_s()
+    client = page.context.new_cdp_session(page)
+    client.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+    def spent_s() -> tuple[float, float]:
+        measured = {each["name"]: each["value"] for each in client.send("Performance.getMetrics")["metrics"]}
+        return cpu(process.pid), float(measured["TaskDuration"])
+
+    before_s = spent_s()
     moves = list(_moved_ms(page, 1))
-    server_ms, browser_ms = (
-        1e3 * (after_s - each_s) / MOVES
-        for each_s, after_s in zip(before_s, (cpu(process.pid), _browser_cpu_s()), strict=True)
-    )
+    server_ms, page_ms = (1e3 * (late - early) / MOVES for early, late in zip(before_s, spent_s(), strict=True))
     print(f"slider to curve, {SLIDER_S:g} s at {1 / PERIOD_S:g} Hz: {_told(moves)}, load {os.getloadavg()[0]:.0f}")
-    print(f"processor time of a move: server {server_ms:.0f} ms, page in the browser {browser_ms:.0f} ms", flush=True)
-
-
-def _browser_cpu_s() -> float:
-    """Return the processor time of the browsers' pages that this process has begun, s."""
-    parents: dict[int, int] = {}
-    pages = set()
-    for folder in Path("/proc").iterdir():
-        with suppress(OSError):
-            if folder.name.isdigit():
-                parents[int(folder.name)] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-                if "--type=renderer" in (folder / "cmdline").read_text():
-                    pages.add(int(folder.name))
-
-    def is_ours(pid: int) -> bool:
-        return pid == os.getpid() or (pid in parents and is_ours(parents[pid]))
-
-    return sum(cpu(pid) for pid in pages if is_ours(pid))
+    print(f"processor time of a move: server {server_ms:.0f} ms, the page's thread {page_ms:.0f} ms", flush=True)
 
 
 def _used_for_long(page: Page, process: "subprocess.Popen[str]", minutes: float) -> None:
