@@ -66,7 +66,7 @@ def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, o
     return {
         "data": traces,
         "layout": layout(
-            xaxis=axis(f"held-out error, rms, {of.unit}", type="log", **_ticks(shown)),
+            xaxis=axis(f"held-out error, rms, {of.unit}", type="log", **log_ticks(shown)),
             yaxis=axis("", categoryorder="array", categoryarray=names[::-1], range=[-0.7, len(names) - 0.3]),
             shapes=[marked(of.factor * value, colour, dash) for value, colour, dash in lines],
             showlegend=True,
@@ -78,9 +78,11 @@ def _errors(tried: Sequence[RankedEffect]) -> list[float]:
     return [each.test for each in tried if each.test is not None]
 
 
-def _ticks(values: Sequence[float]) -> Figure:
+def log_ticks(values: Sequence[float]) -> Figure:
     """Return ticks at 1, 2 and 5 of the decades that the values span; more where that would be fewer than three."""
-    positive = [each for each in values if each > 0.0]
+    positive = [each for each in values if 0.0 < each < np.inf]
+    if not positive:
+        return {}
     low, high = 0.8 * min(positive), 1.25 * max(positive)
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     shown: list[float] = []
@@ -127,7 +129,7 @@ def error_reduction(stages: Sequence[tuple[str, float, float]], floor: float | N
         "data": traces,
         "layout": layout(
             xaxis=axis("", range=[-0.4, len(names) - 0.6]),
-            yaxis=axis(f"error, rms, {of.unit}", type="log", **_ticks(shown)),
+            yaxis=axis(f"error, rms, {of.unit}", type="log", **log_ticks(shown)),
             shapes=[_across(of.factor * each) for each in levels],
         ),
     }

@@ -121,7 +121,7 @@ class TrendPlot:
         """Return all of it."""
         ink, changing = self._theme.ink, self._changing()
         colours = {"reference": ink.model, "position": ink.measured, "command": ink.better, "pressure": ink.measured}
-        quiet = {"axisLine": {"lineStyle": {"color": ink.grid}}, "axisLabel": {"color": ink.quiet}}
+        quiet = {"axisLine": {"lineStyle": {"color": ink.grid}}, "axisLabel": {"color": ink.quiet, "hideOverlap": True}}
         inner = {"axisLabel": {"color": ink.quiet, "showMinLabel": False, "showMaxLabel": False}}
         hidden = quiet | {"axisLabel": {"show": False}}
         rule = {"splitLine": {"lineStyle": {"color": ink.grid}}}

@@ -16,6 +16,7 @@ from sim.effect import tried_effects
 from workbench.fit.fitting import Fit
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.effects_table import headline
+from workbench.report.ranking import log_ticks
 from workbench.report.units import length
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_candidates import EffectCandidate
@@ -163,12 +164,13 @@ class SearchPanel:
             "hovertemplate": "%{y}: %{x:.4~g} mm<extra></extra>",
         }  # fmt: skip
         floor_m = compared.floor_m if compared else None
+        shown_mm = errors_mm if floor_m is None else [*errors_mm, 1e3 * floor_m]
         step = search.step if search else 1
         return {
             "data": [bars],
             "layout": layout(
                 margin={"l": 10, "r": 10, "t": 8, "b": 40},
-                xaxis=axis(f"step {step}: fitted error, mm rms", type="log", dtick="D2", tickformat="~g"),
+                xaxis=axis(f"step {step}: fitted error, mm rms", type="log", **log_ticks(shown_mm)),
                 yaxis=axis("", tickfont={"size": 11}),
                 shapes=[] if floor_m is None else [marked(1e3 * floor_m, MEASURED)],
                 showlegend=False,
