@@ -53,8 +53,8 @@ def main(minutes: float | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         seal(Path(folder, "case"), hide(SEED, duration_s=SLIDER_S, period_s=PERIOD_S))
         if minutes is not None:
-            case, known = (str(Path(folder, "case", name)) for name in ("fit.csv", "valve.toml"))
-            with served(case, "--valve", known) as (address, process, _), page_at(address) as page:
+            files = [str(Path(folder, "case", name)) for name in ("fit.csv", "valve.toml")]
+            with served(files[0], "--valve", files[1]) as (address, process, _), page_at(address) as page:
                 _used_for_long(page, process, minutes)
             return
         case = Path(folder, "case", "fit.csv")

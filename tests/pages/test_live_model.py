@@ -25,7 +25,7 @@ def test_it_says_what_compare_says() -> None:
 
 def test_ten_million_samples_are_refused_at_once_as_for_a_fit() -> None:
     still = np.zeros(10_000_000)
-    recording = Recording({"time_s": 1e-3 * np.arange(still.size), "command_pa": still, "position_m": still})
+    recording = Recording({"time_s": np.arange(still.size, dtype=np.float64), "command_pa": still, "position_m": still})
     with pytest.raises(InputError, match="10000000 samples would take hours to fit; allowed are 1000000 samples"):
         LiveModel(recording, HIDDEN.base)
 
