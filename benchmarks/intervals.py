@@ -1,4 +1,4 @@
-"""How often the 95 % intervals of a fit hold the truth: `python -m benchmarks.intervals [SETTING] [CASES]`.
+"""How often the 95 % intervals of a fit hold the truth: `python -m benchmarks.intervals [SETTING [CASES [SEED]]]`.
 
 Valves drawn as `positioner hide` draws them, one recording of 30 s at 100 Hz, an effect of the library in each other
 one, which the fit is told the name of. Counted are the parameters of the valve, and those of the effects. With n
@@ -24,26 +24,26 @@ Held = tuple[str, float, float, float]
 """Name, truth, and the interval's ends."""
 
 
-def held(setting: str, number: int) -> list[Held]:
+def held(setting: str, seed: int) -> list[Held]:
     """Fit one case."""
-    made = hide(FIRST_SEED[setting] + number, effects=number % 2, dirty=setting == "dirty")
+    made = hide(seed, effects=seed % 2, dirty=setting == "dirty")
     found = fit(made.fit, made.base, effects=[each.name for each in made.truth.effect], workers=1)
     composition = Composition.from_file(made.truth)
     truth = dict(zip(composition.names, composition.theta.tolist(), strict=True))
     return [(name, truth[name], each.lower, each.upper) for name, each in found.parameters.items()]
 
 
-def report(setting: str, cases: int) -> Iterator[str]:
+def report(setting: str, cases: int, first: int) -> Iterator[str]:
     """Yield one line a parameter of the valve, and one for all of the effects."""
     with ProcessPoolExecutor(cpu_count()) as pool:
-        found = [each for case in pool.map(held, [setting] * cases, range(cases)) for each in case]
+        found = [each for case in pool.map(held, [setting] * cases, range(first, first + cases)) for each in case]
     inside: dict[str, list[bool]] = defaultdict(list)
     width: dict[str, list[float]] = defaultdict(list)
     for name, value, lower, upper in found:
         of = "of the effects" if "." in name else name
         inside[of].append(lower <= value <= upper)
         width[of].append((upper - lower) / abs(value) if value else np.inf)
-    yield f"{setting}, {cases} cases from seed {FIRST_SEED[setting]}"
+    yield f"{setting}, {cases} cases from seed {first}"
     for of, each in inside.items():
         middle = f"median width {100 * float(np.median(width[of])):.3g} %"
         yield f"  {of:<22}{sum(each):>4} of {len(each):<4}{middle}"
@@ -54,6 +54,7 @@ def report(setting: str, cases: int) -> Iterator[str]:
 
 if __name__ == "__main__":
     settings = sys.argv[1:2] or list(FIRST_SEED)
+    count = int(sys.argv[2]) if len(sys.argv) > 2 else CASES
     for chosen in settings:
-        for line in report(chosen, int(sys.argv[2]) if len(sys.argv) > 2 else CASES):
+        for line in report(chosen, count, int(sys.argv[3]) if len(sys.argv) > 3 else FIRST_SEED[chosen]):
             print(line, flush=True)

@@ -14,6 +14,9 @@ SEED = load_valve(shipped_valve("seed"))
 NOISE_M = 5e-5
 PERIOD_S = 0.01
 
+SLIM = ValveFile(valve=SEED.valve.model_copy(update={"coulomb_n": 360.0, "static_n": 375.0, "viscous_ns_per_m": 310.0}))
+"""Little friction: it slips often."""
+
 
 def drawn_valve(generator: np.random.Generator) -> ValveFile:
     seed = SEED.valve
@@ -49,6 +52,14 @@ def pressures(generator: np.random.Generator, count: int) -> Column:
         done += length
         last = float(command[done - 1])
     return command
+
+
+def creeping(count: int = 1600) -> Column:
+    """Slow ramps up and down, Pa: (count,): the stem sticks and slips all the way."""
+    seed = SEED.valve
+    span_pa = seed.spring_n_per_m * seed.stroke_m / seed.diaphragm_area_m2
+    corners = span_pa * np.array([0.2, 0.8, 0.3, 0.7])
+    return np.interp(np.arange(count), np.linspace(0, count, corners.size), corners)
 
 
 def record_of(

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.breaking_off import go_on
-from workbench.model.free_run import ROUGH, FreeRun
+from workbench.model.free_run import FINE, ROUGH, Accuracy, FreeRun
+from workbench.model.multiple_shooting import MultipleShooting
 from workbench.model.parameters import Parameter
 
 FINAL, MIDDLE = 5.0, 30.0
@@ -40,6 +41,8 @@ class SimulationError:
         rows = np.flatnonzero(run.judged & record.valid)
         self.count = rows.size
         """Number of valid samples."""
+        self.rows = rows
+        """Of the record that are judged, (count,)."""
         whole = rows.size == len(record)
         self._rows = slice(None) if whole else rows
         self._measured_m = record.position_m
@@ -58,6 +61,18 @@ class SimulationError:
             return self
         run = FreeRun(
             self.composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH, by=self.run.by
+        )
+        return self.over(run)
+
+    def by_slips(self, accuracy: Accuracy = FINE, part: int | None = None) -> "SimulationError":
+        """Return the error by multiple shooting; with `part` 0 or 1, of every other slip or those between."""
+        run = MultipleShooting(
+            self.composition,
+            self.run.record,
+            from_pressure=self.run.from_pressure,
+            accuracy=accuracy,
+            by=self.run.by,
+            part=part,
         )
         return self.over(run)
 
@@ -207,11 +222,17 @@ def root_weights(residuals: Vector, scale: float) -> Vector:
     return np.asarray((1.0 + (residuals / scale) ** 2) ** -0.25)
 
 
-def soft(residuals: Vector, scale: float) -> float:
-    """Return the soft-L1 cost."""
+def softs(residuals: Vector, scale: float) -> Vector:
+    """Return what each residual adds to the soft-L1 cost."""
     roots = residuals / scale
     roots *= roots
     roots += 1.0
     np.sqrt(roots, out=roots)
     roots -= 1.0
-    return float(scale**2 * np.sum(roots))
+    roots *= scale**2
+    return np.asarray(roots)
+
+
+def soft(residuals: Vector, scale: float) -> float:
+    """Return the soft-L1 cost."""
+    return float(np.sum(softs(residuals, scale)))

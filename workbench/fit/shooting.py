@@ -15,8 +15,8 @@ from sim.karnopp import Vector
 from workbench.fit.agreement import Place
 from workbench.fit.descent import COARSE, MIDDLING, WIDE, Stage, descended
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
-from workbench.model.free_run import FINE, ROUGH, Accuracy
-from workbench.model.multiple_shooting import MultipleShooting
+from workbench.model.free_run import FINE, ROUGH
+from workbench.model.multiple_shooting import slips_from_rest
 
 ENOUGH_SLIPS = 12
 """That begin at a rest, from which on every other will do."""
@@ -35,7 +35,7 @@ def shooting_starts(error: SimulationError, grid: Sequence[Vector], best: Vector
     """
     if error.run.by.slow or not grid:
         return []
-    slips = _run(error, FINE).count
+    slips = slips_from_rest(error.run.record)
     if slips < FEWEST_SLIPS:
         return []
     halves = {"even slips": 0, "odd slips": 1} if slips >= ENOUGH_SLIPS else {"slips": None}
@@ -45,7 +45,7 @@ def shooting_starts(error: SimulationError, grid: Sequence[Vector], best: Vector
 
 def _shot(error: SimulationError, grid: Sequence[Vector], best: Vector, part: int | None) -> Vector | None:
     """Return where the best of the grid goes down to, by the slips of one part; None where that gains nothing."""
-    rough, fine = (error.over(_run(error, accuracy, part)) for accuracy in (ROUGH, FINE))
+    rough, fine = (error.by_slips(accuracy, part) for accuracy in (ROUGH, FINE))
     stages: Sequence[tuple[SimulationError, Stage]] = ((rough, WIDE), (rough, MIDDLING), (fine, COARSE))
     z = rough.least(grid, MIDDLE)
     for by, stage in stages:
@@ -54,10 +54,3 @@ def _shot(error: SimulationError, grid: Sequence[Vector], best: Vector, part: in
         if by.cost(z, MIDDLE) > GAINS * by.cost(best, MIDDLE):
             return None
     return z
-
-
-def _run(error: SimulationError, accuracy: Accuracy, part: int | None = None) -> MultipleShooting:
-    run = error.run
-    return MultipleShooting(
-        error.composition, run.record, from_pressure=run.from_pressure, accuracy=accuracy, by=run.by, part=part
-    )

@@ -58,11 +58,6 @@ class MultipleShooting(FreeRun):
         self._part = part
 
     @property
-    def count(self) -> int:
-        """How many slips begin at a rest."""
-        return sum(map(len, self._shots))
-
-    @property
     def judged(self) -> Mask:
         """Which rows are simulated and judged, (n,)."""
         rows = super().judged
@@ -93,6 +88,11 @@ class MultipleShooting(FreeRun):
                 if shot:
                     _put_back(state, shot.position_m)
                 at, known = over, 1
+
+
+def slips_from_rest(record: Record) -> int:
+    """Return how many slips begin at a rest."""
+    return sum(len(_shots(record, first, end)) for first, end in record.segments)
 
 
 def _shots(record: Record, first: int, end: int) -> list[Shot]:
