@@ -13,7 +13,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, IPvAnyNetwork, model_validator
 
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
@@ -178,6 +178,8 @@ class SupervisoryTable(Schema):
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     most_clients: Annotated[int, Field(ge=1, le=1000)] = 64
     clients_per_host: Annotated[int, Field(ge=1, le=1000)] = 56
+    allowed_networks: tuple[IPvAnyNetwork, ...] = ()
+    """Addresses or networks whence clients may come; empty: from anywhere."""
     reserved_hosts: tuple[Host, ...] = ()
     """Addresses of the DCS: where all places are taken, another's is made free for them."""
     requests_per_s: NonNegative = 1000.0

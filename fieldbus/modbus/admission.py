@@ -1,5 +1,6 @@
 """Who gets a place at a server, and how often each host may ask. No socket and no clock: times come in.
 
+    `allowed_networks`           whoever calls from elsewhere gets none, nor a handshake; empty: from anywhere
     a host has at most `clients_per_host` places; of its own, one unused for `UNUSED_S` gives way
     all `most_clients` taken     the one that has asked for nothing for longest gives way, if for `UNUSED_S` at least;
                                  to a reserved host in any case, unless all are of reserved hosts
@@ -9,7 +10,10 @@ Where handshakes come before a place, only so many may be under way: they take n
 """
 
 from dataclasses import dataclass
+from ipaddress import IPv4Network, IPv6Address, IPv6Network, ip_address
 from threading import Lock
+
+Network = IPv4Network | IPv6Network
 
 MOST_CLIENTS = 64
 UNUSED_S = 60.0
@@ -30,6 +34,20 @@ class ServerLimits:
     """0: no limit."""
     idle_s: float = 0.0
     """A client that asks for nothing for so long is disconnected; 0 is never."""
+    allowed_networks: tuple[Network, ...] = ()
+    """Whence clients may come; empty: from anywhere."""
+
+    def allow(self, host: str) -> bool:
+        """Return whether a client may come from an address."""
+        if not self.allowed_networks:
+            return True
+        address = ip_address(host.partition("%")[0])
+        if isinstance(address, IPv6Address) and address.ipv4_mapped is not None:
+            address = address.ipv4_mapped
+        return any(address in each for each in self.allowed_networks)
+
+
+NOT_ALLOWED = "its address is not among those allowed"
 
 
 class Allowance:
@@ -90,6 +108,8 @@ class Places:
 
     def knock(self, peer: str, host: str) -> str | None:
         """Begin a handshake; return why it may not, None if it may."""
+        if not self._limits.allow(host):
+            return NOT_ALLOWED
         with self._lock:
             same = sum(each == host for each in self._knocking.values())
             if same >= HANDSHAKES_PER_HOST or len(self._knocking) >= MOST_HANDSHAKES:
@@ -99,6 +119,8 @@ class Places:
 
     def take(self, peer: str, host: str, now_s: float) -> Admitted:
         """Give a client a place, if there is one for it."""
+        if not self._limits.allow(host):
+            return Admitted(NOT_ALLOWED)
         with self._lock:
             self._knocking.pop(peer, None)
             own = [each for each, place in self._taken.items() if place.host == host]

@@ -324,7 +324,14 @@ def _server(valves: Sequence[ServedValve], history: HistoryKeeper) -> RegisterSe
 
 def _server_limits(table: SupervisoryTable) -> ServerLimits:
     reserved = frozenset(table.reserved_hosts)
-    return ServerLimits(table.most_clients, table.clients_per_host, reserved, table.requests_per_s, table.idle_s)
+    return ServerLimits(
+        table.most_clients,
+        table.clients_per_host,
+        reserved,
+        table.requests_per_s,
+        table.idle_s,
+        table.allowed_networks,
+    )
 
 
 def guard_of(tls: Tls) -> Guard:

@@ -1,8 +1,21 @@
 """Who gets a place at a server, and how long a request waits: in given times, without a socket."""
 
+from ipaddress import ip_network
+
 import pytest
 
-from fieldbus.modbus.admission import HANDSHAKES_PER_HOST, MOST_HANDSHAKES, UNUSED_S, Allowance, Places, ServerLimits
+from config.daemon_file import DaemonFile
+from config.errors import InputError
+from config.loading import validated
+from fieldbus.modbus.admission import (
+    HANDSHAKES_PER_HOST,
+    MOST_HANDSHAKES,
+    NOT_ALLOWED,
+    UNUSED_S,
+    Allowance,
+    Places,
+    ServerLimits,
+)
 
 DCS, PLANT, STRANGER = "10.0.0.5", "10.0.0.7", "10.0.0.9"
 
@@ -22,6 +35,25 @@ def test_a_host_has_no_more_places_than_are_one_hosts() -> None:
     assert places.take(f"{PLANT}:9", PLANT, 30.0).refusal is None
     places.leave(f"{STRANGER}:1")
     assert places.take(f"{STRANGER}:9", STRANGER, 30.0).refusal is None
+
+
+def test_who_calls_from_elsewhere_than_allowed_gets_neither_a_place_nor_a_handshake() -> None:
+    places = Places(ServerLimits(allowed_networks=(ip_network(f"{DCS}/32"), ip_network("fd00::/8"))))
+    for host in (STRANGER, f"::ffff:{STRANGER}", "fe80::1%eth0"):
+        assert places.take(f"{host}:1", host, 0.0).refusal == NOT_ALLOWED
+        assert places.knock(f"{host}:1", host) == NOT_ALLOWED
+    for host in (DCS, f"::ffff:{DCS}", "fd00::7"):
+        assert places.knock(f"{host}:1", host) is None
+        assert places.take(f"{host}:1", host, 0.0).refusal is None
+
+
+def test_the_file_names_addresses_and_networks_and_nothing_else() -> None:
+    table = {"valve": {"stroke_m": 0.1}, "supervisory": {"allowed_networks": ["10.0.0.5", "10.1.0.0/16"]}}
+    allowed = validated(DaemonFile, table, "d.toml").supervisory.allowed_networks
+    assert ServerLimits(allowed_networks=allowed).allow("10.1.2.3")
+    assert not ServerLimits(allowed_networks=allowed).allow("10.0.0.6")
+    with pytest.raises(InputError, match="allowed_networks"):
+        validated(DaemonFile, table | {"supervisory": {"allowed_networks": ["dcs.plant"]}}, "d.toml")
 
 
 def test_when_all_are_taken_the_one_unused_for_longest_gives_way_if_for_long_enough() -> None:
