@@ -26,13 +26,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.progress import at_work
     from workbench.compare.comparison import as_json, compare
 
     writable(arguments.json, "--json")
     writable(arguments.report, "--report")
     valve = load_valve(find_valve(arguments.valve))
     recording = noise_said(read_any(arguments.recording, arguments, valve.valve.stroke_m), arguments)
-    with naming({"recording": str(arguments.recording), "valve file": arguments.valve}):
+    named = {"recording": str(arguments.recording), "valve file": arguments.valve}
+    with naming(named), at_work("compare", f"holding {arguments.valve} against {arguments.recording}"):
         compared = compare(recording, valve)
     print(f"{arguments.valve} against {arguments.recording}: {compared.summary()}")
     if arguments.json is not None:

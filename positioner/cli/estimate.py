@@ -29,15 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Estimate and print; 0 if the ratios that the law needs are valid, else 1."""
-    from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.progress import at_work
     from positioner.estimation.recording_estimates import estimate
 
     writable(arguments.json, "--json")
     held = None if arguments.pressure is None else arguments.pressure == "held"
     recording = read_any(arguments.recording, arguments, None)
-    known = f"{len(recording)} samples were read, nothing is identified yet"
-    with naming({"noise_std_m": "--noise-m"}), told_when_broken_off("estimate", lambda: known):
+    what = f"{len(recording)} samples are read, identifying from them"
+    with naming({"noise_std_m": "--noise-m"}), at_work("estimate", what):
         estimated = estimate(recording, noise_std_m=arguments.noise_m, pressure_held=held)
     print(f"{arguments.recording}: {estimated.summary()}")
     if arguments.json is not None:

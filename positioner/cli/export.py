@@ -18,6 +18,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write it, and say what goes in and comes out."""
     from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.progress import at_work
     from sim.composition import Composition
     from sim.fmu.fmu_file import export_fmu
     from sim.fmu.model_description import variables
@@ -25,7 +26,8 @@ def run(arguments: argparse.Namespace) -> int:
     writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
     composition = Composition.from_file(load_valve(path), str(path))
-    export_fmu(composition, arguments.out)
+    with at_work("export", f"compiling {arguments.valve}"):
+        export_fmu(composition, arguments.out)
     by_causality = {"input": "in", "output": "out"}
     told = [
         f"{by_causality[each.causality]} {each.name}"

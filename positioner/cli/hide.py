@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Hide, or reveal."""
+    from positioner.cli.parts.progress import at_work
     from workbench.blind.hiding import hide
     from workbench.blind.sealing import reveal, seal
 
@@ -38,13 +39,14 @@ def run(arguments: argparse.Namespace) -> int:
         _print_answer(sha256, answer)
         return 0
     _check(arguments)
-    hidden = hide(
-        arguments.seed,
-        effects=arguments.effects,
-        dirty=arguments.dirty,
-        duration_s=arguments.duration_s,
-        period_s=arguments.period_s,
-    )
+    with at_work("hide", "drawing a valve and simulating it"):
+        hidden = hide(
+            arguments.seed,
+            effects=arguments.effects,
+            dirty=arguments.dirty,
+            duration_s=arguments.duration_s,
+            period_s=arguments.period_s,
+        )
     folder = arguments.out
     print(f"sealed: SHA-256 {seal(folder, hidden)}")
     print(f"{folder}/fit.csv, {folder}/test.csv: {len(hidden.fit)} samples each, {arguments.duration_s:g} s")

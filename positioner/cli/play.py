@@ -74,6 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.extended_valves import extended_valve_of
     from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.progress import at_work
 
     writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
@@ -81,7 +82,9 @@ def run(arguments: argparse.Namespace) -> int:
     time_s, reference_m = read_series(arguments.reference, "reference_m")
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
     extended = None if arguments.extended is None else extended_valve_of(_files(arguments, valve)[0], "--extended")
-    runs = [_played(arguments, path, valve, time_s, reference_m, None)]
+    what = f"identifying {valve.name} and following {time_s[-1] - time_s[0]:g} s of references"
+    with at_work("play", what):
+        runs = [_played(arguments, path, valve, time_s, reference_m, None)]
     applied = runs[0].snapshots[-1].decision.applied
     ratios = applied.ratios
     if ratios is None:
@@ -89,7 +92,8 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"identified b/c = {ratios.b_over_c:.6g} Pa/m, k/c = {ratios.k_over_c:.6g} Pa")
     print(_left(runs[0], valve.stroke_m, f"law {arguments.law}, identified"))
     if extended is not None:
-        runs.append(_played(arguments, path, valve, time_s, reference_m, extended))
+        with at_work("play", f"the same, given {arguments.extended}"):
+            runs.append(_played(arguments, path, valve, time_s, reference_m, extended))
         print(_left(runs[1], valve.stroke_m, f"law {arguments.law}, given {arguments.extended}"))
     last = runs[-1]
     write_recording(arguments.out, _recording(last.snapshots, float(time_s[0]) - last.begin_s, valve.name))

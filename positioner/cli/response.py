@@ -22,10 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the figures; 0 if there is a step, else 1."""
 
+    from positioner.cli.parts.progress import at_work
     from positioner.response import as_json, respond
 
     writable(arguments.json, "--json")
-    response = respond(read_any(arguments.recording, arguments, None))
+    recording = read_any(arguments.recording, arguments, None)
+    with at_work("response", f"finding the steps of {len(recording)} samples"):
+        response = respond(recording)
     if arguments.json is not None:
         write_json(arguments.json, as_json(response))
     print(f"{arguments.recording}: {response.summary()}")

@@ -28,6 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.progress import at_work
     from sim.effect import find_effect
     from sim.simulation import simulate
 
@@ -36,7 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
     valve = load_valve(path)
     by_setpoint = any(find_effect(each.name, str(path)).by_setpoint for each in valve.effect)
     time_s, command_pa = read_series(arguments.input, "reference_m" if by_setpoint else "command_pa")
-    with naming({"valve file": str(path), "sensor": "--noise-m, --seed"}):
+    what = f"simulating {time_s[-1] - time_s[0]:g} s"
+    with naming({"valve file": str(path), "sensor": "--noise-m, --seed"}), at_work("simulate", what):
         recording = simulate(valve, time_s, command_pa, noise_std_m=arguments.noise_m, seed=arguments.seed)
     recording.write(arguments.out)
     print(f"{arguments.out}: {len(recording)} samples, {time_s[-1] - time_s[0]:g} s")

@@ -26,3 +26,14 @@ def test_a_discovery_that_is_broken_off_says_how_far_it_came(
         "positioner discover: broken off; so far fitting 5 forms: 40%; nothing was written" in capsys.readouterr().err
     )
     assert not out.exists()
+
+
+def test_a_file_whose_reading_is_broken_off_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken_off(_: Path) -> Recording:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Recording, "read", broken_off)
+    assert main(["estimate", str(tmp_path / "rec.csv")]) == 130
+    assert "positioner estimate: broken off; so far reading " in capsys.readouterr().err

@@ -68,3 +68,12 @@ def test_beats_end_with_the_work() -> None:
         assert any(each.name == "progress" for each in threading.enumerate())
         progress("fitting", 0.5)
     assert not any(each.name == "progress" for each in threading.enumerate())
+
+
+def test_work_without_fractions_says_what_it_is_and_for_how_long() -> None:
+    clock = iter((0.0, 2.0))
+    stream = Terminal()
+    progress = Progress(stream, lambda: next(clock), "reading rec.csv")
+    progress.beat()
+    assert stream.getvalue() == "\r\033[Kreading rec.csv, 2 s so far"
+    assert progress.known == "so far reading rec.csv; nothing was written"

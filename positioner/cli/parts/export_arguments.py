@@ -103,19 +103,23 @@ def read_any(path: Path, arguments: argparse.Namespace, stroke_m: float | None) 
     """
     from config.errors import InputError
     from config.recording import Recording
-    from positioner.cli.parts.progress import Progress
+    from positioner.cli.parts.progress import at_work
 
     take_mapping(arguments)
-    if path.is_file() and path.stat().st_size > LARGE:
-        print(f"reading {path}, {path.stat().st_size / 1e6:.0f} MB", file=sys.stderr, flush=True)
+    size = f", {path.stat().st_size / 1e6:.0f} MB" if path.is_file() and path.stat().st_size > LARGE else ""
+    if size:
+        print(f"reading {path}{size}", file=sys.stderr, flush=True)
     if arguments.column:
-        recording = read_mapped(path, arguments, stroke_m, Progress())
+        with at_work(arguments.command, f"reading {path}{size}") as progress:
+            recording = read_mapped(path, arguments, stroke_m, progress)
         tell(f"positioner {arguments.command}: {path}", recording, arguments.stroke_m or stroke_m)
         return _stretch(recording, arguments)
     for name in BESIDES:
         if getattr(arguments, name):
             raise InputError(f"--{name.replace('_', '-')}", "goes with --column; a recording is in SI units")
-    return _stretch(Recording.read(path), arguments)
+    with at_work(arguments.command, f"reading {path}{size}"):
+        recording = Recording.read(path)
+    return _stretch(recording, arguments)
 
 
 def _stretch(recording: "Recording", arguments: argparse.Namespace) -> "Recording":

@@ -6,9 +6,12 @@ compiled at the first use of an effect: on a terminal every second, in a log aft
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from threading import Event, Lock, Thread
 from typing import Self, TextIO
+
+from positioner.cli.parts.breaking_off import told_when_broken_off
 
 SELDOM_S, BEAT_S = 20.0, 1.0
 """Time between two lines of a log, what is done sooner leaves none; and between two looks at the clock."""
@@ -20,13 +23,17 @@ class Progress:
     Args:
         stream: by default standard error.
         clock: time, s.
+        what: is being done, where no fraction of it is ever told.
     """
 
-    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic, what: str = ""
+    ) -> None:
         self._stream = stream or sys.stderr
         self._clock = clock
         self._began_s = self._told_s = clock()
-        self._what, self._done = "", 0.0
+        self._what: str = what
+        self._done: float | None = None
         self._one_at_a_time, self._over = Lock(), Event()
         self._beats: Thread | None = None
 
@@ -41,7 +48,7 @@ class Progress:
         self._over.set()
         if self._beats:
             self._beats.join()
-        if self._stream.isatty() and self._done >= 1.0:
+        if self._stream.isatty() and (self._done is None or self._done >= 1.0):
             print("\r\033[K", end="", file=self._stream, flush=True)
 
     @property
@@ -70,16 +77,28 @@ class Progress:
 
     @property
     def _last(self) -> str:
-        return f"{self._what}: {self._done:.0%}" if self._what else ""
+        return self._what if self._done is None else f"{self._what}: {self._done:.0%}"
 
     def _beat_on(self) -> None:
         while not self._over.wait(BEAT_S):
             self.beat()
 
     def _redraw(self, end: str) -> None:
-        bar = "#" * round(20 * self._done)
-        print(f"\r\033[K{self._what or 'at work'} [{bar:<20}] {self._done:.0%}", end=end, file=self._stream, flush=True)
+        bar = "" if self._done is None else f" [{'#' * round(20 * self._done):<20}] {self._done:.0%}"
+        print(f"\r\033[K{self._what or 'at work'}{bar}", end=end, file=self._stream, flush=True)
 
     def _tell(self, line: str, now_s: float) -> None:
         self._told_s = now_s
         print(line, file=self._stream, flush=True)
+
+
+@contextmanager
+def at_work(command: str, what: str) -> Iterator[Progress]:
+    """Tell that a command goes on with something that has no fractions, and that it was broken off at it.
+
+    Args:
+        command: of the person, as messages name it.
+        what: it does, as in "reading rec.csv".
+    """
+    with Progress(what=what) as progress, told_when_broken_off(command, lambda: progress.known):
+        yield progress
