@@ -33,7 +33,7 @@ from workbench.blind.hiding import Hidden, hide, strength
 from workbench.blind.trial import Trial, refitted_rmse_m
 from workbench.compare.comparison import Comparison, compare
 from workbench.compare.measures import rms
-from workbench.fleet.examination import AT_FLOOR, refit, refits
+from workbench.fleet.examination import AT_FLOOR, floor_to_reach_m, refit, refits
 
 EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 3.0, np.inf)
 VISIBLE = 0.5
@@ -51,6 +51,7 @@ def case(seed: int) -> dict[str, Any]:
     autumn, clean_m = recorded(bare, truth, seed)
     spring = refit(bare.fit, bare.base)
     known = spring[0].valve if spring else bare.base
+    floor_m = spring[1].floor_m if spring else None
     found = list(refits(autumn, known))
     trial = Trial(bare.test.command_pa, PERIOD_S)
     least_m = [rms(_answer_m(trial, valve) - clean_m) for valve in (known, *(each.valve for each, _ in found))]
@@ -59,14 +60,15 @@ def case(seed: int) -> dict[str, Any]:
         "seed": seed,
         "effect": name,
         "strength": min(least_m) / rms(autumn.position_m - clean_m),
-        "passes": _passes(compare(autumn, known), *(again for _, again in found)),
-        "bare_passes": _passes(compare(bare.test, known), *(again for _, again in refits(bare.test, known))),
+        "passes": _passes(floor_m, compare(autumn, known), *(again for _, again in found)),
+        "bare_passes": _passes(floor_m, compare(bare.test, known), *(each for _, each in refits(bare.test, known))),
     }
 
 
-def _passes(*comparisons: Comparison) -> float | None:
+def _passes(known_floor_m: float | None, *comparisons: Comparison) -> float | None:
     """Return how many floors a look and refits must be allowed for one of them to pass; None: none is adequate."""
-    return min((each.rms_m / each.floor_m for each in comparisons if each.adequate and each.floor_m), default=None)
+    adequate = [(each.rms_m, floor_to_reach_m(each, known_floor_m)) for each in comparisons if each.adequate]
+    return min((rms_m / floor_m for rms_m, floor_m in adequate if floor_m), default=None)
 
 
 def _weakened(name: str, bare: Hidden, generator: np.random.Generator) -> EffectTable:

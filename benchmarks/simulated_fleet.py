@@ -7,8 +7,9 @@ effect of the library, of a strength that is visible after a refit, and a tenth 
 What is known of each is a drawing: spring within 10 %, friction within a third. One recording in the fleet is no text,
 one is not there. The truth lies beside, in `truth.json`, which the fleet is not shown.
 
-It prints precision and recall of the valves with an effect, how many of these the triage would have left undiagnosed,
-how many were named right, and what it took. The plant is made once: run it again to see what a second run takes.
+It prints precision and recall of the valves with an effect, and of all that changed; how many of those with an effect
+the triage left undiagnosed, how many were named right, and what it took. The plant is made once, and what was examined
+is kept: broken off (`timeout` ends it in pieces), the same command goes on; once more, it says what a rerun takes.
 """
 
 import argparse
@@ -41,6 +42,7 @@ from workbench.fleet.tables import write_tables
 DURATION_S, PERIOD_S = 20.0, 0.02
 TIGHTER = 1.3
 """Factor on the friction of a valve whose packing was tightened."""
+PACKING = "tighter packing"
 ONE_IN = 10
 TASKS = 500
 SPRING, AUTUMN = "2026-03-01", "2026-09-01"
@@ -57,6 +59,10 @@ class Score:
     """Of those missed: never diagnosed, so the triage's fault."""
     named: set[str]
     """Of those found: the effect, or a set with it."""
+    tightened: set[str]
+    """Said to have changed, of those whose packing was tightened."""
+    unchanged: set[str]
+    """Said to have changed, or to have an effect, of those that are as they were."""
 
 
 def make(folder: Path, valves: int, hidden: int, seed: int, workers: int) -> None:
@@ -67,7 +73,7 @@ def make(folder: Path, valves: int, hidden: int, seed: int, workers: int) -> Non
     affected = set(draw.permutation(valves)[:hidden].tolist())
     others = [i for i in range(valves) if i not in affected]
     tightened = set(others[::ONE_IN])
-    kinds = ["effect" if i in affected else "tightened" if i in tightened else "" for i in range(valves)]
+    kinds = ["effect" if i in affected else PACKING if i in tightened else "" for i in range(valves)]
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         truth = dict(pool.map(partial(_valve, folder, 1000 * seed), range(valves), kinds))
     rows = ["valve,file,recording,when"]
@@ -81,19 +87,23 @@ def make(folder: Path, valves: int, hidden: int, seed: int, workers: int) -> Non
 
 
 def _valve(folder: Path, seed: int, number: int, kind: str) -> tuple[str, str]:
-    """Write a valve and its recordings; return its name and its effect, empty if it has none."""
+    """Write a valve and its recordings, unless they are there; return its name and what happened to it, or nothing."""
     name, own = f"V{number:04d}", seed + number
+    made = folder / "valves" / f"{name}.json"
+    if made.exists():
+        return name, json.loads(made.read_text())
     record = partial(hide, own, duration_s=DURATION_S, period_s=PERIOD_S)
     bare = record(effects=0)
-    effect, autumn = "", bare.test
+    truth, autumn = kind, bare.test
     if kind == "effect":
-        effect, autumn = _with_effect(partial(hide, own, duration_s=DURATION_S, period_s=PERIOD_S), own)
-    elif kind == "tightened":
+        truth, autumn = _with_effect(record, own)
+    elif kind == PACKING:
         autumn = _tightened(bare, own)
     write_valve(folder / "valves" / f"{name}.toml", bare.base)
     bare.fit.write(folder / "recordings" / f"{name}-{SPRING}.csv")
     autumn.write(folder / "recordings" / f"{name}-{AUTUMN}.csv")
-    return name, effect
+    made.write_text(json.dumps(truth))
+    return name, truth
 
 
 def _with_effect(record: Any, seed: int) -> tuple[str, Recording]:
@@ -124,8 +134,9 @@ def recorded(bare: Hidden, valve: ValveFile, seed: int) -> tuple[Recording, Colu
 def score(found: Fleet, truth: Mapping[str, str]) -> Score:
     """Hold the ranking against the truth."""
     gravest = {course.name: course.gravest[1] for course in found.courses if course.gravest}
-    suspected = {name for name, each in gravest.items() if each.outcome != CHANGED}
-    hidden = {name for name, effect in truth.items() if effect}
+    changed = {name for name, each in gravest.items() if each.outcome == CHANGED}
+    suspected = gravest.keys() - changed
+    hidden = {name for name, happened in truth.items() if happened not in ("", PACKING)}
     last = {course.name: course.examined[-1][1].outcome for course in found.courses}
     return Score(
         found=suspected & hidden,
@@ -133,6 +144,8 @@ def score(found: Fleet, truth: Mapping[str, str]) -> Score:
         missed=hidden - suspected,
         untried={name for name in hidden - suspected if last[name] in (AS_BEFORE, CHANGED)},
         named={name for name in suspected & hidden if truth[name] in (*gravest[name].effects, *gravest[name].rivals)},
+        tightened={name for name in changed if truth[name] == PACKING},
+        unchanged={name for name in gravest if not truth[name]},
     )
 
 
@@ -154,7 +167,8 @@ def main(words: Sequence[str] | None = None) -> None:
     took_s = time.monotonic() - began_s
     write_tables(found.courses, given.folder / "out")
     result = score(found, truth)
-    hidden = sum(map(bool, truth.values()))
+    tightened = sum(happened == PACKING for happened in truth.values())
+    hidden = sum(map(bool, truth.values())) - tightened
     diagnosed = sum(each.outcome not in (AS_BEFORE, CHANGED) for course in found.courses for _, each in course.readable)
     print(f"{len(truth)} valves, {hidden} with a hidden effect; {found.count} recordings, {len(found.bad)} unreadable")
     print(
@@ -162,8 +176,12 @@ def main(words: Sequence[str] | None = None) -> None:
     )
     print(f"named right {len(result.named)} of {len(result.found)}; diagnosed {diagnosed} recordings")
     print(f"left undiagnosed by the triage: {len(result.untried)} of {hidden}")
+    as_it_was = len(truth) - hidden - tightened
+    print(f"tightened and said to have changed: {len(result.tightened)} of {tightened}")
+    print(f"as it was, yet complained of: {len(result.unchanged)} of {as_it_was} {sorted(result.unchanged) or ''}")
+    said = {course.name: course.gravest[1].sentence if course.gravest else "nothing" for course in found.courses}
     for name in sorted(result.missed | result.false):
-        print(f"  {'missed' if name in result.missed else 'false'}: {name} {truth[name]}")
+        print(f"  {'missed' if name in result.missed else 'false'}: {name} {truth[name]}: {said[name]}")
     print(f"{found.examined} examined in {took_s:.1f} s on {given.workers} workers")
     print(f"scheduler: {1e3 * overhead_s(given.workers):.1f} ms a task")
 

@@ -29,14 +29,17 @@ from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import Fit, fit, local_fit, profiled
 from workbench.select.diagnosis import Diagnosis, diagnose
 
-RULES = 2
+RULES = 3
 """To be raised when an examination would come out differently: what was kept is then made anew."""
 UNREADABLE, AS_BEFORE, CHANGED, UNTOLD = "unreadable", "as_before", "changed", "untold"
 LEAST_CHANGE = 0.05
 """Of a parameter: what differs by less has not changed, however narrow its interval."""
-AT_FLOOR = 1.2
+AT_FLOOR = 1.1
 """Times the floor that a look or a refit may leave; more is diagnosed. `python -m benchmarks.fleet_triage` has what
 each value misses."""
+RISEN = 1.25
+"""Times the floor of the recording behind the model: a floor that lies higher is itself something new. Laps that differ
+by a friction that drifts raise it, and the drift would lie below it."""
 MOST_CANDIDATES = 5
 
 
@@ -49,6 +52,9 @@ class Request:
     model: ValveFile
     known_by: str | None = None
     """The recording by which the model was accepted, or the drawing confirmed; None: it is a mere drawing."""
+
+    floor_m: float | None = None
+    """Of that recording; None: unknown."""
 
     @property
     def is_first(self) -> bool:
@@ -128,7 +134,7 @@ def _examined(request: Request) -> Examination:
     recording = Recording.read(Path(request.recording))
     looked = compare(recording, request.model)
     figures = _figures(looked, request.model)
-    if is_at_floor(looked, request.model):
+    if is_at_floor(looked, request.model, request.floor_m):
         return Examination(
             outcome=AS_BEFORE,
             sentence="as the last model says",
@@ -144,19 +150,24 @@ def _examined(request: Request) -> Examination:
 
 
 def _explained(recording: Recording, request: Request, figures: Mapping[str, Any]) -> Examination:
-    refitted = refit(recording, request.model)
+    refitted = refit(recording, request.model, request.floor_m)
     if refitted is not None:
         return _refitted(recording, *refitted, request, figures)
     return _diagnosed(diagnose(recording, request.model, workers=1), request, figures)
 
 
-def refit(recording: Recording, model: ValveFile) -> tuple[Fit, Comparison] | None:
+def refit(recording: Recording, model: ValveFile, known_floor_m: float | None = None) -> tuple[Fit, Comparison] | None:
     """Return the valve refitted, and how it compares; None: no refit explains the recording.
+
+    Args:
+        recording: what was measured.
+        model: where the refit begins.
+        known_floor_m: of the recording behind the model, rms; None: unknown.
 
     Raises:
         InputError: the recording holds too little.
     """
-    return next((each for each in refits(recording, model) if is_at_floor(each[1], model)), None)
+    return next((each for each in refits(recording, model) if is_at_floor(each[1], model, known_floor_m)), None)
 
 
 def refits(recording: Recording, model: ValveFile) -> Iterator[tuple[Fit, Comparison]]:
@@ -170,10 +181,23 @@ def refits(recording: Recording, model: ValveFile) -> Iterator[tuple[Fit, Compar
         yield found, compare(recording, found.valve)
 
 
-def is_at_floor(comparison: Comparison, model: ValveFile) -> bool:
-    """Whether a model explains a recording, so that nothing need be diagnosed."""
-    most_m = max(AT_FLOOR * (comparison.floor_m or 0.0), NUMERICAL * model.valve.stroke_m)
-    return comparison.adequate and comparison.rms_m <= most_m
+def is_at_floor(comparison: Comparison, model: ValveFile, known_floor_m: float | None = None) -> bool:
+    """Whether a model explains a recording, so that nothing need be diagnosed.
+
+    Args:
+        comparison: of the recording with the model.
+        model: a valve file.
+        known_floor_m: of the recording behind the model, rms; None: unknown.
+    """
+    floor_m = floor_to_reach_m(comparison, known_floor_m) or 0.0
+    return comparison.adequate and comparison.rms_m <= max(AT_FLOOR * floor_m, NUMERICAL * model.valve.stroke_m)
+
+
+def floor_to_reach_m(comparison: Comparison, known_floor_m: float | None) -> float | None:
+    """Return the floor by which a recording is judged, rms, m; None: unknown."""
+    if comparison.floor_m is None or known_floor_m is None:
+        return comparison.floor_m
+    return min(comparison.floor_m, RISEN * known_floor_m)
 
 
 def _figures(looked: Comparison, model: ValveFile) -> dict[str, Any]:

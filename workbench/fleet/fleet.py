@@ -148,8 +148,8 @@ class _Running:
     ) -> None:
         self._entries, self._folder, self._store, self._told = entries, manifest.folder, store, told
         self._asked: Request | None = None
-        self._known: tuple[str, str] | None = None
-        """Key and recording of the examination by which the model was accepted, or the drawing confirmed."""
+        self._known: tuple[str, str, float | None] | None = None
+        """Key, recording and floor of the examination by which the model was accepted, or the drawing confirmed."""
         self.examined = 0
         self.course = ValveCourse(name)
         try:
@@ -195,7 +195,8 @@ class _Running:
                 continue
             kept = self._store.get(key)
             if kept is None:
-                return Request(key, str(path.resolve()), self._model, self._known[1] if self._known else None)
+                _, known_by, floor_m = self._known or ("", None, None)
+                return Request(key, str(path.resolve()), self._model, known_by, floor_m)
             self._go_on(key, entry, kept)
         return None
 
@@ -203,7 +204,7 @@ class _Running:
         if found.model is not None:
             self._model = valve_in(found.model)
         if found.model is not None or (self._known is None and found.outcome == AS_BEFORE):
-            self._known = key, str((self._folder / entry.recording).resolve())
+            self._known = key, str((self._folder / entry.recording).resolve()), found.floor_m
         self._tell(entry, found)
 
     def _tell(self, entry: Entry, found: Examination) -> None:
