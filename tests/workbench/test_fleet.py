@@ -1,5 +1,6 @@
 """Fleet: manifests, a small plant on real workers, killed workers and clients, reruns, what changed since."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -7,6 +8,7 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ import numpy as np
 import psutil
 import pyarrow as pa
 import pytest
-from distributed import KilledWorker
+from distributed import Client, KilledWorker
 from distributed.comm.core import CommClosedError
 from pyarrow import parquet
 
@@ -282,6 +284,7 @@ def test_a_leak_and_a_lost_calibration_are_told_from_a_packing(
         (HEAD + "a,seed,r.csv,yesterday\n", "recording.0.when"),
         (HEAD + "a,seed,r.csv,2026-01-01\na,ordinary,s.csv,2026-01-02\n", "a: file is seed and ordinary; a valve has"),
         (HEAD + "a,seed,r.csv,2026-01-01\nb,seed,r.csv,2026-01-02\n", "r.csv: valve is a and b; it is of one valve"),
+        (HEAD + "a,seed,r.csv,2026-01-01\nb,seed,./r.csv,2026-01-02\n", "r.csv: valve is a and b; it is of one valve"),
         (HEAD + "a,seed,r.csv,2026-01-01\na,seed,s.csv,2026-01-01\n", "a: two recordings of 2026-01-01"),
         (
             HEAD + "a,seed,r.csv,2026-01-01T00:00Z\na,seed,s.csv,2026-02-01\n",
@@ -299,6 +302,24 @@ def test_a_manifest_that_is_wrong_is_one_line(
     assert err.count("\n") == 1
     assert said in err
     assert not (tmp_path / "out").exists()
+
+
+def test_recordings_in_other_units_are_listed_and_the_others_go_on(
+    site: Path, tmp_path: Path, without_dask: None
+) -> None:
+    lines = (site.parent / "recordings" / "well-1.csv").read_text().splitlines()
+    head, cells = lines[1], [line.split(",") for line in lines[2:]]
+    millimetres = [f"{time},{command},{1e3 * float(position)}" for time, command, position in cells]
+    bar = [f"{time},{1e-5 * float(command)},{position}" for time, command, position in cells]
+    for name, rows in {"mm": millimetres, "bar": bar, "si": [",".join(each) for each in cells]}.items():
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows, ""]))
+    names = ("mm", "bar", "si")
+    (tmp_path / "plant.csv").write_text(HEAD + "".join(f"{name},seed,{name}.csv,2026-01-01\n" for name in names))
+    found = fleet(tmp_path / "plant.csv", tmp_path / "out")
+    reasons = {name: reason for name, _, reason in found.bad}
+    assert "it looks like per cent (%) or mm" in reasons["mm"]
+    assert "it looks like bar" in reasons["bar"]
+    assert set(reasons) == {"mm", "bar"}
 
 
 def test_a_manifest_may_be_toml_and_have_semicolons(tmp_path: Path) -> None:
@@ -399,6 +420,41 @@ def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_p
     write_tables(found.courses, out)
     write_tables(fleet(small, tmp_path / "whole").courses, tmp_path / "whole")
     assert tables(out) == tables(tmp_path / "whole")
+
+
+@pytest.mark.patient
+def test_a_scheduler_that_is_killed_is_one_line_and_the_same_command_goes_on(
+    site: Path, tmp_path: Path, without_dask: None
+) -> None:
+    out, small, told = tmp_path / "out", site.with_name("small.csv"), tmp_path / "scheduler.json"
+    dask = [sys.executable, "-m", "distributed.cli.dask_{}", "--scheduler-file", str(told)]
+    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with ExitStack() as ended:
+        running = []
+        for role, options in {"scheduler": ["--port", "0"], "worker": ["--nthreads", "1", "--no-nanny"]}.items():
+            words = [word.format(role) for word in dask] + ["--host", "127.0.0.1", *options]
+            running.append(ended.enter_context(subprocess.Popen(words, **quiet)))
+            ended.callback(running[-1].kill)
+            until(told.exists)
+        until(lambda: "tcp://" in told.read_text())
+        address = json.loads(told.read_text())["address"]
+        connected: Any = Client
+        with connected(address) as asked:
+            asked.wait_for_workers(1)
+        words = [sys.executable, "-m", "positioner.cli", "fleet", str(small), "--out", str(out)]
+        client = ended.enter_context(
+            subprocess.Popen(
+                [*words, "--scheduler", address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+        )
+        until(lambda: kept(out) >= 2 or client.poll() is not None)
+        running[0].kill()
+        _, said = client.communicate()
+    assert client.returncode == 1, said
+    assert said.splitlines()[-1] == f"positioner fleet: {engine.GONE}"
+    assert "Traceback" not in said
+    before = kept(out)
+    assert fleet(small, out).examined == 6 - before
 
 
 def kept(out: Path) -> int:

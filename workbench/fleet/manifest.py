@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
+from os.path import normpath
 from pathlib import Path
 from typing import Any
 
@@ -89,8 +90,9 @@ def _rows(path: Path) -> list[dict[str, Any]]:
 def _refuse_doubles(path: Path, entries: Sequence[Entry]) -> None:
     if len({entry.time.tzinfo is None for entry in entries}) > 1:
         raise InputError(str(path), "when: some times have an offset and some have none; all or none must have one")
-    _alike(path, entries, "file", lambda entry: entry.valve, lambda entry: entry.file, "a valve has one file")
-    _alike(path, entries, "valve", lambda entry: entry.recording, lambda entry: entry.valve, "it is of one valve")
+    _alike(path, entries, "file", lambda entry: entry.valve, lambda entry: normpath(entry.file), "a valve has one file")
+    of_one = "it is of one valve"
+    _alike(path, entries, "valve", lambda entry: normpath(entry.recording), lambda entry: entry.valve, of_one)
     seen: set[tuple[str, datetime]] = set()
     for entry in entries:
         if (entry.valve, entry.time) in seen:
