@@ -13,6 +13,8 @@ daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
 
 import argparse
 import math
+import shutil
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,10 +45,11 @@ SETTLED_S = 0.2
 LARGEST_ERROR_PU = 0.01
 LARGEST_RATIO_ERROR = 0.01
 RATIOS = ("b_over_c", "k_over_c")
+PROGRAM = "positioner"
 IN_A_BROWSER = """in a browser:
-  positioner workbench {recording} --valve seed
-  positioner sim config/profiles/slave.toml & positioner run config/profiles/daemon.toml &
-  positioner page --config config/profiles/daemon.toml"""
+  {positioner} workbench {recording} --valve seed
+  {positioner} sim config/profiles/slave.toml & {positioner} run config/profiles/daemon.toml &
+  {positioner} page --config config/profiles/daemon.toml"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +144,7 @@ def _run_steps(arguments: argparse.Namespace) -> int:
         picture = _picture(folder, outcome)
         if arguments.out:
             _print_line(f"picture {picture}, recording {_recording(folder)}")
-            print(IN_A_BROWSER.format(recording=_recording(folder)))
+            print(IN_A_BROWSER.format(positioner=_as_called(), recording=_recording(folder)))
         if arguments.json:
             write_json(arguments.json, _jsonable(outcome, time.monotonic() - started_s), indent=1)
         for problem in outcome.problems:
@@ -290,6 +293,12 @@ def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:
 
 def _without_nan(values: dict[str, object]) -> dict[str, object]:
     return {name: None if value != value else value for name, value in values.items()}  # noqa: PLR0124 - NaN is not itself
+
+
+def _as_called() -> str:
+    """Return how this program was called where its name alone would not be found: in a fresh clone by its path."""
+    called = Path(sys.argv[0])
+    return str(called) if called.name == PROGRAM and shutil.which(PROGRAM) is None else PROGRAM
 
 
 def _recording(folder: Path) -> Path:
