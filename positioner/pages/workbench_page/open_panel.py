@@ -11,8 +11,8 @@ from config.data_sheet import DataSheet, from_data_sheet
 from config.errors import InputError
 from config.loading import SHIPPED
 from config.writing import write_valve
-from positioner.pages.parts.server import MOST_BYTES
-from positioner.pages.parts.telling import aside, errors_told, heading, sentences, tell_error
+from positioner.pages.parts.drop_box import drop_box
+from positioner.pages.parts.telling import aside, errors_told, heading, sentences
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.columns_panel import ColumnsPanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
@@ -68,14 +68,7 @@ class OpenPanel:
 
     def _recording(self, files: Sequence[Path]) -> None:
         heading("Recording")
-        upload = ui.upload(
-            label="drop a recording here, or press +: CSV, Excel, MATLAB, Parquet",
-            on_upload=self._dropped,
-            on_rejected=lambda: tell_error(f"a file may have {MOST_BYTES >> 20} MiB at most"),
-            max_file_size=MOST_BYTES,
-            auto_upload=True,
-        )
-        upload.classes("w-full").props('flat bordered data-testid="drop"')
+        drop_box("drop a recording here, or press +: CSV, Excel, MATLAB, Parquet", "drop", self._dropped)
         self._offered(files)
         with ui.row().classes("items-center"):
             ui.button("Blind practice", icon="visibility_off", on_click=self._blind).props("outline no-caps")
@@ -100,10 +93,7 @@ class OpenPanel:
         held = self._desk.held_out
         said = f"held out: {held.name}" if held else "held out: the last third of it"
         with ui.expansion(said, icon="content_cut").classes("w-full").props('data-testid="held-out"'):
-            upload = ui.upload(
-                label="drop another recording of the same valve", on_upload=self._held_dropped, auto_upload=True
-            )
-            upload.classes("w-full").props('flat bordered data-testid="drop-held-out"')
+            drop_box("drop another recording of the same valve", "drop-held-out", self._held_dropped)
             if held:
                 ui.button("Hold out the last third again", on_click=lambda: self._hold_out(None)).props(
                     "outline no-caps"
@@ -125,8 +115,7 @@ class OpenPanel:
         shipped = sorted(path.stem for path in (SHIPPED / "valves").glob("*.toml"))
         self._names = ui.select(shipped, label="valve", on_change=lambda event: self._named(event.value))
         self._names.classes("w-full").props('data-testid="valve"')
-        own = ui.upload(label="or drop a valve file, .toml", on_upload=self._valve_dropped, auto_upload=True)
-        own.classes("w-full").props('flat bordered accept=".toml" data-testid="drop-valve"')
+        drop_box("or drop a valve file, .toml", "drop-valve", self._valve_dropped, 'accept=".toml"')
         with ui.expansion("from a data sheet", icon="straighten").classes("w-full"):
             self._data_sheet()
 
