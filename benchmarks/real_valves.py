@@ -1,6 +1,7 @@
 """Random valves as plants have them, under the law of slides: is anything wrong accepted, do small steps land?
 
-    python -m benchmarks.real_valves [--valves 50] [--steps 40] [--seed 0] [--left-alone-s 0 [--disturbance 0]]
+    python -m benchmarks.real_valves [--valves 50] [--steps 40] [--seed 0] [--law slides] [--periods-ms MS...]
+                                     [--left-alone-s 0 [--disturbance 0] [--reference-noise 0]]
 
 Each valve is drawn anew: stroke 20 to 100 mm, bench range 60 to 100 kPa, friction 2 to 12 % of it, F_s/F_c 1.05 to 1.4,
 stops at both ends; of preload (to 40 % of the bench range), packing asymmetry (to 30 %), presliding, I/P lag (to
@@ -22,7 +23,10 @@ loose, play w is taken up. Whoever goes on in the direction of the last slide be
 may be below 1. The first `LEARNING` steps are counted apart. Some 10 s a valve. With `--left-alone-s 3600` each is then
 left for an hour at its last reference, and changes of the command after the first minute are counted: there are none
 without a limit cycle. With `--disturbance 0.01` the I/P meanwhile drifts to and fro by 1 % of the bench range, once in
-`DRIFTS_S`: what moves the stem has to be answered, what does not, not. `--steps 0` only identifies, in seconds a valve.
+`DRIFTS_S`: what moves the stem has to be answered, what does not, not. With `--reference-noise 2e-4` a DCS writes every
+`WRITTEN_S` a reference that is off by that share of the stroke, a standard deviation; what the stem travels in that
+time stands beside the changes. `--steps 0` only identifies, in seconds a valve. `--law moves` has the law that chooses
+the move, and a staircase at every period. `--periods-ms 1 20` gives every valve each of these in place of its own.
 """
 
 import argparse
@@ -59,6 +63,7 @@ EXCURSION, AN_EXCURSION = 1.15, 0.2
 """Of the least: what is aimed at; less than this is none."""
 SETTLED_S, DRIFTS_S = 60.0, 600.0
 """Of being left alone, what does not count; period of a disturbance."""
+WRITTEN_S = 0.5
 LEARNING = 10
 """Steps in which the shortest slides are learnt."""
 PROBES = (0.35, 0.5, 0.65)
@@ -164,16 +169,16 @@ class Disturbed(Late):
 class Loop:
     """A drawn valve with the daemon's cycle, in virtual time."""
 
-    def __init__(self, each: Drawn, rng: np.random.Generator) -> None:
-        self._each = each
+    def __init__(self, each: Drawn, rng: np.random.Generator, law: str = "slides") -> None:
+        self._each, self._rng = each, rng
         period_s = each.period_s
         daemon = {
             "valve": {"stroke_m": each.stroke_m},
             "cycle": {"pace": "device", "period_s": period_s},
             "pressure": {"maximum_pa": each.maximum_pa},
             "safety": {"stale_after_s": 8 * period_s, "lost_after_cycles": 6},
-            "control": {"law": "slides", "excursion_limit": 0.5},
-            "excitation": {"staircase_limit_s": S3_LIMIT_S},
+            "control": {"law": law, "excursion_limit": 0.5},
+            "excitation": {"kind": "staircase", "staircase_limit_s": S3_LIMIT_S},
         }
         slave = {
             "clock": {"mode": "lockstep", "period_s": period_s},
@@ -230,16 +235,31 @@ class Loop:
                 last_pa, since_s = self.decision.command_pa, self.time_s
         return farthest_m
 
-    def left_alone(self, duration_s: float, disturbance: float) -> int:
-        """Return how often the command changes from now on, but for the first while, under a disturbance."""
-        self.device.amplitude_pa = disturbance * self._each.bench_pa
-        changes, until_s = 0, self.time_s + duration_s
-        settled_s = min(self.time_s + SETTLED_S, until_s)
-        while self.time_s < until_s:
-            before_pa = self.decision.command_pa
+    def left_alone(self, alone: "Alone") -> tuple[int, float]:
+        """Return what happens from now on, but for the first while: changes of the command, travel in strokes."""
+        self.device.amplitude_pa = alone.disturbance * self._each.bench_pa
+        asked_m, begin_s = self.cycle.requests.reference_m, self.time_s
+        writes, changes, travel_m = 0, 0, 0.0
+        while self.time_s < begin_s + alone.duration_s:
+            if alone.reference_noise and self.time_s - begin_s >= WRITTEN_S * writes:
+                off_m = alone.reference_noise * self._each.stroke_m * self._rng.standard_normal()
+                writes += 1
+                self.ask(reference_m=asked_m + off_m, reference_writes=self.cycle.requests.reference_writes + 1)
+            before_pa, before_m = self.decision.command_pa, self.valve.position_m
             self.cycle.once()
-            changes += self.time_s > settled_s and self.decision.command_pa != before_pa
-        return changes
+            if self.time_s > begin_s + min(SETTLED_S, alone.duration_s):
+                changes += self.decision.command_pa != before_pa
+                travel_m += abs(self.valve.position_m - before_m)
+        return changes, travel_m / self._each.stroke_m
+
+
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """How a valve is left alone after its steps: drift of the I/P over the bench range, noise of the reference, p.u."""
+
+    duration_s: float = 0.0
+    disturbance: float = 0.0
+    reference_noise: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,6 +278,8 @@ class Outcome:
     why: str
     changes: int = 0
     """Of the command, while it was left alone."""
+    strokes: float = 0.0
+    """Of the stem, in that time."""
 
 
 def probed(each: Drawn, loop: Loop) -> float:
@@ -298,11 +320,17 @@ def least_excursion_m(each: Drawn, from_m: float, to_m: float) -> float:
     return max(shortest_slide_m(each, to_m, -s), shortest_slide_m(each, to_m, s) - abs(to_m - from_m))
 
 
-def outcome(seed: int, steps: int, left_alone_s: float = 0.0, disturbance: float = 0.0) -> tuple[Drawn, Outcome]:
-    """Return a drawn valve and what became of it."""
+NOT_LEFT = Alone()
+
+
+def outcome(
+    seed: int, steps: int, alone: Alone = NOT_LEFT, law: str = "slides", period_s: float | None = None
+) -> tuple[Drawn, Outcome]:
+    """Return a drawn valve, with a period of its own unless one is given, and what became of it."""
     rng = np.random.default_rng(seed)
     each = drawn(rng)
-    loop = Loop(each, rng)
+    each = each if period_s is None else replace(each, period_s=period_s)
+    loop = Loop(each, rng, law)
     loop.identify()
     decision = loop.decision
     if decision.applied.ratios is None:
@@ -329,6 +357,8 @@ def outcome(seed: int, steps: int, left_alone_s: float = 0.0, disturbance: float
         errors.append(loop.valve.indicated_m / stroke_m - at)
         excursions.append(farthest_m / least_excursion_m(each, before_m, at * stroke_m))
     allowed = max(WITHIN, each.quantum_m / each.stroke_m)
+    why = loop.decision.inhibit_reason.name
+    changes, strokes = loop.left_alone(alone) if alone.duration_s else (0, 0.0)
     return each, Outcome(
         "accepted",
         worst,
@@ -337,14 +367,15 @@ def outcome(seed: int, steps: int, left_alone_s: float = 0.0, disturbance: float
         tuple(abs(e) <= allowed for e in errors),
         tuple(errors),
         tuple(excursions),
-        loop.decision.inhibit_reason.name,
-        loop.left_alone(left_alone_s, disturbance) if left_alone_s else 0,
+        why,
+        changes,
+        strokes,
     )
 
 
 HEAD = (
     "seed     ms  lag s  effects                            S3 s  off, deviations  residual %  landed  rms %"
-    "  excursion  changes"
+    "  excursion  changes  strokes"
 )
 GROUPS_S = ((0.0, 5e-3), (5e-3, 20e-3), (20e-3, 60e-3), (60e-3, 1.0))
 
@@ -361,7 +392,7 @@ def line(seed: int, each: Drawn, found: Outcome) -> str:
     rms = 100 * np.sqrt(np.mean(np.square(found.errors)))
     return (
         f"{head} {np.mean(found.landed):7.2f} {rms:6.3f}"
-        f" {np.quantile(found.excursions, 0.9):10.2f} {found.changes:8d} {found.why}"
+        f" {np.quantile(found.excursions, 0.9):10.2f} {found.changes:8d} {found.strokes:8.3f} {found.why}"
     )
 
 
@@ -410,12 +441,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the first valve")
     parser.add_argument("--left-alone-s", type=float, default=0.0)
     parser.add_argument("--disturbance", type=float, default=0.0, help="of an I/P that drifts, over the bench range")
+    parser.add_argument("--reference-noise", type=float, default=0.0, help="of the stroke, every 0.5 s, meanwhile")
+    parser.add_argument("--law", choices=("slides", "moves"), default="slides")
+    parser.add_argument("--periods-ms", type=float, nargs="+", default=[], help="in place of the valves' own")
     arguments = parser.parse_args()
+    alone = Alone(arguments.left_alone_s, arguments.disturbance, arguments.reference_noise)
+    periods_s = [1e-3 * each for each in arguments.periods_ms] or [None]
     print(HEAD)
     results = []
     for seed in range(arguments.seed, arguments.seed + arguments.valves):
-        results.append(outcome(seed, arguments.steps, arguments.left_alone_s, arguments.disturbance))
-        print(line(seed, *results[-1]), flush=True)
+        for period_s in periods_s:
+            results.append(outcome(seed, arguments.steps, alone, arguments.law, period_s))
+            print(line(seed, *results[-1]), flush=True)
     print("", *together(results), sep="\n")
 
 
