@@ -8,12 +8,14 @@ of the moving stem holds where it rests. No landing is
 - a rest under a pressure that still moves (`stem_at_rest`).
 
 How long a stem takes to answer is learnt: a stem that has not moved may yet, so it is waited for as long as the longest
-answer seen, for the size of the step (a rate limit). One that answers later still corrects what was learnt.
+answer seen, for the size of the step (a rate limit), or, where the pressure is measured, from its arrival on
+(`pressure_arrival`). One that answers later still corrects what was learnt.
 """
 
 from math import isnan, nan, sqrt
 from typing import NamedTuple
 
+from positioner.estimation.landings.pressure_arrival import PressureArrival
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 
 VISIBLE = 5e-3
@@ -43,6 +45,8 @@ before, for what a small step takes may be a lag, which a large one takes but on
 CREEP, INSTANTS = 1e-3, 2
 """Of the stroke, for each second that a slide takes beyond two samples: behind a slow pressure the stem creeps into its
 rest and sticks, its friction risen, a little before the pressure has come to an end."""
+ONE_SAMPLE = 1.5
+"""Intervals: a level held no longer was changed with the next sample."""
 DISTURBED = 4
 """Samples in a row that must be elsewhere."""
 
@@ -93,6 +97,7 @@ class LandingDetector:
         low_m, high_m = stops_m if stops_m is not None else (0.0, stroke_m)
         self._free_m = (low_m + STOP * stroke_m, high_m - STOP * stroke_m)
         self._window = RestWindow(stroke_m)
+        self._arrival = PressureArrival()
         self._level_pa = nan
         self._sense = 0
         self._running_on = False
@@ -112,7 +117,8 @@ class LandingDetector:
         if self._known or abs(rest.position_m - self._from_m) > self._visible_m(rest):
             return PATIENCE * self.answers.longest_s
         longest_s, slowness_s_per_pa, _ = self.answers
-        return PATIENCE * (max(longest_s, slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S)
+        waited_s = max(longest_s, slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S
+        return PATIENCE * min(waited_s, self._arrival.answered_s)
 
     def _visible_m(self, rest: Rest) -> float:
         noise_m, least_m = VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m
@@ -128,9 +134,9 @@ class LandingDetector:
         if not 0.0 < self.quantum_m < self._finer_m:
             self._learn_quantum(position_m)
         if command_pa != self._level_pa:
-            self._change_level(time_s, command_pa)
-        if self._running_on:
-            self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
+            self._change_level(time_s, command_pa, pressure_pa)
+        if self.rest is None:
+            self._follow(time_s, position_m, pressure_pa)
         self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
         if not arrived:
             self._level_s = time_s
@@ -163,9 +169,21 @@ class LandingDetector:
             divisor_m = _common_divisor(step_m, self.quantum_m, self._finest_m)
             self.quantum_m = self._window.quantum_m = divisor_m
 
-    def _change_level(self, time_s: float, command_pa: float) -> None:
+    def _follow(self, time_s: float, position_m: float, pressure_pa: float) -> None:
+        """Follow a stem that moves or may yet move, and the pressure on its way."""
+        if self._running_on:
+            self._from_m = max(self._from_m, position_m) if self._sense < 0 else min(self._from_m, position_m)
+        if self._arrival.awaited:
+            self._arrival.add(time_s, pressure_pa)
+
+    def _change_level(self, time_s: float, command_pa: float, pressure_pa: float) -> None:
         """Begin to wait for what a change of the command does; the stem starts from its rest, or from where it is."""
         step_pa = abs(command_pa - self._level_pa)
+        # Of a command that changes with each sample there is no arrival.
+        if time_s - self._level_s > ONE_SAMPLE * self._interval_s:
+            self._arrival.restart(time_s, pressure_pa, self._level_pa, command_pa, at_rest=self.rest is not None)
+        elif self._arrival.followed:
+            self._arrival.lost()
         if self.rest is None and not self._known and self._under_way:
             self._learn_answer(time_s - self._level_s)
         self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
@@ -195,6 +213,7 @@ class LandingDetector:
             self._window.restart(time_s)
         else:
             self._learn_answer(time_s - self._level_s)
+            self._arrival.learn(time_s - self._level_s)
             self._window.look_again(time_s)
 
     def _learn_answer(self, answer_s: float) -> None:
@@ -214,6 +233,7 @@ class LandingDetector:
         creep_s = max(0.0, rest.came_to_rest_s - INSTANTS * self._interval_s)
         if moved:
             self._learn_answer(rest.came_to_rest_s)
+            self._arrival.learn(rest.came_to_rest_s)
         return SlideOutcome(
             time_s=time_s,
             direction=self._sense,
