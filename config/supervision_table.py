@@ -116,7 +116,6 @@ class SupervisionTable(Schema):
     sample_age: SampleAge = SampleAge()
     plausibility: Plausibility = Plausibility()
     heartbeat: Heartbeat = Heartbeat()
-
     travel_deviation: TravelDeviation = TravelDeviation()
     frozen_sensor: FrozenSensor = FrozenSensor()
     position_rate: PositionRate = PositionRate()

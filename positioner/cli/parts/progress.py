@@ -72,7 +72,7 @@ class Progress:
             so_far = f"{now_s - self._began_s:.0f} s so far"
             if self._stream.isatty():
                 self._redraw(f", {so_far}")
-            elif not self._stream.isatty() and now_s - self._told_s >= SELDOM_S:
+            elif now_s - self._told_s >= SELDOM_S:
                 self._tell(f"{self._last or 'at work'}, {so_far}", now_s)
 
     @property
