@@ -66,4 +66,7 @@ def test_the_container_runs_as_nobody_and_ends_by_the_signal_that_is_caught() ->
     text = (DEPLOY / "container" / "Containerfile").read_text()
     assert "USER 65534:65534" in text
     assert "STOPSIGNAL SIGTERM" in text
-    assert {"tls", "canopen", "metrics"} <= set(re.findall(r"\w+", text.partition("/source[")[2].partition("]")[0]))
+    assert "--require-hashes -r /source/deploy/locked/gateway.txt" in text
+    locked = (DEPLOY / "locked" / "gateway.txt").read_text()
+    of_extras = {"cryptography", "canopen", "prometheus-client"}  # TLS, CANopen, metrics
+    assert of_extras <= set(re.findall(r"^([\w-]+)==", locked, re.MULTILINE))

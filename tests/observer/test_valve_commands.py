@@ -89,7 +89,7 @@ def test_an_observer_writes_nothing(daemon: Daemon, role: Role) -> None:
         "reference needs the role operator",
         "mode needs the role engineer",
         "acknowledge needs the role operator",
-        "eta_1 needs the role engineer",
+        "identification needs the role engineer",
     ]
     assert not any(each.done for each in said)
     assert daemon.writes == []
