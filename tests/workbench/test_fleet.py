@@ -1,98 +1,33 @@
 """Fleet: manifests, a small plant on real workers, killed workers and clients, reruns, what changed since."""
 
-import json
 import re
 import shutil
-import subprocess
-import sys
-import time
 import tomllib
-from collections.abc import Callable
-from contextlib import ExitStack
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import psutil
 import pyarrow as pa
 import pytest
-from distributed import Client, KilledWorker
-from distributed.comm.core import CommClosedError
 from pyarrow import parquet
 
-from config.errors import CommandFailed
-from config.slave_file import Sensor
 from config.valve_file import ValveFile, valve
 from config.writing import write_valve
 from positioner.cli.main import main
-from sim.composition import Composition
-from workbench.blind.input_signal import excitation
-from workbench.blind.trial import Trial
-from workbench.fleet import engine
-from workbench.fleet.examination import Change, Examination, examine
+from tests.workbench.fleets import HEAD, examined_here, plant, play, record, tables
+from workbench.fleet.examination import Change, Examination
 from workbench.fleet.fleet import fleet
 from workbench.fleet.manifest import Entry, read_manifest
 from workbench.fleet.tables import columns_told, write_tables
 from workbench.fleet.valve_course import ValveCourse
 
-HEAD = "valve,file,recording,when\n"
 PLACES = {"valve": "V", "file": "V.toml", "recording": "r.csv"}
 ROOT = Path(__file__).parents[2]
-ROWS, PERIOD_S = 1000, 0.02
-TIGHTER = {"coulomb_n": 2200.0, "static_n": 2600.0}
-PLAY = {"name": "backlash", "width_m": 4e-3}
-
-
-def record(file: ValveFile, path: Path, seed: int, *, share: float = 1.0, gain: float = 1.0) -> None:
-    """Record a valve under a command that shows what it is: a share of it arrives, the position is read by a gain."""
-    path.parent.mkdir(exist_ok=True)
-    command_pa = excitation(valve("seed").valve, np.random.default_rng(seed), ROWS)
-    composition = Composition.from_file(file)
-    answer_m = gain * Trial(share * command_pa, PERIOD_S).answer_m(composition, composition.theta)
-    Trial(command_pa, PERIOD_S).recording(answer_m, Sensor(noise_std_m=5e-5, seed=seed)).write(path)
-
-
-def play() -> ValveFile:
-    return ValveFile.model_validate({"valve": valve("seed").valve.model_dump(), "effect": [PLAY]})
-
-
-def plant(folder: Path) -> Path:
-    """A valve that is well, one whose packing was tightened, one with play, one with a recording of garbage."""
-    well = valve("seed")
-    tight = well.model_copy(update={"valve": well.valve.model_copy(update=TIGHTER)})
-    write_valve(folder / "seed.toml", well)
-    rows = []
-    for number, (name, autumn) in enumerate({"well": well, "tight": tight, "play": play(), "bad": well}.items()):
-        record(well, folder / "recordings" / f"{name}-1.csv", 2 * number)
-        record(autumn, folder / "recordings" / f"{name}-2.csv", 2 * number + 1)
-        rows += [f"{name},seed.toml,recordings/{name}-{i}.csv,2026-0{i}-01\n" for i in (1, 2)]
-    (folder / "recordings" / "bad-2.csv").write_text("no recording\n")
-    (folder / "small.csv").write_text(HEAD + "".join(rows[:4] + rows[6:]))
-    (folder / "plant.csv").write_text(HEAD + "".join([*rows, "absent,none.toml,recordings/absent.csv,2026-01-01\n"]))
-    return folder / "plant.csv"
-
-
-class Straight:
-    """In place of Dask: examines where it stands."""
-
-    def __enter__(self) -> "Straight":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
-def straight(_client: object, courses: Any, _time_limit_s: float) -> None:
-    for course in courses:
-        while (request := course.following()) is not None:
-            course.take(examine(request))
 
 
 @pytest.fixture
 def without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("workbench.fleet.fleet.work", straight)
-    monkeypatch.setattr("workbench.fleet.fleet.cluster", lambda *_: Straight())
+    examined_here(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -105,14 +40,9 @@ def ranked(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a whole run."""
     out = tmp_path_factory.mktemp("ranked")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("workbench.fleet.fleet.work", straight)
-        patch.setattr("workbench.fleet.fleet.cluster", lambda *_: Straight())
+        examined_here(patch)
         assert main(["fleet", str(site), "--out", str(out), "--report", str(out / "fleet.html")]) == 1
     return out
-
-
-def tables(out: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in out.glob("*.parquet")}
 
 
 def test_the_valves_are_ranked_by_what_their_recordings_say(site: Path, ranked: Path, without_dask: None) -> None:
@@ -335,139 +265,3 @@ def test_a_folder_of_another_form_is_refused(site: Path, tmp_path: Path, capsys:
     (tmp_path / "fleet.json").write_text('{"form": 7}\n')
     assert main(["fleet", str(site), "--out", str(tmp_path)]) == 2
     assert "form: is 7, allowed is 1" in capsys.readouterr().err
-
-
-class Future:
-    """An answer of Dask's that is none."""
-
-    def __init__(self, status: str, error: Exception | None = None) -> None:
-        self.status, self._error, self.key = status, error, "examine-1"
-
-    def exception(self) -> Exception | None:
-        return self._error
-
-    def result(self) -> None:
-        raise CommClosedError
-
-
-def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_gone_said() -> None:
-    died: Any = KilledWorker
-    killed = engine._answer(Future("error", died("examine-1", None, 3)), set(), 1.0)
-    assert killed.outcome == "unreadable"
-    assert killed.sentence == "the workers that examined it died"
-    for status in ("cancelled", "lost", "finished"):
-        with pytest.raises(CommandFailed, match="the same command goes on from there"), engine._told_when_gone():
-            engine._answer(Future(status), set(), 1.0)
-    assert engine._answer(Future("cancelled"), {"examine-1"}, 9.0).sentence == "not examined within 9 s"
-
-
-@pytest.mark.patient
-def test_no_scheduler_is_one_line(
-    site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(engine, "CONNECT_WITHIN_S", 0.5)
-    assert main(["fleet", str(site), "--out", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:1"]) == 2
-    err = capsys.readouterr().err
-    assert err.splitlines()[-1].startswith("positioner fleet: tcp://127.0.0.1:1: no scheduler answers there")
-
-
-def test_a_task_runs_since_those_before_it_at_its_worker_are_through() -> None:
-    clocks = engine._Clocks()
-    clocks.look({"here": ["first"], "there": ["other"]}, {"here": 1, "there": 1}, 0.0)
-    clocks.look({"here": ["behind", "first"], "there": ["other"]}, {"here": 1, "there": 1}, 5.0)
-    assert clocks.late(1.0) == [("here", "first"), ("there", "other")]
-    clocks.look({"here": ["behind"]}, {"here": 1}, 6.0)
-    assert clocks.late(5.9) == []
-    assert clocks.late(6.1) == [("here", "behind")]
-
-
-@pytest.mark.patient
-def test_a_recording_that_takes_too_long_is_listed_and_tried_again(
-    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An effect of one's own, a program, that does not come back in a worker."""
-    own = (ROOT / "sim" / "effects" / "preload.py").read_text()
-    endless = "import multiprocessing, time\nif multiprocessing.parent_process() is not None:\n    time.sleep(1e6)\n"
-    (tmp_path / "endless.py").write_text(own + endless)
-    text = (site.parent / "seed.toml").read_text() + "\n[[effect]]\nname = './endless.py'\nforce_n = 10.0\n"
-    (tmp_path / "seed.toml").write_text(text)
-    shutil.copy(site.parent / "recordings" / "well-1.csv", tmp_path / "r.csv")
-    (tmp_path / "plant.csv").write_text(HEAD + "V,seed.toml,r.csv,2026-01-01\n")
-    monkeypatch.setenv("POSITIONER_EFFECTS", str(tmp_path))
-    found = fleet(tmp_path / "plant.csv", tmp_path / "out", workers=1, time_limit_s=2.0)
-    assert [reason for *_, reason in found.bad] == ["not examined within 2 s"]
-    assert kept(tmp_path / "out") == 0
-    monkeypatch.delenv("POSITIONER_EFFECTS")
-    found = fleet(tmp_path / "plant.csv", tmp_path / "out", workers=1)
-    assert "lies in no folder allowed" in found.bad[0][2], "listed as well: the others would go on"
-
-
-@pytest.mark.patient
-def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_path: Path, without_dask: None) -> None:
-    out, small = tmp_path / "out", site.with_name("small.csv")
-    words = [sys.executable, "-m", "positioner.cli", "fleet", str(small), "--out", str(out), "--workers", "1"]
-    with subprocess.Popen(words, stderr=subprocess.DEVNULL, text=True) as client:
-        until(lambda: kept(out) >= 1)
-        (worker,) = workers_of(client.pid)
-        worker.kill()
-        until(lambda: kept(out) >= 3)
-        left = workers_of(client.pid)
-        client.kill()
-    until(lambda: not any(each.is_running() for each in left))
-    before = kept(out)
-    found = fleet(small, out)
-    assert found.examined == 6 - before, "five that can be read, and the unreadable one"
-    write_tables(found.courses, out)
-    write_tables(fleet(small, tmp_path / "whole").courses, tmp_path / "whole")
-    assert tables(out) == tables(tmp_path / "whole")
-
-
-@pytest.mark.patient
-def test_a_scheduler_that_is_killed_is_one_line_and_the_same_command_goes_on(
-    site: Path, tmp_path: Path, without_dask: None
-) -> None:
-    out, small, told = tmp_path / "out", site.with_name("small.csv"), tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "distributed.cli.dask_{}", "--scheduler-file", str(told)]
-    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with ExitStack() as ended:
-        running = []
-        for role, options in {"scheduler": ["--port", "0"], "worker": ["--nthreads", "1", "--no-nanny"]}.items():
-            words = [word.format(role) for word in dask] + ["--host", "127.0.0.1", *options]
-            running.append(ended.enter_context(subprocess.Popen(words, **quiet)))
-            ended.callback(running[-1].kill)
-            until(told.exists)
-        until(lambda: "tcp://" in told.read_text())
-        address = json.loads(told.read_text())["address"]
-        connected: Any = Client
-        with connected(address) as asked:
-            asked.wait_for_workers(1)
-        words = [sys.executable, "-m", "positioner.cli", "fleet", str(small), "--out", str(out)]
-        client = ended.enter_context(
-            subprocess.Popen(
-                [*words, "--scheduler", address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-            )
-        )
-        until(lambda: kept(out) >= 2 or client.poll() is not None)
-        running[0].kill()
-        _, said = client.communicate()
-    assert client.returncode == 1, said
-    assert said.splitlines()[-1] == f"positioner fleet: {engine.GONE}"
-    assert "Traceback" not in said
-    before = kept(out)
-    assert fleet(small, out).examined == 6 - before
-
-
-def kept(out: Path) -> int:
-    return len(list(out.glob("examinations/*/*.json")))
-
-
-def workers_of(pid: int) -> list[psutil.Process]:
-    children = psutil.Process(pid).children(recursive=True)
-    return [each for each in children if "spawn_main" in " ".join(each.cmdline())]
-
-
-def until(holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 250.0
-    while not holds():
-        assert time.monotonic() < end_s
-        time.sleep(0.02)
