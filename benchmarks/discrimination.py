@@ -32,7 +32,8 @@ from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
 from workbench.select.discrimination import BUDGET, FEW_MOVES, Discrimination, Played, Player, discriminate
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment

@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from workbench.compare.comparison import Comparison, compare
     from workbench.data.imposed_motion import read_imposed
     from workbench.discover.discovery import Discovery, discover
-    from workbench.fit.fitting import Fit, fit
+    from workbench.fit.fit_result import Fit
+    from workbench.fit.fitting import fit
     from workbench.fleet.fleet import Fleet, fleet
     from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
     from workbench.select.diagnosis import Diagnosis, diagnose

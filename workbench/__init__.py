@@ -24,7 +24,8 @@ Its rooms, each on those before it:
 from config.recording import Recording
 from workbench.compare.comparison import Comparison, compare
 from workbench.data.imposed_motion import read_imposed
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.extension import Extension, extend

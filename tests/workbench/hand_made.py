@@ -11,8 +11,8 @@ import numpy as np
 from config.valve_file import EffectTable, ValveFile
 from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.valves import SEED
+from workbench.fit.fit_result import Fit, Search
 from workbench.fit.fitted_parameter import Fitted
-from workbench.fit.fitting import Fit, Search
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EvaluatedModel
 

@@ -18,7 +18,8 @@ from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.data.record import Record
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
 from workbench.select.discrimination import Played, discriminate
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg

@@ -12,7 +12,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, fit_of, model_of, valve_with
 from workbench.data.held_out import split
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.select import effect_search
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EffectStep, judged_step

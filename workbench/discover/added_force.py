@@ -18,7 +18,7 @@ from sim.effect import Effect, execute
 from sim.interpreted import interpreted
 from workbench.data.held_out import Split
 from workbench.discover.grammar import Form
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.fit.landings import rests
 from workbench.model.free_run import FreeRun
 

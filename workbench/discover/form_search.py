@@ -24,7 +24,8 @@ from workbench.discover.form_file import write_forms
 from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import Form
 from workbench.discover.proposal import Proposal, proposed
-from workbench.fit.fitting import BegunFit, begun_fit, profiled
+from workbench.fit.begun_fit import BegunFit
+from workbench.fit.fitting import begun_fit, profiled
 from workbench.fit.threads import on_threads
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import BETTER, OUT_OF_RACE, EffectSearch, Progress, evaluated

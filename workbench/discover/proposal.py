@@ -29,7 +29,7 @@ from workbench.discover.added_force import Landing, landings
 from workbench.discover.grammar import Form
 from workbench.fit.breaking_off import go_on
 from workbench.fit.descent import NARROW
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.fit.objective import FINAL, SimulationError, root_weights
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import ROUGH, FreeRun

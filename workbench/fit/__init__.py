@@ -3,6 +3,8 @@
 Its files:
 
     fitting            puts it together
+    begun_fit          a fit on its way: its searches, stage by stage
+    fit_result         what it comes to
     starts, guesses    where searches begin; what the positions suggest
     setpoint_starts    the same for a valve behind its positioner
     shooting           searches by multiple shooting, where those of the free run leave something to explain

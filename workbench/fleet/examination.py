@@ -25,8 +25,9 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from config.writing import valve_toml
 from workbench.compare.comparison import NUMERICAL, Comparison, compare
+from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
-from workbench.fit.fitting import Fit, fit, local_fit, profiled
+from workbench.fit.fitting import fit, local_fit, profiled
 from workbench.select.diagnosis import Diagnosis, diagnose
 
 RULES = 3

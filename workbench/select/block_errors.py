@@ -19,7 +19,7 @@ import numpy as np
 from config.recording import Column
 from config.results.result import Brief
 from workbench.data.held_out import Part, Split, residual_m
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 from workbench.select.residual_structure import clipped, structure
 

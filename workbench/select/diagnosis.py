@@ -18,7 +18,7 @@ from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told_mm
 from workbench.fit.breaking_off import BrokenOff, ending
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
 from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table, draw_race

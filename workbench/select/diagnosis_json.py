@@ -7,7 +7,7 @@ more than a factor of 2 in it, so it never exceeds 0.5.
 from math import isfinite
 from typing import Any
 
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable

@@ -23,7 +23,7 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from sim.effect import Effect
 from workbench.data.record import Record
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import parameters_json
 from workbench.select.equivalence import classes

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import BlockErrors, relative_error_reduction
 
 LEAST_BIC = 10.0

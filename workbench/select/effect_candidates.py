@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from sim.effect import Effect, Parameter
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import (
     SAME_STANDARD_ERRORS,
     BlockErrors,

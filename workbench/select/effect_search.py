@@ -23,8 +23,10 @@ from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import Split
+from workbench.fit.begun_fit import BegunFit
 from workbench.fit.descent import NARROW, descended
-from workbench.fit.fitting import BegunFit, Fit, begun_fit, fit, profiled
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import begun_fit, fit, profiled
 from workbench.fit.objective import SimulationError
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun

@@ -22,7 +22,7 @@ from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from workbench.data.record import Record, ready
 from workbench.fit.descent import descended_through
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.fit.objective import SimulationError
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun

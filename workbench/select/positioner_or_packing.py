@@ -22,7 +22,8 @@ from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.effect import find_effect
 from workbench.data.held_out import Split
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
 from workbench.fit.setpoint_starts import FREE
 from workbench.select.block_errors import block_errors
 from workbench.select.effect_acceptance import Gain, gain

@@ -27,7 +27,8 @@ from sim.composition import Composition
 from workbench.data.held_out import joined
 from workbench.data.record import ready, require_few_samples, require_fittable
 from workbench.fit.descent import MIDDLING, descended, settled
-from workbench.fit.fitting import Fit, fit
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
 from workbench.fit.objective import FINAL, SimulationError
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun

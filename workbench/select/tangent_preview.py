@@ -18,7 +18,7 @@ from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.record import Record
 from workbench.fit.descent import NARROW
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.fit.objective import FINAL, SimulationError, root_weights
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun

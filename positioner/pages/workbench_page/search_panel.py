@@ -13,7 +13,7 @@ from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.effect_panel import effect_section
 from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
-from workbench.fit.fitting import Fit
+from workbench.fit.fit_result import Fit
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks

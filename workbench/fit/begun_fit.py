@@ -1,0 +1,210 @@
+"""A fit on its way: searches at the wide scale, the best of them at the middling one, the best of those to where they
+stay, until searches from independent starts have come to the same.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from math import inf
+from typing import TypeVar
+
+from sim.composition import Composition
+from sim.karnopp import Vector
+from workbench.fit.agreement import Place, agreeing
+from workbench.fit.descent import MIDDLING, WIDE, descended, settled
+from workbench.fit.fit_result import Fit, fit_at
+from workbench.fit.guesses import FINEST
+from workbench.fit.objective import MIDDLE, SimulationError, smoothed
+from workbench.fit.shooting import shooting_starts
+from workbench.fit.starts import moved_starts
+from workbench.fit.strewing import proved, strewn
+from workbench.fit.threads import on_threads
+from workbench.model.parameters import Parameter
+
+LEAVES = 0.6
+"""Cost a sample above which a fit leaves something to explain; that of white residuals of the noise is 0.485."""
+
+Progress = Callable[[float], None]
+T = TypeVar("T")
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much a search takes upon itself."""
+
+    carried: int
+    """Of the searches begun at the wide scale the best are carried on,"""
+    settled: int
+    """of those at most so many, two at a time, are brought to where they stay,"""
+    agreeing: int
+    """until searches from so many origins have come to the same."""
+    improves_below: float = inf
+    """Cost above which an effect makes nothing better than the base: such ends are not scanned for stairs, and do not
+    agree, as the place where the effect is off can be reached from everywhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class BegunFit:
+    """A fit whose searches have come through the wide scale or the middling one, or the best to where they stay."""
+
+    composition: Composition
+    error: SimulationError
+    places: Sequence[Place]
+    """Where the searches have come to, the best first; through the middling scale, in the order in which they go on."""
+    effort: Effort
+    workers: int | None
+    tell: Progress
+    ends: tuple[Place, ...] = ()
+    """Where the first of them stay, best first."""
+    weakest: Place | None = None
+    """Where what is added makes next to nothing of the base."""
+    added: Sequence[Parameter] = ()
+    """The parameters of what is added."""
+    waiting: Sequence[Place] = ()
+    """Starts from landings that no search has begun at."""
+    grid: Sequence[Vector] = ()
+    """Coordinates of strengths of what is added, from which multiple shooting chooses."""
+    through: bool = False
+    """Whether the searches have come through the middling scale."""
+
+    @property
+    def cost(self) -> float:
+        """Cost of the best end."""
+        return self.error.cost(self.ends[0].z)
+
+    @property
+    def screening_cost(self) -> float:
+        """Cost by which searches are compared on their way, that of the best of them."""
+        return min(self.error.rough.cost(place.z, MIDDLE) for place in self.places)
+
+    @property
+    def gain(self) -> float:
+        """The cost by which searches are compared on their way, over that with next to nothing of what is added."""
+        assert self.weakest is not None
+        return self.screening_cost / self.error.rough.cost(self.weakest.z, MIDDLE)
+
+    def landed(self) -> "BegunFit":
+        """Begin the searches from landings, which take more to begin than others, if they are not there yet."""
+        if not self.waiting:
+            return self
+        return replace(widely(self, moved_starts(self.error, self.waiting, self.added)), waiting=())
+
+    def carried(self) -> "BegunFit":
+        """Carry the searches from the wide scale through the middling one, if they are not there yet."""
+        rough = self.error.rough
+        if self.through:
+            return self
+
+        def carried(place: Place) -> Place:
+            return replace(place, z=descended(smoothed(rough, place.z), place.z, MIDDLING))
+
+        found = _each(carried, self.places, self.workers, lambda done: self.tell(0.3 + 0.2 * done))
+        ordered = sorted(found, key=lambda place: rough.cost(place.z, MIDDLE))
+        return replace(self, places=_by_origins(ordered), through=True)
+
+    @property
+    def rms_m(self) -> float:
+        """The rms error of the best that its searches have come to so far, m."""
+        return self.error.rms_m((self.ends or self.places)[0].z)
+
+    def settled(self, count: int) -> "BegunFit":
+        """Bring at most so many more of the searches to where they stay."""
+        chosen = self.places[len(self.ends) : len(self.ends) + count]
+        found = _each(self._ended, chosen, self.workers, lambda done: self.tell(0.5 + 0.4 * done))
+        return replace(self, ends=self._ordered([*self.ends, *found]))
+
+    def _ended(self, start: Place) -> Place:
+        z = settled(self.error, start.z, self.effort.improves_below)
+        return replace(start, z=strewn(self.error, z) if self._rounds(z) else z)
+
+    def _ordered(self, ends: Sequence[Place]) -> tuple[Place, ...]:
+        return tuple(sorted(ends, key=lambda end: self.error.cost(end.z)))
+
+    def finished(self, *, profile: bool) -> Fit:
+        """Return the fit, searches brought to where they stay two at a time until they agree.
+
+        Where a sensor rounds by more than the noise hides, places about the best are tried before the agreement counts.
+
+        Args:
+            profile: follow the cost for the intervals.
+        """
+        here, most = self, min(self.effort.settled, len(self.places))
+        while len(here.ends) < most and (not here.ends or agreeing(here.error, here.ends) < here.effort.agreeing):
+            # One that was there already is the first of two: the fit is the same whether it was begun apart or not.
+            here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
+        here = here.shot()
+        best = here.ends[0].z
+        if here._rounds(best) and here._shows(best):
+            here = replace(here, ends=proved(here.error, here.ends))
+        return here.judged(profile=profile)
+
+    def shot(self) -> "BegunFit":
+        """Search from starts by multiple shooting too, where the best end leaves something to explain."""
+        if self.cost <= LEAVES * self.error.count:
+            return self
+        begins = shooting_starts(self.error, self.grid, self.ends[0].z)
+        found = _each(self._ended, begins, self.workers, lambda done: self.tell(0.9 + 0.05 * done))
+        return replace(self, ends=self._ordered([*self.ends, *found]))
+
+    def left(self) -> Fit:
+        """Return the fit by the best place on the way: nothing has settled, and nothing is brought there."""
+        return replace(self, ends=tuple(self.ends or self.places)[:1], weakest=None).judged(profile=False)
+
+    def judged(self, *, profile: bool) -> Fit:
+        """Return the fit by what has settled so far.
+
+        Args:
+            profile: follow the cost for the intervals.
+        """
+        here = self._never_worse()
+        found = [end.z for end in here.ends]
+        agree = agreeing(self.error, here.ends) if self._shows(found[0]) else 1
+        result = fit_at(self.error, self.composition, found, agree, profile=profile)
+        self.tell(1.0)
+        return result
+
+    def _never_worse(self) -> "BegunFit":
+        """Search from the base too where all ends are worse than that."""
+        if self.weakest is None or self.cost <= self.error.cost(self.weakest.z):
+            return self
+        end = replace(self.weakest, z=settled(self.error, self.weakest.z, self.effort.improves_below))
+        return replace(self, ends=(end, *self.ends))
+
+    def _shows(self, z: Vector) -> bool:
+        """Whether what is added makes something better than the base, a quantum by more than the noise hides."""
+        theta, noise_m = self.error.theta(z), self.error.run.record.scale_m
+        quanta_m = [theta[each.index] for each in self.error.parameters if each.guess == "quantum"]
+        return self.error.cost(z) < self.effort.improves_below and all(each >= FINEST * noise_m for each in quanta_m)
+
+    def _rounds(self, z: Vector) -> bool:
+        """Whether the sensor rounds at z, and that makes something better than the base."""
+        return smoothed(self.error, z) is not self.error and self.error.cost(z) < self.effort.improves_below
+
+
+def widely(fit: BegunFit, begins: Sequence[Place]) -> BegunFit:
+    """Search from more starts at the wide scale."""
+    rough = fit.error.rough
+
+    def begun(start: Place) -> Place:
+        return replace(start, z=descended(smoothed(rough, start.z), start.z, WIDE))
+
+    found = [*fit.places, *_each(begun, begins, fit.workers, lambda done: fit.tell(0.3 * done))]
+    ordered = sorted(found, key=lambda place: rough.cost(place.z, MIDDLE))
+    return replace(fit, places=ordered[: fit.effort.carried])
+
+
+def _by_origins(places: Sequence[Place]) -> list[Place]:
+    """Return the first of each origin, then the second of each, and so on: those that can agree come first."""
+    turns = [sum(other.origin == each.origin for other in places[:i]) for i, each in enumerate(places)]
+    return [places[i] for i in sorted(range(len(places)), key=turns.__getitem__)]
+
+
+def _each(function: Callable[[T], S], arguments: Sequence[T], workers: int | None, tell: Progress) -> list[S]:
+    """Apply a function to each argument on the workers; results in the order of the arguments."""
+    results = []
+    with closing(on_threads(function, arguments, workers)) as found:
+        for result in found:
+            results.append(result)
+            tell(len(results) / len(arguments))
+    return results
