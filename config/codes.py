@@ -238,15 +238,15 @@ class EventKind(Code):
     FAULT_GONE = 4, "a fault is acknowledged and gone"
     ALARM = 5, "an alarm"
     ALARM_GONE = 6, "an alarm is over"
-    MODE = 7, "the mode is another"
-    HEALTH = 8, "the NE 107 status is another"
+    MODE = 7, "the mode has changed"
+    HEALTH = 8, "the NE 107 status has changed"
     EXCITED = 9, "the valve is excited"
     EXCITATION_ENDED = 10, "the excitation has ended"
     IDENTIFIED = 11, "an identification was applied"
     NOT_IDENTIFIED = 12, "an identification was refused"
     RESTORED = 13, "what is known from before a restart is judged anew"
     EXPERIMENT = 14, "a played experiment"
-    CONFIGURATION = 15, "the configuration is another than at the last start"
+    CONFIGURATION = 15, "the configuration has changed since the last start"
     HISTORY_GAP = 16, "the history has a gap"
     HISTORY_ANEW = 17, "the history was unreadable, set aside and begun anew"
     CLOCK_SET = 18, "the gateway's clock was set"
@@ -267,3 +267,14 @@ CAUSES: dict[EventKind, type[Code]] = {
     EventKind.EXPERIMENT: ExperimentState,
 }
 """The code of an event's cause; of a kind that is not here the cause is 0, and a text says it."""
+NO_CAUSE = (InhibitReason.NOTHING, Ne107Cause.NONE)
+"""Such a cause is none, and nothing is said of it."""
+
+
+def cause_text(kind: EventKind, cause: int) -> str:
+    """Return what the number of an event's cause says; empty where there is none, or none that this version knows."""
+    code = CAUSES.get(kind)
+    if code is None or cause not in list(code):
+        return ""
+    found = code(cause)
+    return "" if any(found is each for each in NO_CAUSE) else found.text

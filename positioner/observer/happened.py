@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from config.codes import CAUSES, EventKind, Ne107Status
+from config.codes import EventKind, Ne107Status, cause_text
 from config.errors import InputError
 from positioner.history import HistoryReader
 from positioner.history.entries import Event
@@ -63,8 +63,7 @@ def served_event(valve: str, values: Mapping[str, float]) -> Event | None:
     kind, ne107, cause = (int(values[name]) for name in ("event", "event_class", "event_cause"))
     known = kind in list(EventKind)
     name = EventKind(kind).name if known else ""
-    code = CAUSES.get(EventKind(kind)) if known else None
-    text = code(cause).text if code is not None and cause in list(code) else ""
+    text = cause_text(EventKind(kind), cause) if known else ""
     return Event(valve, int(number), values["event_time"], kind, name, ne107, cause, text)
 
 

@@ -24,7 +24,7 @@ def test_a_history_tells_all_newest_first_and_only_of_this_valve(tmp_path: Path)
     try:
         assert what_happened(tmp_path, "FV-101", (), 5).source == FROM_HISTORY
         assert told(tmp_path, MODE) == [
-            ("the mode is another: automatic", ""),
+            ("the mode has changed: automatic", ""),
             ("a fault is latched: no reply", "F failure"),
         ]
     finally:
@@ -33,7 +33,7 @@ def test_a_history_tells_all_newest_first_and_only_of_this_valve(tmp_path: Path)
 
 def test_without_one_the_newest_as_served_are_told_and_why(tmp_path: Path) -> None:
     assert told(None, FAULT, MODE) == [
-        ("the mode is another: automatic", ""),
+        ("the mode has changed: automatic", ""),
         ("a fault is latched: no reply", "F failure"),
     ]
     assert what_happened(None, "FV-101", (), 5).source == AS_SERVED
@@ -41,6 +41,14 @@ def test_without_one_the_newest_as_served_are_told_and_why(tmp_path: Path) -> No
     assert gone.source.startswith(AS_SERVED)
     assert "No such file" in gone.source
     assert len(gone.lines) == 1
+
+
+def test_of_an_event_without_a_cause_no_cause_is_told() -> None:
+    values = {"event_number": 4.0, "event_time": 1e9, "event_class": 0.0, "event_cause": 0.0}
+    ended = served_event("FV-101", values | {"event": float(EventKind.EXCITATION_ENDED)})
+    held = served_event("FV-101", values | {"event": float(EventKind.MODE)})
+    assert told(None, *filter(None, (ended,))) == [("the excitation has ended", "")]
+    assert told(None, *filter(None, (held,))) == [("the mode has changed: hold", "")]
 
 
 def test_events_that_came_between_two_readings_are_counted() -> None:

@@ -79,7 +79,7 @@ def test_events_have_their_fields(history: RecordedHistory) -> None:
     events, _ = asyncio.run(history.read_event_history(VALVE, None, None, 0, None))
     assert [each.Number for each in events] == [3, 2, 1]
     assert (events[0].SourceName, events[0].EventType, events[0].Severity) == ("FV 1", EVENT_TYPE, 100)
-    assert events[0].Message.Text == "the mode is another: automatic"
+    assert events[0].Message.Text == "the mode has changed: automatic"
 
 
 def test_without_a_history_or_of_another_node_there_is_none(history: RecordedHistory, tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def moved_by_an_engineer(page: Page) -> None:
     expect(page.get_by_test_id("mode")).to_have_text("automatic, S1 up")
     expect(page.get_by_test_id("events")).to_contain_text("mode: hold -> automatic")
     expect(page.get_by_test_id("history")).to_contain_text("from the daemon's history")
-    expect(page.get_by_test_id("history")).to_contain_text("the mode is another: automatic")
+    expect(page.get_by_test_id("history")).to_contain_text("the mode has changed: automatic")
     expect(page.get_by_test_id("history")).to_contain_text("the daemon started")
     page.get_by_test_id("work-out").click()
     expect(page.get_by_test_id("moves")).to_contain_text("reference_m")

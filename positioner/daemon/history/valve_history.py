@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
-from config.codes import CAUSES, EventKind, Ne107Status
+from config.codes import EventKind, Ne107Status, cause_text
 from positioner.control.controller_memory import Decision
 from positioner.daemon.health.ne107 import FaultClasses
 from positioner.daemon.history.audited_writes import Told, written_text
@@ -108,8 +108,7 @@ class ValveHistory:
     def numbered(self, time_s: float, happened: Happened) -> Event:
         """Return an event as the next one, s since 1970. In the keeper's thread."""
         kind, status, cause, text = happened
-        if not text and (code := CAUSES.get(kind)) is not None:
-            text = code(cause).text
+        text = text or cause_text(kind, int(cause))
         self.newest = Event(
             self.valve, self.newest.number + 1, time_s, int(kind), kind.name, int(Ne107Status(status)), int(cause), text
         )
