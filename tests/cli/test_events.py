@@ -51,8 +51,8 @@ def test_events_are_lines_or_json_by_valve_time_and_number(tmp_path: Path, capsy
         "good",
         "the",
         "mode",
-        "is",
-        "another:",
+        "has",
+        "changed:",
         "automatic",
     ]
     (newest,) = printed(capsys, folder, "--valve", "FV 1", "--json", "--limit", "1")
