@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 from config.codes import Quality
 from config.daemon_file import DaemonFile
-from drivers.boundary import Driver, DriverError, NoNumber, Reading, ReadsBack, Refused
+from drivers.boundary import Driver, DriverError, NoNumber, NoReply, Reading, ReadsBack, Refused
 from positioner.control.sample import Sample
 from positioner.daemon.backoff import Backoff, Sayings
 from positioner.daemon.logs import log_event
@@ -32,6 +32,8 @@ LONG_COUNTER = 1 << 16
 """A counter of fewer numbers may well pass half of them from one reading to the next."""
 MOST_REFUSALS = 2
 """Exceptions in a row on a connection that stays; after more the device is looked at anew."""
+TRIES_AT_START = 3
+"""Replies lost in a row at the start, that end it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +104,24 @@ class Link:
     def open(self) -> tuple[float, Reading]:
         """Connect for the first time; return the command the device holds, in Pa, and a first reading.
 
+        A reply that is lost is asked for again: one alone ends no daemon that runs, and so none that begins.
+
         Raises:
             DriverError: the device is not there or does not answer as it should.
         """
+        for _ in range(TRIES_AT_START - 1):
+            try:
+                return self._opened()
+            except NoReply as error:
+                self._say(logging.WARNING, "no reply at the start, asked again", reason=str(error))
+                self._driver.close()
+        return self._opened()
+
+    def _opened(self) -> tuple[float, Reading]:
         held_pa = self._driver.open()
+        reading = self._driver.read()
         self._connected = True
-        return held_pa, self._driver.read()
+        return held_pa, reading
 
     @property
     def longest_unattended_s(self) -> float:

@@ -84,6 +84,27 @@ def test_a_lost_reply_keeps_the_last_values_and_says_so() -> None:
     assert link.counts.lost_replies == 1
 
 
+@pytest.mark.parametrize(("lost", "begins"), [(2, True), (3, False)])
+def test_a_reply_lost_at_the_start_is_asked_for_again(lost: int, begins: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    driver = Scripted()
+    readings: list[Reading | None] = [None] * lost + [reading(1)]
+
+    def read() -> Reading:
+        if (answer := readings.pop(0)) is None:
+            raise NoReply("silent")
+        return answer
+
+    monkeypatch.setattr(driver, "read", read)
+    link = Link(driver, DevicePace())
+    if begins:
+        assert link.open() == (driver.held_pa, reading(1))
+        assert (driver.opened, driver.closed) == (3, 2)
+    else:
+        with pytest.raises(NoReply):
+            link.open()
+    assert driver.sent_pa == [], "nothing is commanded at the start"
+
+
 def test_after_a_loss_it_connects_anew_and_looks_before_it_commands() -> None:
     """A device that was restarted must not be moved by the command it had before, nor its status be cleared by it."""
     driver = Scripted(reading(1), NoConnection("gone"), reading(2), held_pa=0.0)
