@@ -20,11 +20,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from threading import Event, Thread
-from typing import Any
 
 import numpy as np
 import psutil
 
+from benchmarks.kept_lines import Line, kept
 from config.slave_file import Sensor
 from config.valve_file import ValveFile, load_valve
 from config.writing import write_valve
@@ -69,7 +69,7 @@ def _valve(folder: Path, name: str, seed: int) -> None:
         trial.recording(clean_m, sensor).write(folder / "recordings" / f"{name}-{i}.csv")
 
 
-def measured(folder: Path, count: int, workers: int) -> dict[str, Any]:
+def measured(folder: Path, count: int, workers: int) -> Line:
     """Return what a whole run takes, this process and its children."""
     peak, ended = {"client": 0, "worker": 0}, Event()
     here = psutil.Process()
@@ -106,7 +106,7 @@ def measured(folder: Path, count: int, workers: int) -> dict[str, Any]:
     }
 
 
-def table(runs: Sequence[dict[str, Any]]) -> list[str]:
+def table(runs: Sequence[Line]) -> list[str]:
     """Return a line a run, then what one more recording takes."""
     ordered = sorted(runs, key=lambda each: (each["workers"], each["recordings"]))
     lines = ["workers  recordings   clock s  rec./s  client CPU s  workers' CPU s  client MiB  worker MiB  complaints"]
@@ -122,7 +122,7 @@ def table(runs: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _slope(low: dict[str, Any], high: dict[str, Any]) -> list[str]:
+def _slope(low: Line, high: Line) -> list[str]:
     more = high["recordings"] - low["recordings"]
     client_s = (high["client_cpu_s"] - low["client_cpu_s"]) / more
     worker_s = (high["workers_cpu_s"] - low["workers_cpu_s"]) / more
@@ -162,20 +162,19 @@ def main(words: Sequence[str] | None = None) -> None:
     if given.one:
         print(json.dumps(measured(given.folder, given.recordings[0], given.workers[0])))
         return
-    kept = given.folder / "scaling.jsonl"
+    file = given.folder / "scaling.jsonl"
     for count in sorted(given.recordings):
         make(given.folder, count)
         for workers in given.workers:
-            runs = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
-            if not any((each["recordings"], each["workers"]) == (count, workers) for each in runs):
+            if not any((each["recordings"], each["workers"]) == (count, workers) for each in kept(file)):
                 command = [sys.executable, "-m", "benchmarks.fleet_scaling", str(given.folder), "--one"]
                 command += ["--recordings", str(count), "--workers", str(workers)]
                 said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
-                with kept.open("a") as file:
-                    file.write(said.splitlines()[-1] + "\n")
+                with file.open("a") as lines:
+                    lines.write(said.splitlines()[-1] + "\n")
     examined_s, kept_s = alone_s(given.folder, min(given.recordings))
     print(f"without Dask: examined in {1e3 * examined_s:.1f} ms of CPU, named and kept in {1e3 * kept_s:.1f} ms")
-    print("\n".join(table([json.loads(line) for line in kept.read_text().splitlines()])))
+    print("\n".join(table(kept(file))))
 
 
 if __name__ == "__main__":

@@ -13,17 +13,14 @@ Cases are kept a line each: the same command goes on where it ended, and prints 
 """
 
 import argparse
-import json
 import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from itertools import pairwise
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.kept_lines import Line, kept, run
 from benchmarks.simulated_fleet import DURATION_S, PERIOD_S, recorded
 from config.recording import Column
 from config.valve_file import EffectTable, ValveFile
@@ -41,7 +38,7 @@ WEAKEST = 0.03
 ALLOWED = (1.05, 1.1, 1.15, 1.2, 1.5)
 
 
-def case(seed: int) -> dict[str, Any]:
+def case(seed: int) -> Line:
     """Return what the triage makes of a valve with an effect, and how strong that is."""
     generator = np.random.default_rng([seed, 1])
     pool = first_effects()
@@ -86,7 +83,7 @@ def _answer_m(trial: Trial, valve: ValveFile) -> Column:
     return trial.answer_m(composition, composition.theta)
 
 
-def table(cases: Sequence[dict[str, Any]]) -> list[str]:
+def table(cases: Sequence[Line]) -> list[str]:
     """Return lines: the share left undiagnosed by strength, for each error that a look or a refit may leave."""
     head = "".join(f"{f'{floors:g} floors':>14}" for floors in ALLOWED)
     lines = [f"{'strength, floors':18}{'cases':>7}{head}"]
@@ -108,7 +105,7 @@ def _is_through(passes: float | None, most: float = AT_FLOOR) -> bool:
     return passes is not None and passes <= most
 
 
-def _told(each: dict[str, Any]) -> str:
+def _told(each: Line) -> str:
     return (
         f"  undiagnosed: {each['effect']} {each['strength']:.2f} floors, seed {each['seed']}, {each['passes']:.3f} left"
     )
@@ -121,17 +118,10 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--seed", type=int, default=5000)
     given = parser.parse_args(words)
-    lines = given.file.read_text().splitlines() if given.file.exists() else []
-    cases = [json.loads(line) for line in lines]
+    cases = kept(given.file)
     there = {each["seed"] for each in cases}
-    wanted = [seed for seed in range(given.seed, given.seed + given.cases) if seed not in there]
-    with (
-        given.file.open("a") as kept,
-        ProcessPoolExecutor(given.workers, mp_context=get_context("spawn")) as pool,
-    ):
-        for future in as_completed([pool.submit(case, seed) for seed in wanted]):
-            cases.append(future.result())
-            print(json.dumps(cases[-1]), file=kept, flush=True)
+    wanted = [(seed,) for seed in range(given.seed, given.seed + given.cases) if seed not in there]
+    cases += run(given.file, case, wanted, given.workers)
     print(f"left undiagnosed, by what a look or a refit may leave; the fleet's is {AT_FLOOR:g} floors")
     print("\n".join(table(cases)))
 

@@ -50,6 +50,13 @@ class ColumnPreview:
         found = [cell for cell in self.cells if cell != ""]
         return bool(found) and sum(isinstance(cell, float) or is_numeral(cell) for cell in found) > len(found) / 2
 
+    @property
+    def status_words(self) -> str:
+        """The words by which it says which rows are good; empty of a column that does not."""
+        if self.numbers or not STATUS.search(self.name):
+            return ""
+        return ", ".join(sorted({str(cell) for cell in self.cells if cell != ""})[:5])
+
 
 @dataclass(frozen=True, slots=True)
 class ExportPreview:
@@ -150,8 +157,7 @@ def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[s
 def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], separator: str) -> Iterator[str]:
     """Yield what a person must look at beyond the columns that were chosen."""
     for each in left:
-        if STATUS.search(each.name) and not each.numbers:
-            held = ", ".join(sorted({str(cell) for cell in each.cells if cell != ""})[:5])
+        if held := each.status_words:
             yield f"{each.name!r} holds {held}: --status {_quoted(each.name + '=GOOD')} leaves the other rows out"
     if said := _row_a_value(columns):
         yield said

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from config.errors import InputError
 from config.exports.column_mapping import Source, read_mapping
-from config.exports.export_preview import COMMON, STATUS, ColumnPreview, ExportPreview
+from config.exports.export_preview import COMMON, ColumnPreview, ExportPreview
 from config.exports.export_units import SHARES
 from config.exports.mapping_file import MappingTable
 
@@ -58,9 +58,8 @@ def _column(ours: str, proposed: str | None, found: ExportPreview, ask: Ask) -> 
 
 
 def _status(column: ColumnPreview, ask: Ask) -> str:
-    if column.numbers or not STATUS.search(column.name):
+    if not (held := column.status_words):
         return ""
-    held = ", ".join(sorted({str(cell) for cell in column.cells if cell != ""})[:5])
     good = ask(f"{column.name!r} holds {held}: which are good, by commas; nothing if it does not matter?", "")
     return f"{column.name}={good}" if good else ""
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from config.errors import InputError
 from config.exports.raw_table import RawTable
-from config.exports.typed_tables import column_rows, first_line
+from config.exports.typed_tables import by_length, column_rows, first_line, no_vectors
 from config.extras import needed
 from config.plain_file import require_moderate
 
@@ -43,7 +43,7 @@ def hdf5(path: Path) -> list[RawTable]:
         raise
     except Exception as error:  # a damaged file fails anywhere in the HDF5 library
         raise InputError(str(path), f"is a damaged HDF5 file: {first_line(error)}") from None
-    return _by_length(path, columns)
+    return _required(path, _tables(columns, "vectors"))
 
 
 def _datasets(path: Path, h5py: Any, group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -97,7 +97,8 @@ def tdms(path: Path) -> list[RawTable]:
     except Exception as error:  # a damaged file fails anywhere in its reader
         raise InputError(str(path), f"is a damaged TDMS file: {first_line(error)}") from None
     notes = (("torn", told.first),) if told.first else ()
-    return [replace(table, notes=notes) for name, columns in groups for table in _tables(columns, name)] or _none(path)
+    tables = [replace(table, notes=notes) for name, columns in groups for table in _tables(columns, name)]
+    return _required(path, tables)
 
 
 class _Told(logging.Handler):
@@ -140,7 +141,7 @@ def mdf4(path: Path) -> list[RawTable]:
         raise
     except Exception as error:  # a damaged file fails anywhere in its reader
         raise InputError(str(path), f"is a damaged MDF file: {first_line(error)}") from None
-    return [table for name, columns in groups for table in _tables(columns, name)] or _none(path)
+    return _required(path, [table for name, columns in groups for table in _tables(columns, name)])
 
 
 def _opened_mdf(asammdf: Any, path: Path) -> Any:
@@ -177,20 +178,17 @@ def _mdf_group(path: Path, file: Any, index: int) -> Columns:
 
 def _tables(columns: Columns, name: str) -> list[RawTable]:
     """Return a table for each length among columns, the longest first."""
-    lengths = sorted({len(each) for each in columns.values() if len(each) > 1}, reverse=True)
-    by_length = [{key: each for key, each in columns.items() if len(each) == length} for length in lengths]
     return [
         RawTable(f"{name}, {length} rows", "row", partial(column_rows, chosen), length=length)
-        for length, chosen in zip(lengths, by_length, strict=True)
+        for length, chosen in by_length(columns)
+        if length > 1
     ]
 
 
-def _by_length(path: Path, columns: Columns) -> list[RawTable]:
-    return _tables(columns, "vectors") or _none(path)
-
-
-def _none(path: Path) -> list[RawTable]:
-    raise InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
+def _required(path: Path, tables: list[RawTable]) -> list[RawTable]:
+    if not tables:
+        raise no_vectors(path)
+    return tables
 
 
 def _named(name: str, unit: str) -> str:

@@ -87,14 +87,22 @@ def matlab(path: Path) -> list[RawTable]:
     except Exception as error:  # a damaged file fails anywhere in scipy's reader
         raise InputError(str(path), f"is a damaged MATLAB file: {first_line(error)}") from None
     columns = dict(_vectors({name: value for name, value in found.items() if not name.startswith("__")}))
-    lengths = sorted({len(each) for each in columns.values()}, reverse=True)
-    if not lengths:
-        raise InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
-    tables = []
-    for length in lengths:
-        chosen = {name: each for name, each in columns.items() if len(each) == length}
-        tables.append(RawTable(f"vectors of {length}", "row", partial(column_rows, chosen)))
-    return tables
+    if not columns:
+        raise no_vectors(path)
+    return [
+        RawTable(f"vectors of {length}", "row", partial(column_rows, chosen)) for length, chosen in by_length(columns)
+    ]
+
+
+def no_vectors(path: Path) -> InputError:
+    """Return what to say of a file without vectors."""
+    return InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
+
+
+def by_length(columns: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the lengths of columns, the longest first, and the columns of each."""
+    for length in sorted({len(each) for each in columns.values()}, reverse=True):
+        yield length, {name: each for name, each in columns.items() if len(each) == length}
 
 
 def _vectors(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

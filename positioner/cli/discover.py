@@ -36,9 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Discover and print; 0 if a form explains the recordings, or nothing is left to explain, else 1."""
     from config.extras import needed
     from config.valve_file import find_valve, load_valve
-    from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import Progress
+    from positioner.cli.parts.progress import at_work
     from workbench.discover.discovery import discover
     from workbench.discover.discovery_json import as_json
 
@@ -52,8 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
     named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
-    progress = Progress()
-    with naming(named), told_when_broken_off("discover", lambda: progress.known), progress:
+    with naming(named), at_work("discover") as progress:
         found = discover(
             recordings, valve, test=test, seed=arguments.seed, on_proposal=_tell_proposal, progress=progress
         )

@@ -36,9 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     import time
 
     from config.valve_file import find_valve, load_valve
-    from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.progress import Progress
+    from positioner.cli.parts.progress import at_work
     from workbench.report import report_journal, require_plotly
     from workbench.select.extension import extend
     from workbench.select.extension_journal import Journal, write_extended
@@ -56,8 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     test = noise_said(read_any(arguments.test, arguments, valve.valve.stroke_m), arguments) if arguments.test else None
     Journal.beside(path)  # what is none is refused before the work begins
     named = {"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}
-    progress = Progress()
-    with naming(named), told_when_broken_off("extend", lambda: progress.known), progress:
+    with naming(named), at_work("extend") as progress:
         extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=progress)
     journal = write_extended(extension, path, arguments.out)
     print(extension.summary())

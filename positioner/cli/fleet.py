@@ -55,8 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     writable(arguments.picture, "--picture")
     if arguments.picture is not None:
         needed("matplotlib.pyplot", "--picture")
-    if arguments.picture is not None and arguments.since is None:
-        raise InputError("--picture", "draws what changed since a date: give it as --since DATE")
+        if arguments.since is None:
+            raise InputError("--picture", "draws what changed since a date: give it as --since DATE")
     if arguments.diagnoses < 0:
         raise InputError("--diagnoses", f"must be 0 or more, got {arguments.diagnoses}")
     if arguments.report is not None and arguments.diagnoses:

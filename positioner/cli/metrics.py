@@ -20,17 +20,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve until told to end."""
     from threading import Event
 
-    from config.errors import InputError
     from config.extras import needed
     from positioner.cli.parts.daemon_address import client_tls
+    from positioner.cli.parts.page_address import require_port
     from positioner.cli.parts.served_valves import places_in
 
     needed("prometheus_client", "positioner metrics")
     from positioner.metrics.exporter import serve_metrics
     from positioner.metrics.scraped_valve import ScrapedValve
 
-    if not 0 <= arguments.listen_port <= 65535:
-        raise InputError("--listen-port", f"must lie between 0 (any free one) and 65535, got {arguments.listen_port}")
+    require_port("--listen-port", arguments.listen_port)
     tls = None if arguments.tls is None else client_tls(*arguments.tls)
     valves = [ScrapedValve(each.name, (each.host, each.port, each.unit), tls) for each in places_in(arguments.config)]
     port = serve_metrics(valves, arguments.listen_host, arguments.listen_port)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from positioner.cli.parts.page_address import MOST_PORT
+from positioner.cli.parts.page_address import require_port
 from positioner.cli.parts.served_valves import add_certificates, certificates, places_in, set_role_password
 
 HELP = "serve running valves to OPC UA clients: signed and encrypted, users by role, the history of the daemon"
@@ -45,9 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     for option in ("users", "keys"):
         if getattr(arguments, option) is None:
             raise InputError(f"--{option}", "is needed: nobody comes in without a password and a trusted certificate")
-    if not 0 <= arguments.listen_port <= MOST_PORT:
-        said = f"must lie between 0 (any free one) and {MOST_PORT}, got {arguments.listen_port}"
-        raise InputError("--listen-port", said)
+    require_port("--listen-port", arguments.listen_port)
     sign_in = SignIn(read_passwords(arguments.users))
     places = list(places_in(arguments.config, *certificates(arguments)))
     needed("asyncua", "positioner opcua")

@@ -16,7 +16,7 @@ from asyncua.common.events import Event as UaEvent
 from asyncua.common.utils import ServiceError
 from asyncua.server.history import HistoryStorageInterface
 
-from config.codes import EventKind, Ne107Status
+from config.codes import Ne107Status
 from config.errors import InputError
 from positioner.history import HistoryReader
 from positioner.history.entries import Event, HealthHour, Identification
@@ -82,8 +82,8 @@ class RecordedHistory(HistoryStorageInterface):  # type: ignore[misc]  # asyncua
     ) -> tuple[list[ua.DataValue], datetime | None]:
         """Return the values of a stretch, and from when on to go on."""
         recorded = self._recorded(node_id)
-        points = await _in_a_thread(_points, recorded)
-        chosen, further = _stretch(points, start, end, nb_values)
+        stretch = _Stretch.between(start, end)
+        chosen, further = stretch.cut(await _in_a_thread(_points, recorded, stretch.since_s), nb_values)
         return [_value(time_s, value, recorded.of) for time_s, value in chosen], further
 
     async def read_event_history(
@@ -91,8 +91,8 @@ class RecordedHistory(HistoryStorageInterface):  # type: ignore[misc]  # asyncua
     ) -> tuple[list[UaEvent], datetime | None]:
         """Return the events of a stretch, and from when on to go on."""
         recorded = self._recorded(source_id)
-        events = await _in_a_thread(_events, recorded)
-        chosen, further = _stretch(events, start, end, nb_values)
+        stretch = _Stretch.between(start, end)
+        chosen, further = stretch.cut(await _in_a_thread(_events, recorded, stretch.since_s), nb_values)
         return [_event(event, source_id, self._event_type) for _, event in chosen], further
 
     def _recorded(self, node_id: ua.NodeId) -> Recorded:
@@ -101,22 +101,22 @@ class RecordedHistory(HistoryStorageInterface):  # type: ignore[misc]  # asyncua
         return self._nodes[node_id]
 
 
-async def _in_a_thread(read: Any, recorded: Recorded) -> list[Any]:
+async def _in_a_thread(read: Any, recorded: Recorded, since_s: float | None) -> list[Any]:
     try:
-        return list(await asyncio.to_thread(read, recorded))
+        return list(await asyncio.to_thread(read, recorded, since_s))
     except InputError:  # it is not there yet, or is another version's: the daemon says so
         raise ServiceError(ua.StatusCodes.BadNoData) from None
 
 
-def _points(recorded: Recorded) -> list[tuple[float, float]]:
-    """Return times, s since 1970, and values, oldest first."""
+def _points(recorded: Recorded, since_s: float | None) -> list[tuple[float, float]]:
+    """Return times, s since 1970, and values from a time on, oldest first."""
     with HistoryReader(recorded.file) as history:
         if recorded.node in BY_HOUR:
             column = BY_HOUR[recorded.node]
-            hours = history.rows(HealthHour, recorded.valve)
+            hours = history.rows(HealthHour, recorded.valve, since_s)
             return sorted((float(each.hour_s), _served(recorded.node, getattr(each, column))) for _, each in hours)
         column = BY_IDENTIFICATION[recorded.node]
-        found = history.rows(Identification, recorded.valve)
+        found = history.rows(Identification, recorded.valve, since_s)
         return sorted((each.time_s, getattr(each, column)) for _, each in found)
 
 
@@ -127,29 +127,42 @@ def _served(node: str, value: float) -> float:
     return math.nan if health is None else health
 
 
-def _events(recorded: Recorded) -> Iterator[tuple[float, Event]]:
+def _events(recorded: Recorded, since_s: float | None) -> Iterator[tuple[float, Event]]:
     with HistoryReader(recorded.file) as history:
-        yield from sorted(((each.time_s, each) for each in history.events(recorded.valve)), key=lambda each: each[0])
+        events = history.events(recorded.valve, since_s)
+        yield from sorted(((each.time_s, each) for each in events), key=lambda each: each[0])
 
 
-def _stretch(
-    points: list[tuple[float, T]], start: datetime | None, end: datetime | None, most: int
-) -> tuple[list[tuple[float, T]], datetime | None]:
-    """Return what lies in a stretch, backwards if it ends before it begins or has no beginning, and where to go on."""
-    begin_s, end_s = _seconds(start), _seconds(end)
-    backwards = begin_s is None or (end_s is not None and end_s < begin_s)
-    low_s, high_s = (end_s, begin_s) if backwards else (begin_s, end_s)
-    low_s, high_s = -math.inf if low_s is None else low_s, math.inf if high_s is None else high_s
-    if begin_s is None and end_s is not None:
-        low_s, high_s = -math.inf, end_s
-    chosen = [each for each in points if low_s <= each[0] <= high_s]
-    if backwards:
-        chosen.reverse()
-    if most and len(chosen) > most:
-        return chosen[:most], None
-    if len(chosen) > MOST_AT_ONCE:
-        return chosen[:MOST_AT_ONCE], _moment(chosen[MOST_AT_ONCE][0])
-    return chosen, None
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """What a client asks for, s since 1970; backwards if it ends before it begins or has no beginning."""
+
+    low_s: float
+    high_s: float
+    backwards: bool
+
+    @classmethod
+    def between(cls, start: datetime | None, end: datetime | None) -> "_Stretch":
+        begin_s, end_s = _seconds(start), _seconds(end)
+        backwards = begin_s is None or (end_s is not None and end_s < begin_s)
+        low_s, high_s = (end_s, begin_s) if backwards and begin_s is not None else (begin_s, end_s)
+        return cls(-math.inf if low_s is None else low_s, math.inf if high_s is None else high_s, backwards)
+
+    @property
+    def since_s(self) -> float | None:
+        """Its beginning; None: none."""
+        return self.low_s if math.isfinite(self.low_s) else None
+
+    def cut(self, points: list[tuple[float, T]], most: int) -> tuple[list[tuple[float, T]], datetime | None]:
+        """Return what of points, oldest first, lies in it, at most so many, and where to go on."""
+        chosen = [each for each in points if self.low_s <= each[0] <= self.high_s]
+        if self.backwards:
+            chosen.reverse()
+        if most and len(chosen) > most:
+            return chosen[:most], None
+        if len(chosen) > MOST_AT_ONCE:
+            return chosen[:MOST_AT_ONCE], _moment(chosen[MOST_AT_ONCE][0])
+        return chosen, None
 
 
 def _seconds(moment: datetime | None) -> float | None:
@@ -175,9 +188,7 @@ def _value(time_s: float, value: float, of: ua.VariantType) -> ua.DataValue:
 
 
 def _event(event: Event, source: ua.NodeId, event_type: ua.NodeId) -> UaEvent:
-    kind = EventKind(event.kind).text if event.kind in list(EventKind) else event.name
     made = UaEvent(source)
-    text = kind + (f": {event.text}" if event.text else "")
     severity = SEVERITY[Ne107Status(event.ne107)] if event.ne107 in list(Ne107Status) else max(SEVERITY.values())
     identity = f"{event.valve}:{event.number}".encode()
     fields: dict[str, tuple[Any, ua.VariantType]] = {
@@ -187,7 +198,7 @@ def _event(event: Event, source: ua.NodeId, event_type: ua.NodeId) -> UaEvent:
         "SourceName": (event.valve, ua.VariantType.String),
         "Time": (_moment(event.time_s), ua.VariantType.DateTime),
         "ReceiveTime": (_moment(event.time_s), ua.VariantType.DateTime),
-        "Message": (ua.LocalizedText(text), ua.VariantType.LocalizedText),
+        "Message": (ua.LocalizedText(event.words), ua.VariantType.LocalizedText),
         "Severity": (severity, ua.VariantType.UInt16),
         "Number": (event.number, ua.VariantType.UInt32),
         "Kind": (event.name, ua.VariantType.String),

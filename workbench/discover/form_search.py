@@ -1,9 +1,9 @@
 """The search for a form: ranked, fitted, judged as effects are, the nearest taken further.
 
 The forms of a turn race: one whose searches are far behind another's waits, or that makes nothing of the valve as it is
-better, and is told by what it had come to. Where
-the best of a turn is accepted and leaves something to explain, its curve is tried: the same place and variable with a
-free shape. The forms of the second turn are fitted only where none of this explains the recordings.
+better, and is told by what it had come to. Where the best of a turn is accepted and leaves something to explain, its
+curve is tried: the same place and variable with a free shape. The forms of the second turn are fitted only where none
+of this explains the recordings.
 """
 
 from collections.abc import Callable, Mapping, Sequence

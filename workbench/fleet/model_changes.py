@@ -93,14 +93,15 @@ class ModelChanges(Result):
             axes.plot([0.0, end], [row, row], color=MODEL if new else BETTER, lw=2.0)
             axes.plot(end, row, "o", color=MODEL if new else BETTER, ms=5.0)
             said = f"new: {_number(each.now)}" if new else _percent(each)
-            left = end < 0.0 or end > 0.6 * LONGEST_PERCENT
+            far = end > 0.6 * LONGEST_PERCENT
+            left = end < 0.0 or far
             axes.annotate(
                 said,
                 (end, row),
-                xytext=(-8 if left else 8, 5 if end > 0.6 * LONGEST_PERCENT else 0),
+                xytext=(-8 if left else 8, 5 if far else 0),
                 textcoords="offset points",
                 ha="right" if left else "left",
-                va="bottom" if end > 0.6 * LONGEST_PERCENT else "center",
+                va="bottom" if far else "center",
                 fontsize=8,
             )
         axes.axvline(0.0, color="black", lw=0.8)

@@ -1,4 +1,4 @@
-"""Where a page listens, from the arguments of a command."""
+"""Where a command listens, from its arguments."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -18,8 +18,8 @@ def listening(arguments: argparse.Namespace) -> "Listening":
     from config.errors import InputError
     from positioner.pages.parts.server import Listening
 
-    if arguments.port is not None and not 0 <= arguments.port <= MOST_PORT:
-        raise InputError("--port", f"must lie between 0 (any free one) and {MOST_PORT}, got {arguments.port}")
+    if arguments.port is not None:
+        require_port("--port", arguments.port)
     password = ""
     if arguments.password_file is not None:
         try:
@@ -29,3 +29,15 @@ def listening(arguments: argparse.Namespace) -> "Listening":
         if not password:
             raise InputError(str(arguments.password_file), "its first line must be the password; it is empty")
     return Listening(arguments.host, arguments.port, password)
+
+
+def require_port(option: str, port: int) -> None:
+    """Check a port to listen at.
+
+    Raises:
+        InputError: it is none.
+    """
+    from config.errors import InputError
+
+    if not 0 <= port <= MOST_PORT:
+        raise InputError(option, f"must lie between 0 (any free one) and {MOST_PORT}, got {port}")

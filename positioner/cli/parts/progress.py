@@ -93,12 +93,13 @@ class Progress:
 
 
 @contextmanager
-def at_work(command: str, what: str) -> Iterator[Progress]:
-    """Tell that a command goes on with something that has no fractions, and that it was broken off at it.
+def at_work(command: str, what: str = "") -> Iterator[Progress]:
+    """Tell that a command goes on, and that it was broken off at what it did.
 
     Args:
         command: of the person, as messages name it.
-        what: it does, as in "reading rec.csv".
+        what: it does, as in "reading rec.csv", if it has no fractions to tell.
     """
-    with Progress(what=what) as progress, told_when_broken_off(command, lambda: progress.known):
+    progress = Progress(what=what)
+    with told_when_broken_off(command, lambda: progress.known), progress:
         yield progress
