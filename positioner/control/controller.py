@@ -155,7 +155,7 @@ def step(
     )
     if excitation is not None and memory.excitation is None and not excitation.ended:
         statics.restart()
-    experiment = _experiment(memory, supervision, sample, requests, settings, fresh=fresh)
+    experiment = _experiment(memory, supervision, sample.now_s, requests, settings)
     playing = experiment.commands
     outcome = _outcome(memory, sample, settings, statics) if fresh else None
     if excitation is not None and fresh:
@@ -233,7 +233,7 @@ def step(
         restoration,
         experiment,
         monitoring.holding,
-        supervision.measured,
+        supervision.position_m is not None,
     )
     return ControllerMemory(
         command_pa,
@@ -265,22 +265,23 @@ def _sent_to_m(memory: ControllerMemory) -> float | None:
 def _experiment(
     memory: ControllerMemory,
     supervision: SupervisionMemory,
-    sample: Sample,
+    now_s: float,
     requests: Requests,
     settings: Settings,
-    *,
-    fresh: bool,
 ) -> PlayedExperiment:
-    """Return the experiment after this sample; as it was where none is under way and none is asked for."""
+    """Return the experiment after this sample; as it was where none is under way and none is asked for.
+
+    It may begin on a sample that is repeated or lost: how old the last good one may be, supervision watches.
+    """
     before = memory.experiment
     if before.is_idle(requests.experiment):
         return before
     around = Surroundings(
-        now_s=sample.now_s,
+        now_s=now_s,
         mode=supervision.mode,
         fault=supervision.fault,
         excited=requests.eta[0] == 0,
-        position_m=sample.position_m if fresh else None,
+        position_m=supervision.position_m,
         command_pa=memory.command_pa,
         held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
     )

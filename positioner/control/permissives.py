@@ -73,7 +73,7 @@ NO_VETO = Permissive(
     WAY_BACK,
 )
 MEASURED = Permissive(
-    "a good measurement to begin with",
+    "a good measurement to begin with: S3 waits for a new one, an experiment takes the last",
     "register `quality`",
     InhibitReason.EXCITATION_UNMEASURED,
     ExperimentState.NO_MEASUREMENT,

@@ -37,7 +37,7 @@ class ExperimentLimits:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What permits an experiment: `position_m` is None without a good measurement."""
+    """What permits an experiment: `position_m` is of the last good measurement, None before the first."""
 
     now_s: float
     mode: Mode

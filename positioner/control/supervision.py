@@ -57,8 +57,8 @@ class SupervisionMemory(NamedTuple):
     mode_writes: int = 0
     acknowledgements: int = 0
     heartbeats: int = 0
-    measured: bool = False
-    """Whether there was a good measurement since the start."""
+    position_m: float | None = None
+    """Of the stem at the last good measurement; None before the first since the start."""
     unanswered_pa: tuple[float, ...] = ()
     """Commands given since the last good measurement, which the device may hold or not."""
 
@@ -118,7 +118,7 @@ def supervise(
         requests.mode_writes,
         requests.acknowledgements,
         requests.heartbeats,
-        memory.measured or good,
+        sample.position_m if good else memory.position_m,
         (command_pa,) if good else given_pa,
     )
 

@@ -110,9 +110,21 @@ def test_while_eta_asks_for_another_excitation_it_is_refused() -> None:
     assert bench.step().experiment.state is ExperimentState.EXCITED
 
 
-def test_without_a_measurement_it_is_refused() -> None:
-    bench = asked(automatic())
+def test_before_the_first_measurement_it_is_refused() -> None:
+    bench = asked(Bench())
+    bench.ask(mode=Mode.AUTOMATIC)
     assert bench.step(quality=Quality.LOST).experiment.state is ExperimentState.NO_MEASUREMENT
+
+
+@pytest.mark.parametrize("quality", [Quality.REPEATED, Quality.LOST])
+def test_a_sample_that_is_not_new_does_not_refuse_it(quality: Quality) -> None:
+    bench = asked(automatic())
+    assert bench.step(quality=quality).experiment.state is ExperimentState.UNDER_WAY
+
+
+def test_a_sample_that_is_not_new_does_not_hide_where_the_stem_was() -> None:
+    bench = asked(automatic(experiment={"travel_window": (0.4, 0.9)}))
+    assert bench.step(quality=Quality.LOST).experiment.state is ExperimentState.OUTSIDE_WINDOW
 
 
 def test_nothing_is_played_at_the_start_whatever_is_asked_then() -> None:
