@@ -18,6 +18,7 @@ from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
 ROOT = Path(__file__).parents[1]
+FITS = ROOT / "tests" / "workbench"
 REAL_TIME = "pytest.mark.real_time"
 """In a file: it is held to a clock, by a process or a wire."""
 PATIENT = "pytest.mark.patient"
@@ -70,8 +71,8 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put what waits first, in real time before all: it takes the longest however many the processors."""
-    items.sort(key=lambda item: (REAL_TIME, PATIENT, "").index(_mark(item.path)))
+    """Put what waits first, in real time before all, then the files of fits: what takes long must not come last."""
+    items.sort(key=lambda item: ((REAL_TIME, PATIENT, "").index(_mark(item.path)), FITS not in item.path.parents))
 
 
 def pytest_collection_finish() -> None:

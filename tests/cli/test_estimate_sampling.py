@@ -1,5 +1,7 @@
 """`positioner estimate` on recordings sampled as historians do, of a valve with a preload: right, or refused."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -9,23 +11,29 @@ from config.valve_file import valve
 from positioner.estimation.recording_estimates import RecordingEstimates, estimate
 from sim.simulation import simulate
 
+FINEST_S = 0.01
 ORDINARY = valve("ordinary")
 AREA_M2, STROKE_M = ORDINARY.valve.diaphragm_area_m2, ORDINARY.valve.stroke_m
 TRUE_PA_PER_M = -ORDINARY.valve.spring_n_per_m / AREA_M2
 LOW_PA, SPAN_PA = 1400.0 / AREA_M2, ORDINARY.valve.spring_n_per_m * STROKE_M / AREA_M2
 
 
-def driven(kind: str, period_s: float) -> RecordingEstimates:
-    dt_s = 0.01
-    time_s = np.arange(0.0, 120.0, dt_s)
-    every = round(period_s / dt_s)
+@cache
+def moved(kind: str, held: int) -> Recording:
+    """Return a recording at 10 ms; random pressures are held for so many samples."""
+    time_s = np.arange(0.0, 120.0, FINEST_S)
     rng = np.random.default_rng(4)
     share = {
         "sine": 0.5 - 0.4 * np.cos(2 * np.pi * time_s / 20.0),
         "triangle": 0.1 + 0.8 * np.abs((time_s / 20.0) % 2 - 1),
-        "random": np.repeat(rng.uniform(0.1, 0.9, time_s.size), 3 * every)[: time_s.size],
+        "random": np.repeat(rng.uniform(0.1, 0.9, time_s.size), held)[: time_s.size],
     }[kind]
-    whole = simulate(ORDINARY, time_s, LOW_PA + SPAN_PA * share, noise_std_m=2e-4 * STROKE_M)
+    return simulate(ORDINARY, time_s, LOW_PA + SPAN_PA * share, noise_std_m=2e-4 * STROKE_M)
+
+
+def driven(kind: str, period_s: float) -> RecordingEstimates:
+    every = round(period_s / FINEST_S)
+    whole = moved(kind, 3 * every if kind == "random" else 1)
     columns = ("time_s", "command_pa", "position_m")
     return estimate(Recording({name: whole.columns[name][::every] for name in columns}))
 
