@@ -183,7 +183,7 @@ class DriverContract:
 class WireContract(DriverContract):
     """What holds for every driver to another process."""
 
-    reply_timeout_s = 2.0
+    reply_timeout_s = 1.0
 
     @pytest.fixture
     def bench(self, make: Callable[[], Bench]) -> WireBench:

@@ -17,8 +17,6 @@ from config.device import Device
 from config.errors import InputError
 from drivers import driver_for
 
-pytestmark = pytest.mark.real_time
-
 GUIDE = Path(__file__).parents[2] / "docs" / "drivers.md"
 
 

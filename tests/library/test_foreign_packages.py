@@ -64,14 +64,12 @@ def test_the_library_says_what_is_in_the_way(foreign: Path) -> None:
     assert done.stderr.splitlines()[-1].startswith(f"ImportError: positioner.valve: {told(foreign)}")
 
 
-@pytest.mark.real_time
 def test_a_child_does_not_see_it(foreign: Path) -> None:
     Path("slave.toml").write_text('valve = "seed"\n')
     with running("sim", Path("slave.toml"), "--port", "0") as ready:
         assert "127.0.0.1:" in ready
 
 
-@pytest.mark.real_time
 def test_the_refinement_process_does_not_see_it(foreign: Path) -> None:
     process = RefinementProcess()
     refiner = process.refiner(blocking=True)

@@ -13,7 +13,7 @@ from config.role_passwords import set_password
 from tests.pages.browser import needs_chromium, opened, served
 from tests.pages.valve_site import valve_site
 
-pytestmark = [pytest.mark.real_time, needs_chromium]
+pytestmark = [pytest.mark.patient, needs_chromium]
 
 PASSWORDS = {"operator": "valves-and-more", "engineer": "friction-matters"}
 
