@@ -20,17 +20,20 @@ class Transmitter:
 
     def __init__(self, sensor: Sensor) -> None:
         self._quantum_m = sensor.quantum_m
-        self._noise_m = _white(sensor.noise_std_m, np.random.default_rng(sensor.seed))
+        self._noise_std_m = sensor.noise_std_m
+        self._generator = np.random.default_rng(sensor.seed)
+        self._drawn_m: Iterator[float] = iter(())
 
     def measure(self, position_m: float) -> float:
         """Return what is measured of a position, in m."""
-        measured_m = position_m + next(self._noise_m)
+        measured_m = position_m + self._noise_m()
         if self._quantum_m:
             measured_m = self._quantum_m * round(measured_m / self._quantum_m)
         return measured_m
 
-
-def _white(std: float, generator: np.random.Generator) -> Iterator[float]:
-    """Yield white Gaussian noise for ever."""
-    while True:
-        yield from (std * generator.standard_normal(BLOCK)).tolist()
+    def _noise_m(self) -> float:
+        noise_m = next(self._drawn_m, None)
+        if noise_m is None:
+            self._drawn_m = iter((self._noise_std_m * self._generator.standard_normal(BLOCK)).tolist())
+            noise_m = next(self._drawn_m)
+        return noise_m

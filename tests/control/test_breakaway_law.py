@@ -103,14 +103,14 @@ def made(loop: Loop, steps_pu: tuple[float, ...], seconds: float = 0.5) -> tuple
 
 
 def test_small_steps_end_where_they_should() -> None:
-    errors, overshoots = made(Loop("breakaway", 1e-4), STEPS_PU)
+    errors, overshoots = made(Loop("breakaway", 1e-4), STEPS_PU, 0.4)
     assert np.mean(errors <= 1e-3) >= 0.95
     assert errors.max() <= 3e-3
     assert overshoots.max() < 3e-3
 
 
 def test_the_seeds_law_does_not_make_them() -> None:
-    errors, _ = made(Loop("seed", 1e-4), STEPS_PU)
+    errors, _ = made(Loop("seed", 1e-4), STEPS_PU[:10], 0.3)
     assert np.mean(errors <= 1e-3) < 0.5
     assert np.sqrt(np.mean(errors**2)) > 0.01
 
@@ -125,7 +125,7 @@ def test_at_rest_nothing_happens(noise_pu: float) -> None:
     loop = Loop("breakaway", noise_pu)
     made(loop, STEPS_PU[:3])
     loop.run(1.0)
-    position_pu, command_pa = loop.run(5.0)
+    position_pu, command_pa = loop.run(2.0)
     assert np.ptp(command_pa) == 0.0
     assert np.ptp(position_pu) == 0.0
 
@@ -141,9 +141,9 @@ def test_at_rest_nothing_happens(noise_pu: float) -> None:
 )
 def test_effects_that_the_law_does_not_know_leave_it_stable(effect: dict[str, object], largest_pu: float) -> None:
     loop = Loop("breakaway", 1e-4, effect)
-    errors, _ = made(loop, (0.011, -0.013, 0.03, -0.02), 2.0)
+    errors, _ = made(loop, (0.011, -0.013, 0.03, -0.02), 1.0)
     assert errors[1:].max() <= largest_pu
-    _, command_pa = loop.run(3.0)
+    _, command_pa = loop.run(1.5)
     assert np.ptp(command_pa) == 0.0
 
 
@@ -223,11 +223,11 @@ def test_a_valve_that_nothing_moves_is_named_and_left_alone() -> None:
     bench = Bench(stuck)
     bench.run(0.2)
     bench.step_to(0.061)
-    decisions = bench.run(3.0)
+    decisions = bench.run(2.0)
     pushes = sum(after.command_pa > before.command_pa for before, after in pairwise(decisions))
     assert decisions[-1].inhibit_reason is InhibitReason.STUCK
     assert pushes < 30
-    assert {each.command_pa for each in decisions[-2000:]} == {decisions[-1].command_pa}
+    assert {each.command_pa for each in decisions[-1000:]} == {decisions[-1].command_pa}
     bench.step_to(0.062)
     tried_pa = max(each.command_pa for each in bench.run(0.1))
     assert tried_pa > decisions[-1].command_pa, "a new reference tries again"
@@ -240,7 +240,7 @@ def test_no_push_goes_beyond_its_limit(limit_pa: float | None) -> None:
     bench.run(0.2)
     bench.step_to(0.061)
     balance_pa = (K_S * 0.06 + F_C) / A
-    strongest_pa = max(each.command_pa for each in bench.run(3.0)) - balance_pa
+    strongest_pa = max(each.command_pa for each in bench.run(2.0)) - balance_pa
     assert strongest_pa == pytest.approx(limit_pa or F_C / A, rel=1e-6)
 
 

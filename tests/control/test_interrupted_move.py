@@ -1,7 +1,9 @@
 """A move of two slides that something interrupts while the stem is away: it ends where the safety table says."""
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -50,6 +52,16 @@ class FaultyDriver(MemoryDriver):
         if self.lost:
             self.lost -= 1
             raise NoReply("lost")
+
+
+def loop_of(**safety: Any) -> "Loop":
+    """Return a loop of one's own; the one that it is copied from is identified once."""
+    return deepcopy(identified_loop(tuple(safety.items())))
+
+
+@cache
+def identified_loop(safety: tuple[tuple[str, Any], ...]) -> "Loop":
+    return Loop(**dict(safety))
 
 
 class Loop:
@@ -130,7 +142,7 @@ FAULTS: dict[Fault, Callable[[Reading], Reading]] = {Fault.DEVICE: unfit, Fault.
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.MANUAL])
 def test_leaving_automatic_lets_the_stem_come_back(mode: Mode) -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     loop.choose(mode)
     loop.run(2.0)
     assert loop.decision.state is State.S0_START
@@ -139,7 +151,7 @@ def test_leaving_automatic_lets_the_stem_come_back(mode: Mode) -> None:
 
 @pytest.mark.parametrize("fault", [*FAULTS, Fault.STALE], ids=lambda each: each.name)
 def test_a_fault_that_holds_lets_the_stem_come_back(fault: Fault) -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     loop.driver.spoil = frozen_at(loop.driver.read()) if fault is Fault.STALE else FAULTS[fault]
     loop.run(2.0)
     assert loop.decision.fault is fault
@@ -152,7 +164,7 @@ def test_a_fault_that_holds_lets_the_stem_come_back(fault: Fault) -> None:
 
 
 def test_a_silent_dcs_lets_the_stem_come_back() -> None:
-    loop = Loop(heartbeat_timeout_s=500.0).away()
+    loop = loop_of(heartbeat_timeout_s=500.0).away()
     controller = loop.cycle._controller
     limits = replace(controller._settings.limits, heartbeat_timeout_s=0.1)
     controller._settings = replace(controller._settings, limits=limits)
@@ -164,7 +176,7 @@ def test_a_silent_dcs_lets_the_stem_come_back() -> None:
 @pytest.mark.parametrize("cycles", range(1, 10))
 def test_whenever_it_is_interrupted_the_stem_ends_within_its_margin(cycles: int) -> None:
     """From nearer than its margin it would not break loose: it stays, or goes as far to the other side."""
-    loop = Loop()
+    loop = loop_of()
     loop.step_to(SMALL)
     loop.run(cycles * PERIOD_S)
     loop.choose(Mode.HOLD)
@@ -173,7 +185,7 @@ def test_whenever_it_is_interrupted_the_stem_ends_within_its_margin(cycles: int)
 
 
 def test_a_fault_that_vents_vents() -> None:
-    loop = Loop(action="vent").away()
+    loop = loop_of(action="vent").away()
     loop.driver.spoil = unfit
     loop.run(3.0)
     assert loop.decision.command_pa == 0.0
@@ -181,7 +193,7 @@ def test_a_fault_that_vents_vents() -> None:
 
 
 def test_the_end_of_the_daemon_leaves_what_would_have_followed() -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     controller = loop.cycle._controller
     assert controller.left_pa != controller.command_pa
     for _ in range(100):
@@ -190,7 +202,7 @@ def test_the_end_of_the_daemon_leaves_what_would_have_followed() -> None:
 
 
 def test_a_lost_reply_or_two_change_nothing() -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     loop.driver.lost = 2
     loop.run(3.0)
     assert (loop.decision.fault, loop.decision.state) == (Fault.NONE, State.S1_UP)
@@ -199,7 +211,7 @@ def test_a_lost_reply_or_two_change_nothing() -> None:
 
 def test_a_bus_that_was_away_leaves_the_device_what_it_holds() -> None:
     """Nothing moves a valve that is found again, not even back: its stem stays within the excursion's limit."""
-    loop = Loop().away()
+    loop = loop_of().away()
     held_pa = loop.device.command_pa
     loop.driver.lost = 4
     loop.run(1.0)
@@ -216,7 +228,7 @@ def test_a_bus_that_was_away_leaves_the_device_what_it_holds() -> None:
 
 
 def test_a_device_restarted_meanwhile_keeps_its_own_command() -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     loop.driver.lost = 1
     loop.cycle.once()
     loop.device._boot()
@@ -227,14 +239,14 @@ def test_a_device_restarted_meanwhile_keeps_its_own_command() -> None:
 
 def test_another_reference_is_where_the_stem_ends() -> None:
     for reference in (0.61, 0.5, 0.601):
-        loop = Loop().away()
+        loop = loop_of().away()
         loop.step_to(reference)
         loop.run(4.0)
         assert abs(loop.position - reference) < 1e-3
 
 
 def test_an_acknowledgement_without_a_fault_changes_nothing() -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     loop.ask(acknowledgements=1)
     loop.run(3.0)
     assert loop.decision.state is State.S1_UP
@@ -242,7 +254,7 @@ def test_an_acknowledgement_without_a_fault_changes_nothing() -> None:
 
 
 def test_an_identification_begun_meanwhile_and_broken_off_comes_back() -> None:
-    loop = Loop().away()
+    loop = loop_of().away()
     loop.ask(eta=(0, 0, 0))
     loop.run(0.4)
     assert loop.decision.state is State.S3_IDENTIFY

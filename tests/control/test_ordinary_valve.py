@@ -36,7 +36,7 @@ UP_PA = (VALVE.coulomb_n * (1 + ASYMMETRY) + PRELOAD_N) / VALVE.diaphragm_area_m
 DOWN_PA = (VALVE.coulomb_n * (1 - ASYMMETRY) - PRELOAD_N) / VALVE.diaphragm_area_m2
 MBAR_PA = 100.0
 PERIOD_S = 0.02
-STEP_S = 6.0
+STEP_S = 4.0
 ON_THE_SEAT, MIDWAY, WIDE_OPEN = (
     Initial(),
     Initial(position_m=0.02, pressure_pa=60e3),
@@ -98,10 +98,10 @@ class Loop:
 
 
 def references_m(seed: int) -> Iterator[float]:
-    """Yield 20 references, steps of 0.5 to 10 % of the stroke."""
+    """Yield 12 references, steps of 0.5 to 10 % of the stroke."""
     rng = np.random.default_rng(seed)
     at = 0.5
-    for _ in range(20):
+    for _ in range(12):
         step = rng.uniform(0.005, 0.1) * rng.choice((-1, 1))
         at += step if 0.1 < at + step < 0.9 else -step
         yield float(at * STROKE_M)
@@ -130,7 +130,7 @@ def test_a_staircase_identifies_it_wherever_the_stem_is(initial: Initial) -> Non
     assert 0.1 * STROKE_M - LANDED_M < since.min() < since.max() < 0.9 * STROKE_M + LANDED_M
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_steps_land(seed: int) -> None:
     loop = Loop(seed=seed)
     learning = 0

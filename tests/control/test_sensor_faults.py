@@ -25,7 +25,7 @@ def test_a_sine_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFaul
     assert not wrong(fault)
 
 
-@pytest.mark.parametrize("fault", JUMPS, ids=str)
+@pytest.mark.parametrize("fault", JUMPS[::2], ids=str)
 def test_nor_where_nobody_refines(fault: SensorFault, monkeypatch: pytest.MonkeyPatch) -> None:
     """The algebraic estimates have a residual of their own."""
 
@@ -48,7 +48,10 @@ def test_without_a_fault_the_same_is_applied() -> None:
 
 
 SLOW = STAIRCASES[-1]
-SHIFTS = [SensorFault(at_s, inf, by * STROKE_M) for at_s in (6.0, 9.98, 10.7, 12.0) for by in (-0.1, 0.02, 0.2)]
+SHIFTS = [
+    SensorFault(at_s, inf, by * STROKE_M)
+    for at_s, by in ((6.0, 0.02), (6.0, 0.2), (9.98, -0.1), (10.7, 0.02), (10.7, 0.2), (12.0, -0.1))
+]
 
 
 @pytest.mark.parametrize("fault", SHIFTS, ids=str)

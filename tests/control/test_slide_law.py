@@ -187,7 +187,7 @@ def test_a_loop_left_alone_does_nothing() -> None:
     loop.step_to(0.6)
     loop.step_to(0.604)
     commands = set()
-    for _ in range(int(600.0 / loop.period_s)):
+    for _ in range(int(200.0 / loop.period_s)):
         loop.cycle.once()
         commands.add(loop.decision.command_pa)
     assert len(commands) == 1

@@ -145,9 +145,8 @@ def seeds_scenario() -> Run:
 def test_the_seeds_scenario_without_noise_and_with_its_noise_taken_as_radians() -> None:
     clean = seeds_scenario()
     noisy = Run(clean.time_s, clean.position_m + 0.01 * STROKE * np.sin(1e5 * clean.time_s), clean.pressure_pa)
-    for held, tolerance in ((True, 4e-3), (False, 5e-4)):
-        np.testing.assert_allclose(solution_of(clean, held=held).theta, THETA, rtol=tolerance)
-        np.testing.assert_allclose(solution_of(noisy, held=held).theta, THETA, rtol=tolerance + 3e-3)
+    np.testing.assert_allclose(solution_of(clean, held=False).theta, THETA, rtol=5e-4)
+    np.testing.assert_allclose(solution_of(noisy, held=True).theta, THETA, rtol=7e-3)
 
 
 FINE_RUN = run(swing, grid(5e-4, 0, WINDOW))
@@ -158,7 +157,7 @@ FINE_RUN = run(swing, grid(5e-4, 0, WINDOW))
 def test_covariance_is_that_of_the_scatter(noise_m: float, noise_pa: float) -> None:
     rng = np.random.default_rng(3)
     thetas = []
-    for _ in range(60):
+    for _ in range(35):
         noisy = FINE_RUN.noisy(rng, noise_m)
         pressure = noisy.pressure_pa + rng.normal(0, noise_pa, len(noisy.time_s))
         thetas.append(solution_of(Run(noisy.time_s, noisy.position_m, pressure), noise_m, noise_pa).theta)
@@ -181,7 +180,7 @@ def test_covariance_where_viscous_friction_leads_on_an_uneven_grid_of_a_quarter_
         positions.append(x)
     noise = 1e-4
     thetas, stds = [], []
-    for _ in range(100):
+    for _ in range(45):
         identifier = Identifier(4.0, 1.0, 1.0)
         noisy = np.array(positions) + rng.normal(0, noise, len(t))
         for sample in zip(t.tolist(), noisy.tolist(), u.tolist(), strict=True):
@@ -198,10 +197,10 @@ def test_bias_is_that_of_the_mean() -> None:
     """Errors in variables at 20 times the noise at which the covariance alone would do."""
     rng = np.random.default_rng(11)
     noise = 2e-3 * STROKE
-    thetas = np.array([solution_of(FINE_RUN.noisy(rng, noise), noise).theta for _ in range(100)])
+    thetas = np.array([solution_of(FINE_RUN.noisy(rng, noise), noise).theta for _ in range(50)])
     solution = solution_of(FINE_RUN, noise)
     mean_error = np.mean(thetas, axis=0) - THETA
-    uncertainty = np.std(thetas, axis=0) / np.sqrt(100)
+    uncertainty = np.std(thetas, axis=0) / np.sqrt(50)
     assert np.all(np.abs(mean_error - solution.bias) < 4 * uncertainty)
 
 

@@ -88,27 +88,28 @@ def test_without_noise_it_is_exact(period_s: float) -> None:
 
 @pytest.mark.parametrize(("period_s", "noise_pu"), [(1e-3, 1e-4), (1e-3, 0.01 / 2**0.5), (5e-3, 1e-3)])
 def test_it_reaches_the_bound_and_says_so(period_s: float, noise_pu: float) -> None:
-    """30 runs know a standard deviation to 13 %; 1.2 and three times that."""
+    """18 runs know a standard deviation to 17 %; 1.2 and three times that."""
     noise_m, clean = noise_pu * STROKE, moved(period_s)
-    runs = [found(clean.noisy(np.random.default_rng(seed), noise_m)) for seed in range(30)]
+    runs = [found(clean.noisy(np.random.default_rng(seed), noise_m)) for seed in range(18)]
     off, at = np.array([errors(each) for each in runs]), bounds(clean, noise_m)
     said = [[getattr(each.estimates, name).std / abs(TRUTH[name]) for name in NAMES] for each in runs]
-    assert (off.std(axis=0) < 1.2 * 1.4 * at).all()
-    assert (np.abs(off.mean(axis=0)) < (0.5 + 3 / 30**0.5) * at).all()
-    assert (np.abs(off) < np.array(said)).mean() == pytest.approx(0.68, abs=0.15)
+    assert (off.std(axis=0) < 1.2 * 1.5 * at).all()
+    assert (np.abs(off.mean(axis=0)) < (0.5 + 3 / 18**0.5) * at).all()
+    assert (np.abs(off) < np.array(said)).mean() == pytest.approx(0.68, abs=0.18)
 
 
 def test_stamps_that_jitter_are_taken_for_what_they_are() -> None:
     """Samples taken evenly whose stamps are off, and samples taken unevenly whose stamps are true."""
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         even = at_once(grid(1e-3, -0.1, 0.8)).noisy(rng)
         off = Run(even.time_s + 1e-4 * rng.uniform(-1, 1, 901), even.position_m, even.pressure_pa)
         uneven_s = grid(1e-3, -0.1, 0.8) + 1e-4 * rng.uniform(-1, 1, 901)
         uneven = at_once(uneven_s - uneven_s[100]).noisy(rng)
         kept = rng.uniform(size=901) >= 0.01
-        assert [found(each.kept(kept)).evened for each in (even, off, uneven)] == [False, True, False]
-        assert max(map(abs, errors(found(off.kept(kept))))) < 5e-3
+        fits = [found(each.kept(kept)) for each in (even, off, uneven)]
+        assert [fit.evened for fit in fits] == [False, True, False]
+        assert max(map(abs, errors(fits[1]))) < 5e-3
 
 
 def test_evened_stamps_keep_the_gaps() -> None:
@@ -143,8 +144,8 @@ def test_behind_a_lag_of_0_3_s_only_the_ratios_are_known() -> None:
     def lagged(time_s: float) -> float:
         return swing(time_s) * (1 - exp(-time_s / 0.3)) if time_s > 0 else 0.0
 
-    fine = run(lagged, grid(1e-4, -0.1, 1.0))
-    rows = slice(None, None, 10)
+    fine = run(lagged, grid(2.5e-4, -0.1, 1.0))
+    rows = slice(None, None, 4)
     seen = Run(fine.time_s[rows], fine.position_m[rows], fine.pressure_pa[rows]).noisy(np.random.default_rng(1))
     for settings in (BatchSettings(), BatchSettings(pressure_held=False)):
         each = found(seen, settings)

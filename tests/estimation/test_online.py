@@ -47,7 +47,7 @@ def test_exact_samples_give_exact_estimates(motion: Run) -> None:
 @pytest.mark.parametrize("motion", [UPWARD, DOWNWARD], ids=["up", "down"])
 def test_white_noise_leaves_the_law_its_numbers_and_their_standard_deviation(motion: Run) -> None:
     rng = np.random.default_rng(0)
-    found = [identified(motion.noisy(rng)).estimates for _ in range(30)]
+    found = [identified(motion.noisy(rng)).estimates for _ in range(15)]
     assert all(estimates.law_ready for estimates in found)
     for name in LAW:
         errors = [error(estimates, name) for estimates in found]
@@ -69,7 +69,7 @@ def test_parameters_that_noise_has_spoiled_say_so() -> None:
 def test_valid_parameters_are_as_good_as_their_standard_deviation() -> None:
     """Up to the noise that is usual: the windows that hold the jerk tell a, b, c apart."""
     rng = np.random.default_rng(2)
-    for number in range(20):
+    for number in range(12):
         noise = (3e-6, 1e-4)[number % 2] * STROKE
         estimates = identified(UPWARD.noisy(rng, noise), noise_std_m=noise).estimates
         for name in SINGLY:
