@@ -28,6 +28,7 @@ from sim.slave import canopen_slave
 from sim.slave.canopen_slave import NodeServer
 from sim.slave.clocks import Clock, Lockstep, RealTime
 from sim.slave.modbus_slave import device_of
+from tests.recovery import taken_up
 
 pytestmark = pytest.mark.real_time
 
@@ -127,8 +128,7 @@ def recovers(driver: CanopenDriver, node: Scripted) -> None:
         with pytest.raises(NoConnection):
             act()
     node.fault = honest
-    driver.open()
-    reading = driver.exchange(PUSH_PA)
+    reading = taken_up(driver, PUSH_PA)
     assert reading.sample_counter == node.device.sample_counter
     assert reading.position_m == pytest.approx(node.device.position_m, rel=1e-6)
     assert reading.status == 0

@@ -28,6 +28,7 @@ from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
 from sim.slave.simulated_device import Device
+from tests.recovery import opened
 
 pytestmark = pytest.mark.real_time
 
@@ -223,7 +224,7 @@ class WireContract(DriverContract):
         late_until_s = time.monotonic() + 60
         while bench.device.samples == 0 and time.monotonic() < late_until_s:  # it obeys after all
             time.sleep(1e-3)
-        assert bench.driver.open() == PUSH_PA
+        assert opened(bench.driver) == PUSH_PA
         reading = bench.driver.exchange(60e3)
         assert reading.sample_counter == 2
         assert self.reading_is_of(bench.device, reading)

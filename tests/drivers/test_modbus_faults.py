@@ -20,6 +20,7 @@ from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep
 from sim.slave.device_registers import DeviceRegisters
 from sim.slave.modbus_slave import device_of
+from tests.recovery import taken_up
 from tests.refusals import refusal_of
 
 pytestmark = pytest.mark.real_time
@@ -106,8 +107,7 @@ def recovers(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
     refused_as(NoConnection, driver.read)
     refused_as(NoConnection, lambda: driver.write(PUSH_PA))
     scripted.fault = honest
-    driver.open()
-    reading = driver.exchange(PUSH_PA)
+    reading = taken_up(driver, PUSH_PA)
     assert reading.sample_counter == scripted.device.sample_counter
     assert reading.position_m == pytest.approx(scripted.device.position_m, rel=1e-6)
 

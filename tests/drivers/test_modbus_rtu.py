@@ -32,6 +32,7 @@ from sim.slave.modbus_slave import device_of
 from sim.slave.rtu_server import RtuServer
 from sim.slave.simulated_device import Device
 from tests.drivers.test_driver_contract import FILE, WireBench, WireContract
+from tests.recovery import taken_up
 from tests.refusals import refusal_of
 
 pytestmark = pytest.mark.real_time
@@ -153,8 +154,7 @@ def recovers(driver: ModbusRtuDriver, scripted: ScriptedDevice) -> None:
     refused_as(NoConnection, driver.read)
     refused_as(NoConnection, lambda: driver.write(PUSH_PA))
     scripted.fault = honest
-    driver.open()
-    reading = driver.exchange(PUSH_PA)
+    reading = taken_up(driver, PUSH_PA)
     assert reading.sample_counter == scripted.device.sample_counter
     assert reading.position_m == pytest.approx(scripted.device.position_m, rel=1e-6)
 

@@ -21,7 +21,7 @@ EXECUTED = "from pathlib import Path\nPath(__file__).with_name('executed').touch
 PATH = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
 
 
-@pytest.fixture(params=["config.py", "config/__init__.py", "sim/__init__.py"])
+@pytest.fixture(params=["config.py", "sim/__init__.py"])
 def foreign(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Stand in a folder with a foreign module; it must not be executed."""
     file = tmp_path / str(request.param)

@@ -53,7 +53,7 @@ def parameters(plant: Plant) -> ValveParameters:
     )
 
 
-def command(count: int = 801, seed: int = 3) -> Series:
+def command(count: int = 401, seed: int = 3) -> Series:
     return excitation(parameters(SAME), np.random.default_rng(seed), count)
 
 
@@ -77,7 +77,8 @@ def ours(file: ValveFile, command_pa: Series, period_s: float = PERIOD_S, start_
 @cache
 def bare() -> Series:
     """What the generator makes of `SAME` without an effect, by the first command."""
-    return theirs(SAME, command())[0]
+    made: Series = theirs(SAME, command())[0]
+    return made
 
 
 def rms(error: Series) -> float:

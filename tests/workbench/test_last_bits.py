@@ -47,8 +47,8 @@ def searched(**environment: str) -> Found:
 
 @pytest.mark.timeout(240)
 def test_the_last_bits_decide_nothing() -> None:
-    runs = [searched(OPENBLAS_CORETYPE=each) for each in BLAS]
-    runs.append(searched(NUMBA_CPU_NAME="generic"))
+    runs = [searched(OPENBLAS_CORETYPE=each) for each in BLAS[:-1]]
+    runs.append(searched(OPENBLAS_CORETYPE=BLAS[-1], NUMBA_CPU_NAME="generic"))
     for run in runs:
         assert run.trusted
         assert run.cost == pytest.approx(runs[0].cost, rel=0.01)
