@@ -35,7 +35,14 @@ STEPS_PU = (0.003, -0.0015, 0.04, 0.001, -0.006, -0.09, 0.002, 0.12)
 class Loop:
     """A valve with a daemon's cycle under the law of slides, in virtual time; the staircase has identified it."""
 
-    def __init__(self, period_s: float, *effects: dict[str, object], identify: bool = True, **control: object) -> None:
+    def __init__(
+        self,
+        period_s: float,
+        *effects: dict[str, object],
+        identify: bool = True,
+        stribeck_velocity_m_per_s: float = VALVE.stribeck_velocity_m_per_s,
+        **control: object,
+    ) -> None:
         self.period_s = period_s
         daemon = {
             "valve": {"stroke_m": STROKE_M},
@@ -48,7 +55,8 @@ class Loop:
             "clock": {"mode": "lockstep", "period_s": period_s},
             "sensor": {"noise_std_m": 1e-5, "quantum_m": STROKE_M / 4096, "seed": 1},
         }
-        self.valve = Valve.from_file(ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": effects}))
+        valve = VALVE.model_dump() | {"stribeck_velocity_m_per_s": stribeck_velocity_m_per_s}
+        self.valve = Valve.from_file(ValveFile.model_validate({"valve": valve, "effect": effects}))
         self.valve.rest_at(0.0, 0.0)
         device = Device(self.valve, SlaveFile.model_validate(slave), {})
         self.cycle = virtual_cycle(
@@ -180,6 +188,16 @@ def test_a_budget_comes_back_with_time() -> None:
     assert memory.spent_at_m(100.0, settings) == STROKE_M
     assert memory.spent_at_m(100.0 + DAY_S / 4, settings) == pytest.approx(0.75 * STROKE_M)
     assert memory.spent_at_m(100.0 + 2 * DAY_S, settings) == 0.0
+
+
+def test_friction_is_known_no_better_than_a_stem_that_sticks_short_behind_a_slow_pressure_lets_it() -> None:
+    """Its friction rises below 1 mm/s: all slides stick short alike, and no residual tells."""
+    loop = Loop(0.02, {"name": "ip_lag", "time_constant_s": 0.1}, stribeck_velocity_m_per_s=1e-3)
+    law = loop.decision.static_law
+    assert law.valid
+    for found in (law.up, law.down):
+        assert 0.005 * FRICTION_PA < found.value - FRICTION_PA < 2.0 * found.std
+        assert found.std < 0.03 * FRICTION_PA
 
 
 def test_a_loop_left_alone_does_nothing() -> None:

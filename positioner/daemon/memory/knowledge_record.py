@@ -30,6 +30,7 @@ class _Slide(_Record):
     std_m: float = Field(ge=0.0)
     moved: bool
     landing: bool
+    short_m: float = Field(default=0.0, ge=0.0)
 
 
 class _Margin(_Record):

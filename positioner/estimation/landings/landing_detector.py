@@ -65,6 +65,8 @@ class SlideOutcome(NamedTuple):
     moved: bool
     landing: bool
     """Whether the balance of the moving stem holds here."""
+    short_m: float = 0.0
+    """How far short of that balance it may have stuck behind a slow pressure: all slides alike, their mean too."""
 
 
 class Answers(NamedTuple):
@@ -243,6 +245,7 @@ class LandingDetector:
             std_m=sqrt(rest.std_m**2 + self.quantum_m**2 / 12 + (CREEP * self._stroke_m * creep_s) ** 2),
             moved=moved,
             landing=moved and self._free_m[0] < rest.position_m < self._free_m[1],
+            short_m=rest.short_m if moved else 0.0,
         )
 
 
