@@ -28,7 +28,7 @@ FORKS.set_forkserver_preload(
         "drivers.modbus_tcp",
         "drivers.modbus_rtu",
         "drivers.canopen.driver",
-        "tests.loaded",
+        "sim.slave.loaded",
     ]
 )
 
@@ -42,14 +42,19 @@ class Ended(NamedTuple):
 
 
 class Child:
-    """`positioner COMMAND CONFIG` in a process; its log goes to a file beside the config."""
+    """`positioner COMMAND CONFIG` in a process; its log goes to a file beside the config.
 
-    def __init__(self, command: str, config: Path, *options: str) -> None:
+    Those that start processes themselves are to be closed: they do not end by themselves with the tests.
+    """
+
+    def __init__(self, command: str, config: Path, *options: str, starts_others: bool = False) -> None:
         self._log = config.with_suffix(".log")
         self._log.unlink(missing_ok=True)
         heard, said = FORKS.Pipe(duplex=False)
         words = [command, str(config), *options]
-        self._process: ForkServerProcess = FORKS.Process(target=_work, args=(words, self._log, said), daemon=True)
+        self._process: ForkServerProcess = FORKS.Process(
+            target=_work, args=(words, self._log, said), daemon=not starts_others
+        )
         self._process.start()
         said.close()
         with heard:

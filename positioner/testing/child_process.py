@@ -13,6 +13,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from positioner.testing.forked import Forked, fork_server
+
 HOME = Path(__file__).resolve().parents[2]
 END_WITHIN_S = 10.0
 
@@ -28,22 +30,31 @@ class NotDone(Exception):
 class ChildProcess:
     """`python -m MODULE WORDS`, from its first line, which says that it is ready; its log is a file.
 
+    Args:
+        module, words: what is run.
+        log: where its standard error goes.
+        forked: off a process that has loaded ours; where that cannot be, from nothing.
+
     Raises:
         NotStarted: it ended before.
     """
 
-    def __init__(self, module: str, *words: str, log: Path) -> None:
-        known = (str(HOME), os.environ.get("PYTHONPATH", ""))
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, known))}
+    def __init__(self, module: str, *words: str, log: Path, forked: bool = False) -> None:
+        path = os.pathsep.join(filter(None, (str(HOME), os.environ.get("PYTHONPATH", ""))))
+        environment = {**os.environ, "PYTHONPATH": path}
+        self._process: subprocess.Popen[str] | Forked
         with log.open("w") as error:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", module, *words],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=error,
-                text=True,
-                env=environment,
-            )
+            if forked and sys.platform == "linux":
+                self._process = fork_server(path).start(module, words, environment, error)
+            else:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", module, *words],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=error,
+                    text=True,
+                    env=environment,
+                )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._in, self._out = self._process.stdin, self._process.stdout
@@ -91,12 +102,12 @@ class ChildProcess:
 
 @contextmanager
 def started(module: str, *words: str, log: Path) -> Iterator[ChildProcess]:
-    """Start a process of ours; make sure that it ends.
+    """Fork a process of ours; make sure that it ends.
 
     Raises:
         NotStarted: it ended instead of getting ready.
     """
-    process = ChildProcess(module, *words, log=log)
+    process = ChildProcess(module, *words, log=log, forked=True)
     try:
         yield process
     finally:
@@ -117,7 +128,7 @@ class Agent:
             NotDone: it could not.
         """
         if self._process is None:
-            self._process = ChildProcess(*self._words, log=self._log)
+            self._process = ChildProcess(*self._words, log=self._log, forked=True)
         return self._process.ask(call, **given)
 
     def end(self) -> None:

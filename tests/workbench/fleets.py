@@ -1,18 +1,23 @@
 """A small plant for tests of fleets, and examinations without Dask."""
 
+import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from distributed import LocalCluster
 
+from config.recording import Recording
 from config.slave_file import Sensor
 from config.valve_file import ValveFile, valve
-from config.writing import write_valve
+from config.writing import valve_toml, write_valve
 from sim.composition import Composition
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import Trial
 from workbench.fleet.examination import examine
+from workbench.select.diagnosis import Diagnosis, diagnose
 
 HEAD = "valve,file,recording,when\n"
 ROWS, PERIOD_S = 1000, 0.02
@@ -67,10 +72,32 @@ def straight(_client: object, courses: Any, _time_limit_s: float) -> None:
 
 
 def examined_here(patch: pytest.MonkeyPatch) -> None:
-    """Without Dask, and against few effects: the whole library would take the longest of all."""
+    """Without Dask, and against few effects, once a recording and valve: the whole library would take the longest."""
+    diagnosed: dict[tuple[bytes, str], Diagnosis] = {}
+
+    def once(recording: Recording, held: ValveFile, **options: Any) -> Diagnosis:
+        nameless = held.model_copy(update={"valve": held.valve.model_copy(update={"name": ""})})
+        key = recording.columns["position_m"].tobytes(), valve_toml(nameless)
+        if key not in diagnosed:
+            diagnosed[key] = diagnose(recording, held, **options)
+        return diagnosed[key]
+
+    patch.setattr("workbench.fleet.examination.diagnose", once)
+    patch.setattr("workbench.fleet.drill_down.diagnose", once)
     patch.setattr("workbench.fleet.fleet.work", straight)
     patch.setattr("workbench.fleet.fleet.cluster", lambda *_: Straight())
     patch.setattr("workbench.select.diagnosis.tried_effects", lambda: FEW)
+
+
+def serve_cluster(said: Connection) -> None:
+    """Be a scheduler with a worker in it, and say its address."""
+    local: Any = LocalCluster
+    with local(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        said.send(cluster.scheduler_address)
+        while True:
+            time.sleep(3600.0)
 
 
 def tables(out: Path) -> dict[str, bytes]:

@@ -1,23 +1,20 @@
 """Fleets on Dask: workers, clients and schedulers that are killed, recordings that hang or kill."""
 
-import json
 import shutil
-import subprocess
-import sys
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
-from distributed import Client, KilledWorker
+from distributed import KilledWorker
 from distributed.comm.core import CommClosedError
 
 from config.errors import CommandFailed
 from positioner.cli.main import main
-from tests.workbench.fleets import HEAD, examined_here, plant, tables
+from tests.children import FORKS, Child
+from tests.workbench.fleets import HEAD, examined_here, plant, serve_cluster, tables
 from workbench.fleet import engine
 from workbench.fleet.fleet import fleet
 from workbench.fleet.tables import write_tables
@@ -102,15 +99,18 @@ def test_a_recording_that_takes_too_long_is_listed_and_tried_again(
 
 @pytest.mark.patient
 def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_path: Path, without_dask: None) -> None:
-    out, small = tmp_path / "out", site.with_name("small.csv")
-    words = [sys.executable, "-m", "positioner.cli", "fleet", str(small), "--out", str(out), "--workers", "1"]
-    with subprocess.Popen(words, stderr=subprocess.DEVNULL, text=True) as client:
+    out = tmp_path / "out"
+    small = Path(shutil.copy(site.with_name("small.csv"), site.with_name("killed.csv")))
+    client = Child("fleet", small, "--out", str(out), "--workers", "1", starts_others=True)
+    try:
         until(lambda: kept(out) >= 1)
         (worker,) = workers_of(client.pid)
         worker.kill()
         until(lambda: kept(out) >= 3)
         left = workers_of(client.pid)
         client.kill()
+    finally:
+        client.close()
     until(lambda: not any(each.is_running() for each in left))
     before = kept(out)
     found = fleet(small, out)
@@ -124,33 +124,22 @@ def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_p
 def test_a_scheduler_that_is_killed_is_one_line_and_the_same_command_goes_on(
     site: Path, tmp_path: Path, without_dask: None
 ) -> None:
-    out, small, told = tmp_path / "out", site.with_name("small.csv"), tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "distributed.cli.dask_{}", "--scheduler-file", str(told)]
-    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with ExitStack() as ended:
-        running = []
-        for role, options in {"scheduler": ["--port", "0"], "worker": ["--nthreads", "1", "--no-nanny"]}.items():
-            words = [word.format(role) for word in dask] + ["--host", "127.0.0.1", *options]
-            running.append(ended.enter_context(subprocess.Popen(words, **quiet)))
-            ended.callback(running[-1].kill)
-            until(told.exists)
-        until(lambda: "tcp://" in told.read_text())
-        address = json.loads(told.read_text())["address"]
-        connected: Any = Client
-        with connected(address) as asked:
-            asked.wait_for_workers(1)
-        words = [sys.executable, "-m", "positioner.cli", "fleet", str(small), "--out", str(out)]
-        client = ended.enter_context(
-            subprocess.Popen(
-                [*words, "--scheduler", address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-            )
-        )
-        until(lambda: kept(out) >= 2 or client.poll() is not None)
-        running[0].kill()
-        _, said = client.communicate()
-    assert client.returncode == 1, said
-    assert said.splitlines()[-1] == f"positioner fleet: {engine.GONE}"
-    assert "Traceback" not in said
+    out, small = tmp_path / "out", site.with_name("small.csv")
+    heard, said = FORKS.Pipe(duplex=False)
+    scheduler = FORKS.Process(target=serve_cluster, args=(said,), daemon=True)
+    scheduler.start()
+    said.close()
+    client = Child("fleet", small, "--out", str(out), "--scheduler", heard.recv())
+    try:
+        until(lambda: kept(out) >= 2)
+        scheduler.kill()
+        status, _, log = client.ended()
+    finally:
+        scheduler.kill()
+        client.close()
+    assert status == 1, log
+    assert log.splitlines()[-1] == f"positioner fleet: {engine.GONE}"
+    assert "Traceback" not in log
     before = kept(out)
     assert fleet(small, out).examined == 6 - before
 

@@ -13,7 +13,7 @@ from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.compare.residuals import Profile, profile
-from workbench.data.motion import PARABOLA, directions, velocity_m_per_s
+from workbench.data.motion import PARABOLA, acceleration_m_per_s2, directions, velocity_m_per_s
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -41,13 +41,11 @@ def forces(
     valve: ValveParameters, time_s: Column, position_m: Column, pressure_pa: Column, load_n: Column, noise_m: float
 ) -> Forces:
     """Reconstruct the friction of an unbroken stretch without NaN, arrays of (n,); none of fewer than nine samples."""
-    from scipy.signal import savgol_filter  # takes as long to load as all else together
-
     if time_s.size < PARABOLA:
         return Forces(*np.empty((6, 0)))
     velocity = velocity_m_per_s(time_s, position_m)
     period_s = float(np.median(np.diff(time_s)))
-    acceleration = savgol_filter(position_m, PARABOLA, 2, deriv=2, delta=period_s)
+    acceleration = acceleration_m_per_s2(position_m, period_s)
     way = directions(position_m, noise_m)
     friction_n = (
         valve.diaphragm_area_m2 * pressure_pa

@@ -26,7 +26,7 @@ from config.noise import position_noise_m
 from config.recording import Column, Recording, read_table
 from config.results.result import Brief
 from config.valve_file import ValveParameters
-from workbench.data.motion import PARABOLA
+from workbench.data.motion import PARABOLA, acceleration_m_per_s2
 from workbench.data.record import UNITS_PA, UNSEEN
 
 FORCES = ("time_s", "pressure_pa", "position_m", "load_n")
@@ -215,7 +215,7 @@ def _moved(recording: Recording, valve: ValveParameters) -> Rows:
     smooth_m = savgol_filter(position_m, PARABOLA, 2)
     velocity = np.gradient(smooth_m, time_s)
     period_s = float(np.median(np.diff(time_s)))
-    inertia_n = valve.mass_kg * savgol_filter(position_m, PARABOLA, 2, deriv=2, delta=period_s)
+    inertia_n = valve.mass_kg * acceleration_m_per_s2(position_m, period_s)
     if np.ptp(position_m) <= max(LEAST_MOTION * noise_m, 1e-6 * valve.stroke_m):
         raise InputError("recording", "the stem does not move: there is no friction to balance")
     direction = _directions(smooth_m, TURNED * SMOOTHED * noise_m)
