@@ -17,7 +17,7 @@ A measured pressure has to rest, too.
 
 How short of its balance may it rest? Friction rises as a stem that creeps behind a slow pressure comes to an end, and
 it sticks; or it goes by jumps. Neither shows where it rests, but in how abruptly it came there. With w_1 to w_4 the
-ways in the quarters of the time from a tenth of the way to T_s, a creep that stopped before it had ended was to go on by
+ways in the quarters of the time from a tenth of the way to T_s, a creep that stopped before its end was to go on by
 
     w_4 r/(1 - r),   r = w_4/w_3      w_4 at the most, where it went by jumps, or was seen in few samples
 
