@@ -58,7 +58,7 @@ journey: $(READY) browser ## minutes: a dropped recording with a hidden effect, 
 locked: $(READY)        ## the packages of a gateway, pinned with their hashes: after a change of pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[supply]'
 	$(BIN)/pip-compile --quiet --generate-hashes --strip-extras --no-header --no-annotate --no-emit-index-url \
-	    --no-emit-trusted-host --no-emit-find-links --build-deps-for wheel --extra tls --extra canopen --extra metrics \
+	    --no-emit-trusted-host --no-emit-find-links --build-deps-for wheel --extra tls --extra canopen --extra metrics --extra opcua \
 	    --output-file deploy/locked/gateway.txt pyproject.toml
 
 sbom: $(READY)          ## what a gateway installs, as CycloneDX: dist/positioner.cdx.json

@@ -88,7 +88,7 @@ def tdms(path: Path) -> list[RawTable]:
     told = _Told()
     logging.getLogger("nptdms").handlers = [told]
     try:
-        with warnings.catch_warnings(action="ignore"), nptdms.TdmsFile.open(path) as file:
+        with warnings.catch_warnings(action="ignore"), path.open("rb") as data, nptdms.TdmsFile.open(data) as file:
             for group in file.groups():
                 require_moderate(path, max((len(each) for each in group.channels()), default=0), len(group.channels()))
             groups = [(group.name, _tdms_group(group)) for group in file.groups()]

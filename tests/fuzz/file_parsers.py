@@ -16,6 +16,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import h5py
+import nptdms
 import numpy as np
 import openpyxl
 from cryptography import x509
@@ -28,6 +30,7 @@ from config.daemon_file import load_valves
 from config.errors import InputError
 from config.exports.column_mapping import read_mapping
 from config.exports.export_preview import preview
+from config.exports.mapping_file import read_mapping_file
 from config.exports.own_format import own_recording
 from config.historian_export import read_export
 from config.loading import SHIPPED
@@ -46,7 +49,7 @@ from positioner.history.history_reader import HistoryReader
 from tests.certificates import folder as certificates
 from tests.certificates import revoke, tls
 from tests.daemon.memory.test_memory_file import KNOWLEDGE, NOW
-from tests.fuzz.parser import Parser, refused_in_one_line, require_line
+from tests.fuzz.parser import Later, Parser, refused_in_one_line, require_line
 
 NODE = 5
 
@@ -136,6 +139,32 @@ def _matlab() -> tuple[bytes, ...]:
     )
 
 
+def _hdf5(path: Path) -> None:
+    with h5py.File(path, "w", track_order=True) as file:
+        for name, values in COLUMNS.items():
+            made = file.create_dataset(f"log/{name}", data=values)
+            made.attrs["units"] = "s"
+        file.create_dataset("matrix", data=np.ones((4, 2)), compression="gzip")
+        file.create_dataset("rows", data=np.zeros(4, dtype=[("t", "<f8"), ("x", "<i2")]))
+
+
+def _tdms(path: Path) -> None:
+    wave = {"unit_string": "%", "wf_increment": 0.1, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(str(path)) as file:
+        file.write_segment([nptdms.ChannelObject("log", name, values, wave) for name, values in COLUMNS.items()])
+
+
+def _mdf4(path: Path) -> None:
+    import asammdf  # takes a second to load
+
+    signals = [
+        asammdf.Signal(values, COLUMNS["t"], name=name, unit="%") for name, values in COLUMNS.items() if name != "t"
+    ]
+    with asammdf.MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(path, overwrite=True)
+
+
 def _history(path: Path) -> None:
     with HistoryReader(path) as history:
         history.events(limit=20)
@@ -220,6 +249,15 @@ EXPORTS = (
     "Zeit;PV;OUT\ns;%;bar\n0,1;1;0,4\n0,2;2;0,5\nMittel;3;\n".encode("utf-16"),
 )
 PASSWORDS = b'{"operator": {"salt": "00ff", "digest": "0011"}}'
+COLUMNS = {"t": np.arange(4.0), "x": np.linspace(0.0, 1.0, 4), "u": np.full(4, 4e4)}
+MAPPING = b"""[export]
+column = ["time_s=Time", "position_m=PV:%", "command_pa=OUT:bar"]
+stroke_m = 0.04
+range_pa = [2e4, 1e5]
+decimal = ","
+time_format = "%Y"
+status = ["Quality=Good"]
+"""
 _MAPPING = read_mapping(["time_s=#1", "position_m=#2:%", "command_pa=#3:kPa"])
 
 
@@ -243,6 +281,10 @@ def file_parsers() -> dict[str, Parser]:
         "recording, Parquet": Parser(of_file("r.parquet", Recording.read, _preview), (parquet,), 2),
         "export": Parser(of_file("x.txt", _own, _preview, _import), (CSV, *EXPORTS), 2, True),
         "export, MATLAB": Parser(of_file("x.mat", _preview, _import), _matlab(), 2),
+        "export, HDF5": Parser(of_file("x.h5", _preview, _import), (_saved(_hdf5, "good.h5"),), 0.3),
+        "export, TDMS": Parser(of_file("x.tdms", _preview, _import), (_saved(_tdms, "good.tdms"),), 0.3),
+        "export, MDF4": Parser(of_file("x.mf4", _preview, _import), Later(lambda: _saved(_mdf4, "good.mf4")), 0.3),
+        "mapping file": Parser(of_file("m.toml", read_mapping_file), (MAPPING,), 4, True),
         "export, workbook": Parser(of_file("x.xlsx", _preview, _import), (workbook,), 0.3),
         "memory file": Parser(memory, (kept,), 2, True),
         "health file": Parser(health, (counts,), 8, True),

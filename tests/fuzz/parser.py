@@ -6,6 +6,8 @@ few bytes, memory without bound) is a fault of ours. `benchmarks.fuzz` and `test
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 LONGEST_SENTENCE = 5000
 
@@ -18,6 +20,19 @@ class Parser:
     good: Sequence[bytes]
     share: float
     text: bool = False
+
+
+class Later(Sequence[bytes]):
+    """An input that is made when it is first asked for: what makes it takes long to load."""
+
+    def __init__(self, make: Callable[[], bytes]) -> None:
+        self._make = cache(make)
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, index: Any) -> Any:
+        return (self._make(),)[index]
 
 
 class Broken(AssertionError):
