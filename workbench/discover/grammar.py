@@ -335,9 +335,10 @@ INDICATION = Place(
     "indication", "an indication", "sensor", ("y",), "float", "y -> y + b_1 g", "y + {c} * ({g})",
     _strength("shift_m", "b_1", "shift", -1.0, 1.0, (-0.003, 0.003, -0.03, 0.03), "stroke_m"), inverse=False,
 )  # fmt: skip
+# At a share of 1 nothing comes through any more, as at a supply's limit: that lies inside the range, not at its end.
 ENTERING = Place(
     "path", "the pressure", "pressure", ("u",), "float", "p = u - k g", "u - {c} * ({g})",
-    _strength("share", "k", "share", -1.0, 1.0, (0.3, 1.0), ""), inverse=False,
+    _strength("share", "k", "share", -2.0, 2.0, (0.3, 1.0), ""), inverse=False,
 )  # fmt: skip
 SHOWN = replace(
     ENTERING, name="indication", words="an indication", function="sensor", arguments=("y",), equation="y -> y - k g",
