@@ -11,6 +11,11 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
     else                               corrected as if the reference rested
 
+What two slides correct in a run that goes nowhere, abs(sum d_i) <= 0.7 sum abs(d_i), is the error from the median r_m of
+the last references: an excursion that lands at the reference of the moment lands a scatter off, and the next references
+ask for another one. Where one slide reaches the reference itself, it goes there. A small step within such a run is
+corrected when half of the references kept have confirmed it, or when it has come to rest.
+
 A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
 the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
 
@@ -20,7 +25,10 @@ with the same travel: no stem that can only be moved by m comes nearer. N D is a
 """
 
 from dataclasses import dataclass
+from itertools import accumulate
 from math import inf, nan
+from operator import sub
+from statistics import median
 
 SCAN_S = 1.2
 """A DCS writes at least so often, or it writes steps."""
@@ -30,6 +38,8 @@ OVERDUE = 1.5
 """Intervals: then no further one comes."""
 TAKEN_BACK = 3.0
 """D: a stem so far off is not met by chance."""
+GOES_ON = 0.7
+"""Of the sum of all changes, without their signs: a run that goes so far goes somewhere."""
 COMING = 8
 """N"""
 A_TREND = 3
@@ -75,6 +85,13 @@ class ReferenceCourse:
         if len(last_m) < A_TREND:
             return 0
         return 1 if min(last_m) > 0.0 else -1 if max(last_m) < 0.0 else 0
+
+    def middle_m(self, now_s: float) -> float:
+        """Return r_m, m: what the references scatter about; of one that rests, or goes somewhere, itself."""
+        net_m, sum_m = abs(sum(self.changes_m)), sum(abs(each) for each in self.changes_m)
+        if len(self.changes_m) < A_TREND or net_m > GOES_ON * sum_m or self.rests(now_s):
+            return self.value_m
+        return median(accumulate(self.changes_m, sub, initial=self.value_m))
 
     def lead_m(self, now_s: float, way_m: float) -> float:
         """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""

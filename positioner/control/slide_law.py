@@ -151,7 +151,9 @@ def step(
         memory = _first_margins(memory, balance, settings)
     if observation.outcome is not None:
         memory = _learnt(memory, observation.outcome, observation.quantum_m, balance, settings)
-    memory = replace(memory, course=memory.course.after(observation.now_s, reference_m))
+    if reference_m != memory.course.value_m:
+        memory = replace(memory, course=memory.course.after(observation.now_s, reference_m))
+    reference_m = _asked_m(memory, observation, settings)
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
         memory = replace(memory, anchor=Anchor(observation.position_m, memory.direction))
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
@@ -163,6 +165,18 @@ def step(
     if reference_m != memory.target_m:
         memory = replace(memory, target_m=reference_m, slides=0, inhibit_reason=InhibitReason.NOTHING)
     return _next_slide(memory, observation, balance, settings)
+
+
+def _asked_m(memory: SlideMemory, observation: StemObservation, settings: SlideSettings) -> float:
+    """Return where the stem is to be, m: the reference, or, where that takes two slides, what it scatters about."""
+    course = memory.course
+    if not course.changes_m:
+        return course.value_m
+    error_m = course.value_m - observation.position_m
+    margin = memory.margins.of(1 if error_m > 0 else -1, turning=True)
+    if not memory.excursion and abs(error_m) >= _way_m(memory, margin, settings):
+        return course.value_m
+    return course.middle_m(observation.now_s)
 
 
 def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: float, settings: SlideSettings) -> bool:
