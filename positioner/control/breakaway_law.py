@@ -96,12 +96,10 @@ def _always(_memory: BreakawayMemory, _pulse: PlannedPulse) -> bool:
 
 def while_not_commanding(memory: BreakawayMemory, observation: Observation, command_pa: float) -> BreakawayMemory:
     """Return the memory while another state commands: the rest of the stem under that command, nothing of a move."""
-    return replace(
-        while_watching(memory, observation, command_pa),
-        move=None,
-        in_progress=None,
-        inhibit_reason=InhibitReason.NOTHING,
-    )
+    watching = while_watching(memory, observation, command_pa)
+    if memory.move is None and memory.in_progress is None and memory.inhibit_reason is InhibitReason.NOTHING:
+        return watching
+    return replace(watching, move=None, in_progress=None, inhibit_reason=InhibitReason.NOTHING)
 
 
 def while_watching(memory: BreakawayMemory, observation: Observation, command_pa: float) -> BreakawayMemory:

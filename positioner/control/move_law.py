@@ -59,14 +59,9 @@ NOT_THERE = (
 
 def while_not_commanding(memory: MoveMemory, observation: Observation, command_pa: float) -> MoveMemory:
     """Return the memory while another state commands: the rest of the stem, nothing of a move."""
-    return replace(
-        memory,
-        pulses=breakaway_law.while_not_commanding(memory.pulses, observation, command_pa),
-        slides=slide_law.while_not_commanding(memory.slides, command_pa),
-        by_pulses=False,
-        declined=(nan, 0),
-        inhibit_reason=InhibitReason.NOTHING,
-    )
+    pulses = breakaway_law.while_not_commanding(memory.pulses, observation, command_pa)
+    slides = slide_law.while_not_commanding(memory.slides, command_pa)
+    return MoveMemory(pulses, slides, identified=memory.identified, given_up=memory.given_up)
 
 
 def step(

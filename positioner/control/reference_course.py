@@ -11,10 +11,10 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
     e carried by N = 8 references      left alone: a ramp brings it within the reach of one slide, or back to the stem
     else                               corrected as if the reference rested
 
-What two slides correct in a run that goes nowhere, abs(sum d_i) <= 0.7 sum abs(d_i), is the error from the median r_m of
-the last references: an excursion that lands at the reference of the moment lands a scatter off, and the next references
-ask for another one. Where one slide reaches the reference itself, it goes there. A small step within such a run is
-corrected when half of the references kept have confirmed it, or when it has come to rest.
+What two slides correct in a run that goes nowhere, abs(sum d_i) <= 0.7 sum abs(d_i), is the error from the median r_m
+of the last references: an excursion that lands at the reference of the moment lands a scatter off, and the next
+references ask for another one. Where one slide reaches the reference itself, it goes there. A small step within such a
+run is corrected when half of the references kept have confirmed it, or when it has come to rest.
 
 A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
 the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m

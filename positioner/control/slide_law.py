@@ -159,7 +159,8 @@ def step(
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
     if memory.excursion and observation.rest is None:
         memory = replace(memory, return_pa=_return_pa(memory, observation.position_m, balance, settings))
-    memory = replace(memory, last_m=observation.position_m)
+    if memory.excursion:
+        memory = replace(memory, last_m=observation.position_m)
     if observation.rest is None:
         return _redirected(memory, observation, reference_m, balance, settings)
     if reference_m != memory.target_m:
@@ -280,7 +281,7 @@ def _next_slide(
     if memory.slides > FREE_SLIDES:
         known_m = max(known_m, balance.scatter_m)
     if abs(error_m) <= max(settings.dead_band_m, known_m) * widened:
-        return replace(memory, inhibit_reason=InhibitReason.NOTHING)
+        return _because(memory, InhibitReason.NOTHING)
     again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0
     memory = replace(memory, slides=max(0, memory.slides - 2 * again)) if again else memory
     if memory.slides >= MOST_SLIDES:
@@ -294,8 +295,13 @@ def _next_slide(
     if s * (to_m - anchor.position_m) >= way_m:
         return _slide(memory, observation.now_s, to_m, s, balance, settings, excursion=False)
     if memory.course.takes_back(observation.now_s, error_m, way_m):
-        return replace(memory, inhibit_reason=InhibitReason.REFERENCE_COMES)
+        return _because(memory, InhibitReason.REFERENCE_COMES)
     return _excursion(memory, observation, balance, settings)
+
+
+def _because(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
+    """Return the memory with the reason why nothing is done: the same one, if it says so already, as in most steps."""
+    return memory if memory.inhibit_reason is reason else replace(memory, inhibit_reason=reason)
 
 
 def _lead_m(
@@ -347,10 +353,10 @@ def _excursion(
         if 0.0 < settings.budget_m_per_s * DAY_S < spent_m and not left_away:
             why = InhibitReason.EXCURSION_BUDGET_SPENT
             continue
-        memory = replace(memory, excursion_s=now_s, spent_m=spent_m)
+        memory = replace(memory, excursion_s=now_s, spent_m=spent_m, last_m=observation.position_m)
         memory = _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
         return replace(memory, return_pa=_return_pa(memory, memory.anchor.position_m, balance, settings))
-    return replace(memory, inhibit_reason=why)
+    return _because(memory, why)
 
 
 def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, settings: SlideSettings) -> float:

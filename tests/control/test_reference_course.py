@@ -37,6 +37,15 @@ def test_errors_of_a_few_changes_are_left_until_the_reference_rests() -> None:
     assert not course.takes_back(now_s + 0.8, 8e-4, WAY_M)
 
 
+def test_what_scatters_is_corrected_to_its_middle_and_what_goes_somewhere_to_itself() -> None:
+    course, now_s = written((*NOISE_M, 0.0606))
+    assert course.middle_m(now_s) == pytest.approx(0.06015)
+    assert course.middle_m(now_s + 0.8) == 0.0606, "none came: it stays"
+    for somewhere in (RAMP_M, (*NOISE_M, 0.0650)):
+        course, now_s = written(somewhere)
+        assert course.middle_m(now_s) == somewhere[-1]
+
+
 def test_the_same_reference_again_is_none() -> None:
     course, now_s = written((*NOISE_M, NOISE_M[-1], NOISE_M[-1]))
     assert course.rests(now_s)

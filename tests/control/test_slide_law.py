@@ -161,6 +161,18 @@ def test_an_excursion_beyond_the_limit_is_not_made_and_said() -> None:
     assert loop.decision.inhibit_reason is InhibitReason.EXCURSION_BEYOND_LIMIT
 
 
+def test_under_a_reference_that_flickers_it_comes_to_rest() -> None:
+    """Scatter like the dead band: once to its middle, if at all, then nothing."""
+    loop = Loop(0.05)
+    loop.step_to(0.6)
+    commands = []
+    for flicker in np.random.default_rng(2).normal(0.0, 5e-4, 120):
+        loop.step_to(0.6006 + float(flicker), cycles=10)
+        commands.append(loop.decision.command_pa)
+    assert len(set(commands)) <= 2
+    assert abs(loop.valve.indicated_m / STROKE_M - 0.6006) < 5e-4
+
+
 def test_excursions_keep_their_interval() -> None:
     loop = Loop(0.05, excursion_interval_s=20.0)
     loop.step_to(0.7)
