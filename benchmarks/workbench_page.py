@@ -25,6 +25,7 @@ from benchmarks.operator_page import cpu
 from config.recording import Recording
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
+from workbench.blind.trial import NOISE_M
 
 SEED = 7
 PERIOD_S = 0.01
@@ -32,6 +33,8 @@ SLIDER_S, LONG_SAMPLES = 60.0, 500_000
 MOVES = 30
 LOOKS = 10
 """At the server's memory, while it is used for long."""
+THINKS_S = 30.0
+"""Who uses it for long looks at what came before going on."""
 LONGEST_MS = 600_000
 TIME_PLOT = "position, error and pressure over time"
 WATCHED = """name => {
@@ -123,6 +126,7 @@ def _used_for_long(page: Page, process: "subprocess.Popen[str]", minutes: float)
             page.reload()
             _first_visit_s(page)
             reloads += 1
+            time.sleep(THINKS_S)
         seen_mb.append(_resident_mb(process))
         print(
             f"{drags} moves, {reloads} visits: server {seen_mb[-1]:.0f} MB, load {os.getloadavg()[0]:.0f}", flush=True
@@ -140,6 +144,8 @@ def _panned_ms(page: Page, begin_s: float, end_s: float) -> float:
 def _repeated(recording: Recording, count: int) -> Recording:
     times = -(-count // len(recording))
     columns = {name: np.tile(column, times)[:count] for name, column in recording.columns.items()}
+    # Of noise that repeats itself to the digit nobody would say that it is any.
+    columns["position_m"] += np.random.default_rng(SEED).normal(0.0, NOISE_M, count)
     return Recording(columns | {"time_s": PERIOD_S * np.arange(count, dtype=np.float64)}, recording.metadata)
 
 

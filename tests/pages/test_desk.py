@@ -20,7 +20,7 @@ from workbench.blind.hiding import hide
 from workbench.select.extension import extend
 
 HIDDEN = hide(7, duration_s=5.0)
-FIRST, OTHER = Opened("fit.csv", Path("fit.csv"), HIDDEN.fit), Opened("other.csv", Path("other.csv"), HIDDEN.test)
+FIRST, OTHER = Opened.of("fit.csv", Path("fit.csv"), HIDDEN.fit), Opened.of("other.csv", Path("other.csv"), HIDDEN.test)
 VALVE = NamedValve("valve.toml", Path("valve.toml"), HIDDEN.base)
 
 

@@ -34,7 +34,7 @@ def goes_on(work: Work) -> bool:
 
 def busy(desk: Desk) -> Desk:
     desk.take_valve(NamedValve("valve.toml", Path("valve.toml"), HIDDEN.base))
-    desk.take_recording(Opened("fit.csv", Path("fit.csv"), HIDDEN.fit))
+    desk.take_recording(Opened.of("fit.csv", Path("fit.csv"), HIDDEN.fit))
     search = desk.begin("diagnose", never_ends)
     while not search.doing:
         search.look()

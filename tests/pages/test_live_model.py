@@ -1,25 +1,29 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from config.errors import InputError
 from config.recording import Column, Recording
-from config.valve_file import EffectTable, ValveFile, valve
+from config.valve_file import EffectTable, ValveFile
 from positioner.pages.parts.theme import LIGHT
 from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.live_model import LiveModel
+from positioner.pages.workbench_page.opening import Opened
 from positioner.pages.workbench_page.time_figure import LINES, TimeFigure, Window, window_of
 from workbench.blind.hiding import hide
 from workbench.compare.comparison import compare
 from workbench.data.record import ready
 
 HIDDEN = hide(7, duration_s=10.0)
+RECORD = ready(HIDDEN.fit)
 PRELOADED = ValveFile(
     valve=HIDDEN.base.valve, effect=(EffectTable.model_validate({"name": "preload", "force_n": 100.0}),)
 )
 
 
 def test_it_says_what_compare_says() -> None:
-    live = LiveModel(HIDDEN.fit, HIDDEN.base)
+    live = LiveModel(RECORD, HIDDEN.base)
     assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-12)
 
 
@@ -27,11 +31,11 @@ def test_ten_million_samples_are_refused_at_once_as_for_a_fit() -> None:
     still = np.zeros(10_000_000)
     recording = Recording({"time_s": np.arange(still.size, dtype=np.float64), "command_pa": still, "position_m": still})
     with pytest.raises(InputError, match="10000000 samples would take hours to fit; allowed are 1000000 samples"):
-        LiveModel(recording, HIDDEN.base)
+        Opened.of("still.csv", Path("still.csv"), recording)
 
 
 def test_a_move_is_a_parameter_of_the_valve_file_and_is_undone() -> None:
-    live = LiveModel(HIDDEN.fit, HIDDEN.base)
+    live = LiveModel(RECORD, HIDDEN.base)
     given = live.curve().rms_m
     spring = live.parameters["spring_n_per_m"]
     live.keep()
@@ -45,7 +49,7 @@ def test_a_move_is_a_parameter_of_the_valve_file_and_is_undone() -> None:
 
 @pytest.mark.parametrize("name", ["coulomb_n", "static_n", "preload.force_n", "mass_kg"])
 def test_a_slider_goes_over_the_whole_range_and_static_friction_never_falls_below_sliding(name: str) -> None:
-    live = LiveModel(HIDDEN.fit, PRELOADED)
+    live = LiveModel(RECORD, PRELOADED)
     moved = live.parameters[name]
     for share in (0.0, 0.3, 1.0):
         live.move(moved, share)
@@ -54,7 +58,7 @@ def test_a_slider_goes_over_the_whole_range_and_static_friction_never_falls_belo
 
 
 def test_an_effect_switched_off_is_the_valve_without_it() -> None:
-    live = LiveModel(HIDDEN.fit, PRELOADED)
+    live = LiveModel(RECORD, PRELOADED)
     live.switch("preload", False)
     assert live.valve.effect == ()
     assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-9)
@@ -88,4 +92,4 @@ def test_a_window_is_what_the_plot_says() -> None:
 
 def test_what_cannot_be_simulated_is_refused() -> None:
     with pytest.raises(InputError, match="position_m"):
-        LiveModel(Recording({"time_s": np.arange(9.0), "command_pa": np.arange(9.0)}), valve("seed"))
+        Opened.of("r.csv", Path("r.csv"), Recording({"time_s": np.arange(9.0), "command_pa": np.arange(9.0)}))

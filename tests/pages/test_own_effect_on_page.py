@@ -25,7 +25,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
     desk = Desk(folder=tmp_path / "desk", may_write_effects=True)
     desk.folder.mkdir()
     desk.take_valve(NamedValve("valve.toml", tmp_path / "valve.toml", hidden.base))
-    desk.take_recording(Opened("fit.csv", tmp_path / "fit.csv", hidden.fit))
+    desk.take_recording(Opened.of("fit.csv", tmp_path / "fit.csv", hidden.fit))
     yield desk
     desk.clear()
 

@@ -126,6 +126,7 @@ def test_what_hangs_together_is_few_independent_samples() -> None:
     [
         (Gain(9.0, 0.5, 9.0, 1.0), "evidence 9"),
         (Gain(90.0, 0.04, 9.0, 1.0), "falls by 4 %"),
+        (Gain(90.0, -0.11, -9.0, 1.0), "rises by 11 %, a fall of more than 5 % needed"),
         (Gain(90.0, 0.5, 1.9, 1.0), "1.9 standard errors"),
     ],
 )

@@ -171,7 +171,15 @@ def compare(recording: Recording, valve: ValveFile) -> Comparison:
     Raises:
         InputError: an unknown effect, other units than SI, or a recording that cannot be simulated.
     """
-    record = ready(recording)
+    return compare_record(ready(recording), valve)
+
+
+def compare_record(record: Record, valve: ValveFile) -> Comparison:
+    """Hold a valve against a record that was made ready before.
+
+    Raises:
+        InputError: an unknown effect, or other units than SI.
+    """
     require_units(record, valve.valve)
     composition = Composition.from_file(valve)
     free = FreeRun(composition, record)
@@ -293,9 +301,8 @@ def _segment_findings(valve: ValveFile, record: Record, run: Run, first: int, en
     measured, simulated = slips(measured_m, record.scale_m), slips(simulated_m, record.scale_m)
     pressure_pa = _pressure(record, run)[first:end]
     load_n = np.zeros(rows.size) if record.load_n is None else record.load_n[first:end]
-    direction = np.zeros(rows.size)
-    for slip in measured:
-        direction[slip.first :] = slip.direction
+    begun = np.searchsorted([each.first for each in measured], rows, side="right")
+    direction = np.array([0.0, *(each.direction for each in measured)])[begun]
     both = [
         forces(valve.valve, time_s, position_m, pressure_pa, load_n, record.scale_m)
         for position_m in (measured_m, simulated_m)

@@ -237,11 +237,12 @@ def _where(validation: _Validation) -> Html:
 
 
 def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
-    steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, _tried(step)) for step in diagnosis.steps]
+    steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranked(step)) for step in diagnosis.steps]
     return tried_effects(steps, validation.floor_m, LENGTH, "second by second")
 
 
-def _tried(step: EffectStep) -> list[RankedEffect]:
+def ranked(step: EffectStep) -> list[RankedEffect]:
+    """Return what came of each effect of a step."""
     added, rivals = step.added.name if step.added else "", [each.name for each in step.indistinguishable]
     return [
         RankedEffect(

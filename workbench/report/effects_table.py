@@ -92,7 +92,7 @@ def _ranked(each: RankedEffect, of: Quantity) -> Row:
     return Row(
         [
             each.name,
-            f"{each.outcome}: {each.why}" if each.why else each.outcome,
+            each.said,
             of.shown(each.test),
             of.shown(each.train),
             "–" if each.reduction_standard_errors is None else f"{each.reduction_standard_errors:.3g}",

@@ -38,6 +38,11 @@ class RankedEffect:
         """Added first, then as good, accepted, refused; inside these by held-out error."""
         return ORDER.index(self.outcome), np.inf if self.test is None else self.test
 
+    @property
+    def said(self) -> str:
+        """The outcome, and why it is no better."""
+        return f"{self.outcome}: {self.why}" if self.why else self.outcome
+
 
 def ranking(tried: Sequence[RankedEffect], before: float, floor: float | None, of: Quantity) -> Figure:
     """Return the held-out errors on a logarithmic scale."""

@@ -47,9 +47,9 @@ class Gain:
                 f"are independent: {self.independent_share * self.bic:.2g}, more than {LEAST_BIC:g} needed"
             )
         if self.held_out <= LEAST_REDUCTION:
-            return (
-                f"the held-out error falls by {100 * self.held_out:.2g} %, more than {100 * LEAST_REDUCTION:g} % needed"
-            )
+            way = "falls" if self.held_out >= 0.0 else "rises"
+            changes = f"the held-out error {way} by {100 * abs(self.held_out):.2g} %"
+            return f"{changes}, a fall of more than {100 * LEAST_REDUCTION:g} % needed"
         if self.standard_errors <= least:
             return f"the held-out error falls by {self.standard_errors:.2g} standard errors, more than {least:g} needed"
         return ""

@@ -13,7 +13,12 @@ from positioner.pages.parts.theme import LIGHT, Ink, Theme
 
 Figure = dict[str, Any]
 AT_ONCE = {"mode": "immediate", "transition": {"duration": 0}, "frame": {"duration": 0, "redraw": False}}
-CONFIG = {"displaylogo": False, "scrollZoom": True, "responsive": True, "modeBarButtonsToRemove": ["lasso2d"]}
+UNUSED = ["lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d"]
+CONFIG = {"displaylogo": False, "scrollZoom": True, "responsive": True, "modeBarButtonsToRemove": UNUSED}
+LEGEND = {"orientation": "h", "x": 0, "y": 0, "xanchor": "left", "yanchor": "bottom", "yref": "container"}
+"""Below, where it is in nobody's way however many lines it takes on a narrow screen."""
+BAR_PX = 30
+"""Above a plot, for its buttons: a screen that is touched shows them always."""
 
 
 class FigureView:
@@ -56,6 +61,9 @@ class FigureView:
         figure = _recoloured(self._draw(), changed)
         layout = dict(figure.get("layout", {}))
         layout |= {
+            "margin": {**layout["margin"], "t": max(BAR_PX, layout["margin"]["t"])},
+            "legend": LEGEND,
+            "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": ink.quiet, "activecolor": ink.text},
             "paper_bgcolor": "rgba(0,0,0,0)",
             "plot_bgcolor": "rgba(0,0,0,0)",
             "font": {**layout.get("font", {}), "color": ink.text},

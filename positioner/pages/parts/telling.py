@@ -40,6 +40,15 @@ def sentences(items: Sequence[str], name: str) -> None:
     ui.html(f'<ul class="said">{lines}</ul>', sanitize=False).props(f'data-testid="{name}"')
 
 
-def heading(text: str) -> None:
-    """Show a section's heading."""
-    ui.html(f"<h2>{escape(text)}</h2>", sanitize=False)
+def heading(text: str, name: str = "") -> None:
+    """Show a section's heading; by its name `look_at` finds it."""
+    place = f' data-testid="{name}" tabindex="-1"' if name else ""
+    ui.html(f"<h2{place}>{escape(text)}</h2>", sanitize=False)
+
+
+def look_at(name: str) -> None:
+    """Bring a heading to the top; who goes by keyboard goes on from there."""
+    ui.run_javascript(
+        f"""const it = document.querySelector('[data-testid="{name}"]');
+        it?.focus({{preventScroll: true}}); it?.scrollIntoView();"""
+    )

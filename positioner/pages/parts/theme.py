@@ -35,11 +35,20 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .blamed { background: rgba(217, 98, 43, 0.25); }
 .jump:hover { text-decoration-style: solid; color: var(--q-primary); }
 .jump:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
-h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; }
+h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; scroll-margin-top: 80px; }
 *:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
 .body--dark .q-btn.text-negative { color: #ff8a80 !important; }
 .body--dark .q-uploader__header { background: #1b5e8a; }
-@media (max-width: 599px) { .panel { padding: 8px 8px 24px; } .q-header { padding: 4px 8px; gap: 4px; } }
+@media (max-width: 599px) {
+  .panel { padding: 8px 8px 24px; } .q-header { padding: 4px 8px; gap: 4px; }
+  .candidates thead { display: none; }
+  .candidates tr { display: flex; flex-flow: row wrap; align-items: center; border-top: 1px solid #80808066; }
+  .candidates .q-table tbody td { height: auto; border: none; padding: 2px 8px; }
+  .candidates tbody td:first-child, .candidates tbody td:last-child { flex: 1 0 100%; }
+  .candidates tbody td:nth-child(2)::before { content: "fitted, mm: "; }
+  .candidates tbody td:nth-child(3)::before { content: "held out, mm: "; }
+  .candidates tbody td:nth-child(4)::before { content: "evidence: "; }
+}
 """
 HIDDEN_PLOTS = """
 <script>

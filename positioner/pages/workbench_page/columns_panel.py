@@ -90,7 +90,7 @@ class ColumnsPanel:
         self._confirm.set_enabled(False)
         try:
             read = await aside(mapped, self._export, choice)
-            said = await aside(wrong_with, read.recording, choice.stroke_m)
+            said = await aside(wrong_with, read, choice.stroke_m)
         except InputError as error:
             asked = ASKED.get(error.source, self._export.name)
             self._put(mine, None, [f"{asked}: {error.problem}"])

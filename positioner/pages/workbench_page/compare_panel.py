@@ -168,6 +168,7 @@ class ComparePanel:
         """Look at a stretch with some time around it; None: at all."""
         self._figure.stretch = stretch
         window = self._figure.whole if stretch is None else around(stretch)
+        self._figure.window = window
         shapes = self._figure.shades(self._theme.ink)
         self._time.relayout({"xaxis.range": [window.begin_s, window.end_s], "shapes": shapes})
 

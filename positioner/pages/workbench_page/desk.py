@@ -123,7 +123,7 @@ class Desk:
             InputError: it cannot be simulated with the valve.
         """
         if opened is not None:
-            LiveModel(opened.recording, self._model().valve)
+            LiveModel(opened.record, self._model().valve)
         self.held_out = opened
 
     def keep_variant(self) -> None:
@@ -151,7 +151,7 @@ class Desk:
         folder = self.folder / f"blind-{seed}"
         if not folder.exists():
             seal(folder, hide(seed))
-        opened = Opened(f"{BLIND}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"))
+        opened = Opened.of(f"{BLIND}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"))
         self._held(opened, named_valve(str(folder / "valve.toml"), f"{BLIND}/valve.toml"))
         self.export, self.held_out, self.sealed, self.seed = None, None, folder, seed
 
@@ -321,7 +321,7 @@ class Desk:
 
     def _held(self, opened: Opened | None, valve: NamedValve | None) -> None:
         """Hold a recording and a valve against each other, all found out before forgotten; if that fails, as it was."""
-        live = LiveModel(opened.recording, valve.file) if opened and valve else None
+        live = LiveModel(opened.record, valve.file) if opened and valve else None
         compared = live.comparison() if live else None
         self.stop()
         self._before.append({name: getattr(self, name) for name in UNDONE} | {"variants": dict(self.variants)})

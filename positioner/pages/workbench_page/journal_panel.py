@@ -20,14 +20,15 @@ FALL_PX = 320
 
 
 class JournalPanel:
-    """The panel; `changed` is called when another valve is on the desk."""
+    """The panel; `changed` is called when another valve is on the desk, with the heading of interest."""
 
-    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[], None]) -> None:
+    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[str], None]) -> None:
         self._desk = desk
         self._changed = changed
         if desk.journal:
-            heading("How the error fell")
+            heading("How the error fell", "journal")
             FigureView(theme, self._drawn, FALL_PX, "how the error fell")
+            ui.label("dashed: the floor").classes("quiet")
             for number, step in enumerate(desk.journal, start=1):
                 added = ", ".join(step.extension.effects)
                 ui.label(desk.plain(f"{number}. {added}: {step.extension.summary().splitlines()[0]}")).props(
@@ -60,7 +61,7 @@ class JournalPanel:
     async def _back(self) -> None:
         with errors_told():
             await aside(self._desk.walk_back)
-            self._changed()
+            self._changed("comparison")
 
     def _save(self) -> None:
         with errors_told():

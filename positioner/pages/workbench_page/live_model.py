@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from config.recording import Column, Recording
+from config.recording import Column
 from config.valve_file import ValveFile
 from sim.composition import BASE, Composition
 from sim.karnopp import Vector
-from workbench.compare.comparison import Comparison, compare
+from workbench.compare.comparison import Comparison, compare_record
 from workbench.compare.friction_balance import Forces, forces
 from workbench.compare.measures import rms, valid_rows
-from workbench.data.record import Record, ready, require_few_samples, require_units
+from workbench.data.record import Record, require_units
 from workbench.model.free_run import FreeRun, Run
 from workbench.model.parameters import Parameter, free_parameters
 
@@ -43,12 +43,10 @@ class Curve:
 
 
 class LiveModel:
-    """Raises InputError as `compare` does, and of more samples than may be fitted."""
+    """Raises InputError as `compare_record` does."""
 
-    def __init__(self, recording: Recording, valve: ValveFile) -> None:
-        self.recording = recording
-        require_few_samples(recording)
-        self.record: Record = ready(recording)
+    def __init__(self, record: Record, valve: ValveFile) -> None:
+        self.record = record
         require_units(self.record, valve.valve)
         self._composition = Composition.from_file(valve)
         self._run = FreeRun(self._composition, self.record)
@@ -132,9 +130,9 @@ class LiveModel:
         """Return all that `compare` says of it.
 
         Raises:
-            InputError: as `compare`.
+            InputError: as `compare_record`.
         """
-        return compare(self.recording, self.valve)
+        return compare_record(self.record, self.valve)
 
     def forces(self) -> tuple[Forces, Forces]:
         """Return the friction that the balance of forces leaves in motion: as measured, and of the model."""

@@ -58,9 +58,8 @@ class OpenPanel:
         with self._remarks:
             ui.label(f"{desk.opened.name}: {recording.summary().splitlines()[0]}").props('data-testid="opened"')
             stroke_m = desk.valve.file.valve.stroke_m if desk.valve else None
-            with errors_told():
-                said = wrong_with(recording, stroke_m)
-                sentences(said or ("nothing in it had to be left out or cut",), "wrong")
+            said = wrong_with(desk.opened, stroke_m)
+            sentences(said or ("nothing in it had to be left out or cut",), "wrong")
             if desk.live is not None:
                 self._held_out()
             if desk.valve is None:

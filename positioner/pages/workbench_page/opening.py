@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 from config.errors import InputError
 from config.exports.column_mapping import RANGE_PA, ExportOptions, offered_units, read_mapping
@@ -12,7 +13,7 @@ from config.exports.plausibility import oddities
 from config.historian_export import read_export
 from config.recording import Recording
 from workbench.compare.comparison_sentences import shortened
-from workbench.data.record import ready
+from workbench.data.record import Record, ready, require_few_samples
 
 OURS = ("time_s", "position_m", "command_pa", "reference_m", "pressure_pa", "load_n")
 """Columns that a file's may be taken for."""
@@ -41,13 +42,24 @@ class ColumnChoice:
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A recording that was read: the name it came by, and where it lies."""
+    """A recording that was read, and made ready once for all: the name it came by, and where it lies."""
 
     name: str
     path: Path
     recording: Recording
+    record: Record
     choice: ColumnChoice | None = None
     """How it was read, of an export."""
+
+    @classmethod
+    def of(cls, name: str, path: Path, recording: Recording, choice: ColumnChoice | None = None) -> Self:
+        """Make a recording ready.
+
+        Raises:
+            InputError: as `ready`, and of more samples than may be fitted.
+        """
+        require_few_samples(recording)
+        return cls(name, path, recording, ready(recording), choice)
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -83,7 +95,7 @@ def opened(path: Path, name: str) -> Opened | Export:
     """
     recording = own_recording(path)
     if recording is not None:
-        return Opened(name, path, recording)
+        return Opened.of(name, path, recording)
     found = preview(path)
     return Export(name, path, found, _proposed(found))
 
@@ -122,13 +134,9 @@ def mapped(export: Export, by: ColumnChoice) -> Opened:
     chosen = [f"{ours}={theirs}" for ours, theirs in by.columns.items() if theirs]
     options = ExportOptions(by.decimal or None, by.time_format or None)
     recording = read_export(export.path, read_mapping(chosen), by.stroke_m, RANGE_PA, options)
-    return Opened(export.name, export.path, recording, by)
+    return Opened.of(export.name, export.path, recording, by)
 
 
-def wrong_with(recording: Recording, stroke_m: float | None) -> tuple[str, ...]:
-    """Say what is wrong with a recording, a line each: what is odd, and what had to be left out or cut.
-
-    Raises:
-        InputError: it cannot be simulated.
-    """
-    return (*oddities(recording, stroke_m), *shortened(ready(recording).notes))
+def wrong_with(opened: Opened, stroke_m: float | None) -> tuple[str, ...]:
+    """Say what is wrong with a recording, a line each: what is odd, and what had to be left out or cut."""
+    return (*oddities(opened.recording, stroke_m), *shortened(opened.record.notes))

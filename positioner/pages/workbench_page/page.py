@@ -6,7 +6,7 @@ from pathlib import Path
 from nicegui import app, ui
 
 from positioner.pages.parts.server import Listening, serve
-from positioner.pages.parts.telling import aside, errors_told, heading
+from positioner.pages.parts.telling import aside, errors_told, heading, look_at
 from positioner.pages.parts.theme import Theme
 from positioner.pages.parts.unit_choice import unit_choice
 from positioner.pages.workbench_page.compare_panel import ComparePanel
@@ -114,8 +114,8 @@ class TabPage:
             if await aside(self._desk.undo):
                 self.changed()
 
-    def changed(self) -> None:
-        """Show what goes with the recording and the valve on the desk."""
+    def changed(self, at: str = "") -> None:
+        """Show what goes with the recording and the valve on the desk; `at` is the heading that is looked at then."""
         self._theme.forget()
         self._open.refresh()
         self._rest.clear()
@@ -124,10 +124,12 @@ class TabPage:
                 ui.label("Begin with a recording and a valve, or with a blind case.").classes("quiet")
             return
         with self._rest:
-            heading("Model against measurement")
+            heading("Model against measurement", "comparison")
             ComparePanel(self._desk, self._theme)
             SearchPanel(self._desk, self._theme, self.changed)
             JournalPanel(self._desk, self._theme, self.changed)
+            if at:
+                look_at(at)
 
 
 def serve_workbench(recordings: Sequence[Path], valve: str | None, where: Listening, *, opens_browser: bool) -> None:

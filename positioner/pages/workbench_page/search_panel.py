@@ -1,12 +1,12 @@
 """Diagnosis in the background: the race of the candidates as it runs, then the verdict, and what may be added."""
 
 from collections.abc import Callable, Sequence
-from math import inf
+from math import inf, log10
 
 from nicegui import events, ui
 
 from positioner.pages.parts.figure_view import Figure, FigureView
-from positioner.pages.parts.telling import aside, errors_told, heading, tell_error
+from positioner.pages.parts.telling import aside, errors_told, heading, look_at, tell_error
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.background import diagnosed, extended, refitted
 from positioner.pages.workbench_page.desk import Desk
@@ -15,11 +15,11 @@ from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
 from workbench.fit.fit_result import Fit
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
+from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
-from workbench.report.units import length
+from workbench.report.units import LENGTH, length
 from workbench.select.diagnosis import Diagnosis
-from workbench.select.effect_candidates import EffectCandidate
 from workbench.select.extension import Extension, extension_of
 
 LOOK_S = 0.2
@@ -30,13 +30,13 @@ ROW_PX, FRAME_PX = 18, 70
 
 
 class SearchPanel:
-    """Begins searches and shows them; `changed` is called when another valve is on the desk."""
+    """Begins searches; `changed` is called when another valve is on the desk, with the heading of interest."""
 
-    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[], None]) -> None:
+    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[str], None]) -> None:
         self._desk = desk
         self._theme = theme
         self._changed = changed
-        heading("Which effect is missing?")
+        heading("Which effect is missing?", "search")
         with ui.row().classes("w-full items-center"):
             self._begin = ui.button("Diagnose", icon="search", on_click=self._diagnose)
             self._begin.props('no-caps data-testid="diagnose"')
@@ -49,15 +49,15 @@ class SearchPanel:
             ).style("width: 110px").tooltip("after so long it says what is known then")
             names = ui.select(self._tried(), label="effects tried (all)", multiple=True, clearable=True)
             self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
-        effect_section(desk, theme, self._joined)
         with ui.column().classes("w-full") as self._progress:
             self._doing = ui.label().props('data-testid="doing" aria-live="polite"')
             self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
             self._preview = ui.label().classes("quiet")
+        self._result = ui.column().classes("w-full")
         self._race = ui.column().classes("w-full")
         self._raced: tuple[int, int] = (0, 0)
         self._view: FigureView | None = None
-        self._result = ui.column().classes("w-full")
+        effect_section(desk, theme, self._joined)
         ui.timer(LOOK_S, self._look)
         self._show()
         self._show_race()
@@ -94,6 +94,7 @@ class SearchPanel:
         self._result.clear()
         self._show()
         self._show_race()
+        look_at("search")
 
     def _stop(self) -> None:
         self._desk.stop()
@@ -116,10 +117,10 @@ class SearchPanel:
         with errors_told():
             if isinstance(search.result, Fit):
                 await aside(self._desk.take_fit, search.result)
-                self._changed()
+                self._changed("comparison")
             elif isinstance(search.result, Extension):
                 await aside(self._desk.add, search.result)
-                self._changed()
+                self._changed("journal")
             else:
                 self._desk.found = search
                 self._tell(search)
@@ -173,6 +174,7 @@ class SearchPanel:
                 xaxis=axis(f"step {step}: fitted error, mm rms", type="log", **log_ticks(shown_mm)),
                 yaxis=axis("", tickfont={"size": 11}),
                 shapes=[] if floor_m is None else [marked(1e3 * floor_m, MEASURED)],
+                annotations=[] if floor_m is None else [_named_floor(floor_m)],
                 showlegend=False,
             ),
         }
@@ -199,24 +201,31 @@ class SearchPanel:
                 ui.label(f"step {number}: {length(step.before.errors.test_rmse_m).text} mm held out before").classes(
                     "quiet"
                 )
-                self._candidates(diagnosis, step.candidates, may_add=may_add)
+                self._candidates(diagnosis, number, may_add=may_add)
 
-    def _candidates(self, diagnosis: Diagnosis, candidates: Sequence[EffectCandidate], *, may_add: bool) -> None:
-        heads = {"effect": "effect", "fitted": "fitted, mm", "test": "held out, mm", "bic": "evidence", "why": ""}
+    def _candidates(self, diagnosis: Diagnosis, number: int, *, may_add: bool) -> None:
+        step = diagnosis.steps[number - 1]
+        heads = {
+            "effect": "effect",
+            "fitted": "fitted, mm",
+            "test": "held out, mm",
+            "bic": "evidence",
+            "outcome": "in the search",
+        }
         columns = [{"name": key, "label": head, "field": key, "align": "left"} for key, head in heads.items()]
         rows = [
             {
-                "effects": diagnosis.with_those_before(each.step, each.name),
+                "effects": diagnosis.with_those_before(number, each.name),
                 "effect": self._desk.plain(each.name),
-                "fitted": length(each.model.errors.train_rmse_m).text if each.model else "–",
-                "test": length(each.model.errors.test_rmse_m).text if each.model else "–",
-                "bic": f"{each.gain.bic:.1f}" if each.gain else "–",
-                "why": each.rejection_reason or "accepted",
+                "fitted": LENGTH.shown(each.train).text,
+                "test": LENGTH.shown(each.test).text,
+                "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
+                "outcome": each.said,
             }
-            for each in candidates
+            for each in sorted(ranked(step), key=lambda each: each.order)
         ]
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
-        table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full")
+        table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full candidates")
         if may_add:
             table.add_slot("body-cell-effect", ADDING)
             table.on("add", lambda event: self._extend(event.args["effects"]))
@@ -230,7 +239,13 @@ class SearchPanel:
         with errors_told():
             extension = await aside(extension_of, search.result, search.valve)
             await aside(self._desk.add, extension)
-            self._changed()
+            self._changed("journal")
+
+
+def _named_floor(floor_m: float) -> Figure:
+    """Return what stands over the line of the floor, on an axis in mm that is logarithmic."""
+    where = {"x": log10(1e3 * floor_m), "y": 1.0, "yref": "paper", "yanchor": "bottom"}
+    return {"text": "floor", "showarrow": False, **where}
 
 
 def _shown(budget_s: float) -> float | None:

@@ -128,7 +128,6 @@ class TimeFigure:
             dragmode="zoom",
             uirevision=f"time, {position}, {asked}",
             shapes=self.shades(ink),
-            legend={"orientation": "h", "x": 0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"},
             xaxis=axis("time, s", anchor="y3", range=[self.window.begin_s, self.window.end_s], showspikes=True,
                        spikemode="across", spikethickness=1, spikecolor=ink.quiet),
             yaxis=axis(f"position, {position}", domain=[0.52, 1.0]),
