@@ -42,20 +42,21 @@ class Turn:
     page_cpu: float
 
 
-def report(minutes: float) -> list[str]:
-    """Return lines: medians over the turns, ratios to nobody looking, and the page's memory."""
+def report(minutes: float) -> Iterator[str]:
+    """Yield lines as they come: what dies, medians over the turns, ratios to nobody looking, the page's memory."""
     turns: dict[str, list[Turn]] = {"nobody looks": [], "page, no tab": [], "page, a tab open": []}
-    lines = list(_seen())
+    yield from _seen()
     with tempfile.TemporaryDirectory() as name, valve_site(Path(name)) as site:
         for _ in range(TURNS):
             for who, found in turns.items():
                 with looking(who, site.config) as page_pid:
                     found.append(turn(site.port, site.daemon.pid, page_pid))
-        lines += [f"{'':18} cycle, ms   jitter 99 %, ms   missed, %   daemon's CPU, %   page's CPU, %"]
-        lines += [f"{who:18} {_row(found)}" for who, found in turns.items()]
+        yield f"{'':18} cycle, ms   jitter 99 %, ms   missed, %   daemon's CPU, %   page's CPU, %"
+        yield from (f"{who:18} {_row(found)}" for who, found in turns.items())
         alone = turns["nobody looks"]
-        lines += [f"{who:18} {_ratios(found, alone)}" for who, found in turns.items() if found is not alone]
-        return lines + list(_memory(site.config, site.port, minutes))
+        yield from (f"{who:18} {_ratios(found, alone)}" for who, found in turns.items() if found is not alone)
+        yield f"load {os.getloadavg()[0]:.0f}"
+        yield from _memory(site.config, site.port, minutes)
 
 
 @contextmanager
@@ -145,11 +146,12 @@ def _seen() -> Iterator[str]:
                     tab.get_by_test_id("figure-position").get_by_text("29.").wait_for()
                     kill(site)
                     died_s = time.monotonic()
-                    tab.get_by_text(shown).first.wait_for()
+                    tab.get_by_text(shown).locator("visible=true").first.wait_for()
                     taken_s.append(time.monotonic() - died_s)
                 with suppress(ProcessLookupError):
                     site.daemon.signal(signal.SIGCONT)
-        yield f"{what} after {min(taken_s):.2f} to {max(taken_s):.2f} s ({DEATHS} times)"
+        load = os.getloadavg()[0]
+        yield f"{what} after {min(taken_s):.2f} to {max(taken_s):.2f} s ({DEATHS} times), load {load:.0f}"
 
 
 def _memory(config: Path, port: int, minutes: float) -> Iterator[str]:
@@ -170,4 +172,5 @@ def _memory(config: Path, port: int, minutes: float) -> Iterator[str]:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=12.0, help="for which the page's memory is watched")
-    print("\n".join(report(parser.parse_args().minutes)))
+    for line in report(parser.parse_args().minutes):
+        print(line, flush=True)

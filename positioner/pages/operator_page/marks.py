@@ -49,6 +49,9 @@ LAYOUT = """
 .scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
 .scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
 .scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
+@media (max-width: 599px) {
+  .q-header { flex-wrap: nowrap; } .q-header .title { display: none; } .q-header .q-select { min-width: 0; }
+}
 """
 
 STYLE = LAYOUT + NE107_MARKS + UNHEARD

@@ -62,7 +62,7 @@ class Tab:
         names = [valve.place.name for valve in self._valves]
         several = len(names) > 1
         with ui.header().classes("items-center"):
-            ui.label(TITLE).classes("text-subtitle1")
+            ui.label(TITLE).classes("text-subtitle1 title")
             self._chosen = ui.select([ALL, *names] if several else names, value=ALL if several else names[0])
             self._chosen.props('dense dark options-dense borderless aria-label="valve" data-testid="valve"')
             self._chosen.on_value_change(self._show)

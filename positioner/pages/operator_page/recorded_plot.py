@@ -28,20 +28,29 @@ class RecordedPlot:
         self._theme = theme
         self._units = units
         self._columns: dict[str, Column] = {}
+        self._stroke_m = math.nan
         self._unit = Unit("", 1.0, 0)
         self._chart = ui.echart({}).classes("full-width").style("height: 240px")
         self._chart.props('data-testid="recorded" role="img" aria-label="the last minutes as recorded"')
         self._chart.on("chart:datazoom", self._zoomed, args=["start", "end", "batch"], throttle=ZOOM_EVERY_S)
         self._chart.set_visibility(False)
+        theme.listen(self.redraw)
 
     def show(self, recording: Recording, stroke_m: float) -> None:
         """Show a recording, all of it."""
         nothing = np.full(len(recording), math.nan)
         self._columns = {"time_s": recording.time_s} | {name: recording.columns.get(name, nothing) for name in COLUMNS}
-        self._unit = self._units.position_unit(stroke_m)
+        self._stroke_m = stroke_m
+        self._chart.set_visibility(True)
+        self.redraw()
+
+    def redraw(self) -> None:
+        """Draw it in the colours and the units that are chosen now, if there is anything to draw."""
+        if self._chart.is_deleted or not self._columns:
+            return
+        self._unit = self._units.position_unit(self._stroke_m)
         self._chart.options.clear()
         self._chart.options.update(self._whole())
-        self._chart.set_visibility(True)
         self._chart.update()
 
     def _zoomed(self, event: events.GenericEventArguments) -> None:

@@ -106,6 +106,7 @@ class ValvePanel:
     def redraw(self) -> None:
         """Draw it in other units."""
         self.trend.redraw()
+        self._recorded.redraw()
 
     def _tiles(self) -> None:
         self._figures: dict[str, ui.label] = {}
