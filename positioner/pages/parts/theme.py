@@ -35,7 +35,8 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .blamed { background: rgba(217, 98, 43, 0.25); }
 .jump:hover { text-decoration-style: solid; color: var(--q-primary); }
 h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; scroll-margin-top: 80px; }
-*:focus-visible { outline: 2px solid #d9622b !important; outline-offset: 1px; }
+*:focus-visible { outline: 2px solid #d9622b; outline-offset: 1px; }
+.no-outline:focus-visible { box-shadow: 0 0 0 2px #d9622b !important; }
 .body--dark .q-btn.text-negative { color: #ff8a80 !important; }
 .body--dark .q-uploader__header { background: #1b5e8a; }
 @media (max-width: 599px) {
