@@ -16,10 +16,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import h5py
-import nptdms
 import numpy as np
-import openpyxl
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding
@@ -140,6 +137,8 @@ def _matlab() -> tuple[bytes, ...]:
 
 
 def _hdf5(path: Path) -> None:
+    import h5py
+
     with h5py.File(path, "w", track_order=True) as file:
         for name, values in COLUMNS.items():
             made = file.create_dataset(f"log/{name}", data=values)
@@ -149,13 +148,15 @@ def _hdf5(path: Path) -> None:
 
 
 def _tdms(path: Path) -> None:
+    import nptdms
+
     wave = {"unit_string": "%", "wf_increment": 0.1, "wf_start_offset": 0.0}
     with nptdms.TdmsWriter(str(path)) as file:
         file.write_segment([nptdms.ChannelObject("log", name, values, wave) for name, values in COLUMNS.items()])
 
 
 def _mdf4(path: Path) -> None:
-    import asammdf  # takes a second to load
+    import asammdf
 
     signals = [
         asammdf.Signal(values, COLUMNS["t"], name=name, unit="%") for name, values in COLUMNS.items() if name != "t"
@@ -197,6 +198,8 @@ def _saved(make: Callable[[Path], object], name: str) -> bytes:
 
 
 def _workbook() -> bytes:
+    import openpyxl
+
     book, file = openpyxl.Workbook(), BytesIO()
     for row in (("time_s", "command_pa", "position_m"), (0.0, 4e4, 0.01), (0.1, 4e4, 0.02)):
         book.active.append(row)
@@ -265,7 +268,7 @@ def file_parsers() -> dict[str, Parser]:
     """Return every parser of files by its name."""
     profiles = {name: (SHIPPED / "profiles" / f"{name}.toml").read_bytes() for name in ("daemon", "fleet", "slave")}
     canopen = tuple((SHIPPED / "profiles" / f"{name}_canopen.toml").read_bytes() for name in ("daemon", "slave"))
-    parquet, workbook = _saved(RECORDING.write, "good.parquet"), _workbook()
+    parquet, workbook = Later(lambda: _saved(RECORDING.write, "good.parquet")), Later(_workbook)
     kept = _saved(lambda path: write_memory(path, "FV-1", NOW, KNOWLEDGE), "good.json")
     counts = _saved(lambda path: write_record(path, "FV-1", HealthRecord(1.5, 3, 0.5, 7, 2e3)), "good.json")
     valves = tuple(shipped_valve(name).read_bytes() for name in ("seed", "ordinary"))
@@ -278,14 +281,14 @@ def file_parsers() -> dict[str, Parser]:
         "valve file": Parser(of_file("v.toml", load_valve), valves, 4, True),
         "data sheet": Parser(of_file("e.eds", lambda path: read_eds(path, NODE)), sheets, 1, True),
         "recording": Parser(of_file("r.csv", read_recording, Recording.read), (CSV,), 8, True),
-        "recording, Parquet": Parser(of_file("r.parquet", Recording.read, _preview), (parquet,), 2),
+        "recording, Parquet": Parser(of_file("r.parquet", Recording.read, _preview), parquet, 2),
         "export": Parser(of_file("x.txt", _own, _preview, _import), (CSV, *EXPORTS), 2, True),
         "export, MATLAB": Parser(of_file("x.mat", _preview, _import), _matlab(), 2),
-        "export, HDF5": Parser(of_file("x.h5", _preview, _import), (_saved(_hdf5, "good.h5"),), 0.3),
-        "export, TDMS": Parser(of_file("x.tdms", _preview, _import), (_saved(_tdms, "good.tdms"),), 0.3),
+        "export, HDF5": Parser(of_file("x.h5", _preview, _import), Later(lambda: _saved(_hdf5, "good.h5")), 0.3),
+        "export, TDMS": Parser(of_file("x.tdms", _preview, _import), Later(lambda: _saved(_tdms, "good.tdms")), 0.3),
         "export, MDF4": Parser(of_file("x.mf4", _preview, _import), Later(lambda: _saved(_mdf4, "good.mf4")), 0.3),
         "mapping file": Parser(of_file("m.toml", read_mapping_file), (MAPPING,), 4, True),
-        "export, workbook": Parser(of_file("x.xlsx", _preview, _import), (workbook,), 0.3),
+        "export, workbook": Parser(of_file("x.xlsx", _preview, _import), workbook, 0.3),
         "memory file": Parser(memory, (kept,), 2, True),
         "health file": Parser(health, (counts,), 8, True),
         "history file": Parser(of_file("h.sqlite", _history), (_history_file(),), 1),

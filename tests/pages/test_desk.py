@@ -66,7 +66,7 @@ def test_what_is_held_out_and_how_long_it_may_take_stands_on_the_command_line(de
 
 
 def test_a_recording_that_cannot_be_held_out_is_refused_and_nothing_changes(desk: Desk) -> None:
-    in_percent = HIDDEN.fit.columns | {"position_m": 1000.0 * HIDDEN.fit.columns["position_m"]}
+    in_percent = {**HIDDEN.fit.columns, "position_m": 1000.0 * HIDDEN.fit.columns["position_m"]}
     with pytest.raises(InputError, match="it looks like per cent"):
         desk.hold_out(Opened.of("percent.csv", Path("percent.csv"), Recording(in_percent)))
     assert desk.held_out is None
