@@ -37,7 +37,7 @@ from config.valve_file import load_valve, shipped_valve
 from positioner.cli.parts.children import port_in, running
 from positioner.control.requests import Requests
 from positioner.daemon.recorder import files_of
-from positioner.dcs import Dcs
+from positioner.dcs import Dcs, DcsError
 from positioner.history.history_reader import HistoryReader
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.simulated_device import Device
@@ -73,6 +73,7 @@ LOOKS = 24
 MOVES = 0.4, 0.6
 """References, p.u., in turn."""
 MOVE_S = 1.0
+PATIENCE = 30
 FORWARD_AT, BACK_AT, ROTATED_AT = LOOKS // 4, LOOKS // 2, 5 * LOOKS // 8
 DAY_S = 86_400.0
 CLOCK_SET_S = {FORWARD_AT: DAY_S, BACK_AT: -DAY_S}
@@ -215,9 +216,7 @@ def _looks(dcs: Dcs, pid: int, seconds: float, clock: Clock, log: Path) -> Itera
             off = max(off, abs(dcs.get("position") - MOVES[moves % 2]))
             if dcs.get("fault") != Fault.NONE:
                 faults += 1
-                dcs.set("acknowledge", 1)
-                time.sleep(MOVE_S)
-                dcs.set("mode", Mode.AUTOMATIC)
+                _acknowledge(dcs)
         names = ("travel", "reversals", "cycles", "missed_periods", "lost_samples", "unrecorded", "history_lost")
         seen = dcs.get_all(*names)
         lost = int(seen["lost_samples"] + seen["unrecorded"] + seen["history_lost"])
@@ -226,6 +225,20 @@ def _looks(dcs: Dcs, pid: int, seconds: float, clock: Clock, log: Path) -> Itera
         look = Look(hours, held_by(pid), off, moves, seen["travel"], (*counts, lost, faults))
         print(look.row(), flush=True)
         yield look
+
+
+def _acknowledge(dcs: Dcs) -> None:
+    """Go on in automatic; again if the next fault, as on an overloaded machine, comes before that."""
+    for patience in range(PATIENCE, -1, -1):
+        dcs.set("acknowledge", 1)
+        time.sleep(MOVE_S)
+        try:
+            dcs.set("mode", Mode.AUTOMATIC)
+        except DcsError:
+            if not patience:
+                raise
+        else:
+            return
 
 
 def held_by(pid: int) -> tuple[int, int, int]:
