@@ -12,7 +12,7 @@ MAY_BE = {
     (
         "parts/telling.py",
         "f'<h2{place}>{escape(text)}</h2>'",
-    ): "the text is escaped, the place is a name of the program's own",
+    ): "escaped; the place is the program's own",
 }
 
 
