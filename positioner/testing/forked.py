@@ -1,7 +1,8 @@
 """Processes forked off one that has loaded all they need: a fiftieth of a second each, in place of one.
 
 The first that is asked for starts that one (`positioner.testing.fork_server`), which ends with this process. The
-standard library alone is used here, as in `child_process`.
+standard library alone is used here, as in `child_process`. multiprocessing's own fork server is not: it hands on the
+search path and the main module of the caller, in which somebody else's `config` may come first.
 """
 
 import atexit

@@ -1,4 +1,4 @@
-"""What is worked out without scipy.signal, which takes as long to load as all else, is what scipy.signal gives."""
+"""The window of a spectrum and the parabola of an acceleration, as scipy.signal's own."""
 
 import numpy as np
 import pytest

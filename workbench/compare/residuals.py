@@ -111,14 +111,8 @@ def _correlated(first: Column, second: Column) -> Column:
 
 
 def spectrum(residual_m: Column, period_s: float) -> Spectrum:
-    """Return Welch's estimate of the density, m^2/Hz, for an evenly sampled residual, m, (n,).
+    """Return Welch's estimate of the density, m^2/Hz, for an evenly sampled residual, m, (n,)."""
+    from scipy.signal import welch  # takes as long to load as all else together
 
-    Hann windows, half overlapping, without their means; scipy.signal has it, and takes as long to load as all else.
-    """
-    count = min(LONGEST_WINDOW, residual_m.size)
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)
-    pieces = np.lib.stride_tricks.sliding_window_view(residual_m, count)[:: count - count // 2]
-    pieces = (pieces - pieces.mean(axis=1, keepdims=True)) * window
-    density: Column = np.mean(np.abs(np.fft.rfft(pieces)) ** 2, axis=0) * period_s / np.sum(window**2)
-    density[1 : (count + 1) // 2] *= 2.0  # of both signs; 0 and Nyquist's have one
-    return Spectrum(np.fft.rfftfreq(count, period_s).astype(np.float64), density)
+    frequency, density = welch(residual_m, 1.0 / period_s, nperseg=min(LONGEST_WINDOW, residual_m.size))
+    return Spectrum(frequency, density)

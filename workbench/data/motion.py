@@ -55,18 +55,14 @@ def velocity_m_per_s(time_s: Column, position_m: Column) -> Column:
 def acceleration_m_per_s2(position_m: Column, period_s: float) -> Column:
     """Return the acceleration at each sample, m/s^2, (n,), by local parabolas; at the ends that of the outermost one.
 
-    What Savitzky and Golay's filter of order 2 gives; scipy.signal has it, and takes as long to load as all else.
-
     Args:
         position_m: m, (n,), at least `PARABOLA` samples.
         period_s: between samples, s.
     """
-    reach = PARABOLA // 2
-    squares = np.arange(-reach, reach + 1.0) ** 2
-    squares -= squares.mean()
-    curvature = 2.0 * squares / np.sum(squares**2)
-    inner = np.convolve(position_m, curvature, mode="valid")
-    return np.pad(inner, reach, mode="edge") / period_s**2
+    from scipy.signal import savgol_filter  # takes as long to load as all else together
+
+    acceleration: Column = savgol_filter(position_m, PARABOLA, 2, deriv=2, delta=period_s)
+    return acceleration
 
 
 def directions(position_m: Column, noise_m: float) -> Directions:
