@@ -19,7 +19,8 @@ demo: $(READY)          ## a sticking valve identified and controlled over Modbu
 test: $(READY)          ## lint, types, import contracts and the whole test suite, at the same time
 	$(MAKE) --no-print-directory --jobs=2 suite lint
 
-suite: $(READY) browser
+suite: $(READY)
+	@$(MAKE) --no-print-directory browser
 	$(BIN)/pytest --numprocesses=auto
 
 lint: $(READY)
