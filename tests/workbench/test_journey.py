@@ -55,7 +55,7 @@ MAPPING = [f"--column={each}" for each in ("time_s=Time", "command_pa=OUT:bar", 
     "blind",
     [
         pytest.param(
-            lambda: generated("sensor_lag", "elasto_plastic", 2, "ip_lag", is_export=True), id="elasto-plastic, export"
+            lambda: generated("backlash", "elasto_plastic", 2, "ip_lag", is_export=True), id="elasto-plastic, export"
         ),
         pytest.param(lambda: generated("asymmetric_friction", "lugre", 1, "sensor_lag"), id="LuGre"),
     ],
