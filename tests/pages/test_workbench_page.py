@@ -81,7 +81,7 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         # Dragging changes the error, and undo takes it back.
         slider = page.get_by_test_id("slider-spring_n_per_m")
         slider.scroll_into_view_if_needed()
-        box = slider.bounding_box()
+        box, said = slider.bounding_box(), page.get_by_test_id("sentences").inner_text()
         assert box is not None
         middle_y = box["y"] + box["height"] / 2
         page.mouse.move(box["x"] + box["width"] / 2, middle_y)
@@ -89,6 +89,10 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         page.mouse.move(box["x"] + 0.6 * box["width"], middle_y, steps=3)
         expect(page.get_by_test_id("error")).not_to_have_text(f"{given_mm:.4g} mm")
         page.mouse.up()
+        expect(page.get_by_test_id("sentences")).not_to_have_text(said, use_inner_text=True)
+        after = slider.bounding_box()
+        assert after is not None
+        assert after["y"] == box["y"], "it stays under the hand, whatever is said above it"
         page.get_by_test_id("undo").click()
         expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
 

@@ -29,8 +29,10 @@ class FindingsPanel:
         self._stroke_m = stroke_m
         self._units = units
         self.jumps = ui.row().classes("items-center")
-        self._sentences = ui.column().classes("w-full").style("gap: 4px")
-        self._where = ui.label().classes("quiet").props('aria-live="polite" data-testid="where"')
+        # As high whatever is said: the sliders below must not move away from the hand.
+        with ui.column().classes("steady"):
+            self._sentences = ui.column().classes("w-full").style("gap: 4px")
+            self._where = ui.label().classes("quiet").props('aria-live="polite" data-testid="where"')
 
     def show(self, compared: Comparison) -> None:
         """Show what is said of a comparison."""
