@@ -15,6 +15,8 @@ from tests.pages.valve_site import valve_site
 
 pytestmark = [pytest.mark.patient, needs_chromium]
 
+MOST_AHEAD = 20
+"""Messages to a browser that was busy for 2 s: those of two or three readings, and what has happened; not of twenty."""
 PASSWORDS = {"operator": "valves-and-more", "engineer": "friction-matters"}
 
 
@@ -34,6 +36,7 @@ def test_an_operator_watches_signs_in_moves_the_valve_and_is_told_what_dies(tmp_
         with served(*words, port="--listen-port") as address, opened(address) as page:
             watched(page)
             unheard(page, site.config)
+            busy(page)
             signed_in_as_operator(page)
             moved_by_an_engineer(page)
             site.slave.kill()
@@ -85,6 +88,25 @@ def unheard(page: Page, config: Path) -> None:
         expect(page.get_by_test_id("unheard")).to_be_visible()
     finally:
         os.kill(server, signal.SIGCONT)
+    expect(page.get_by_test_id("unheard")).to_be_hidden()
+
+
+def busy(page: Page) -> None:
+    """A browser that is busy for a while is not sent what it cannot show: after it, it shows what is now."""
+    heard: list[str | bytes] = []
+
+    def hear(message: str | bytes) -> None:
+        heard.append(message)
+
+    page.on("websocket", lambda socket: socket.on("framereceived", hear))
+    page.reload()
+    expect(page.get_by_test_id("unheard")).to_be_hidden()
+    expect(page.get_by_test_id("mode")).to_have_text("hold, S0 start")
+    before = len(heard)
+    page.evaluate("() => { const begin = performance.now(); while (performance.now() - begin < 2000); }")
+    page.evaluate("() => new Promise(done => setTimeout(done, 50))")
+    assert before > 0
+    assert len(heard) - before <= MOST_AHEAD
     expect(page.get_by_test_id("unheard")).to_be_hidden()
 
 

@@ -1,8 +1,14 @@
-"""The page of one tab: all valves, or one in full; ten times a second what changes by the reading."""
+"""The page of one tab: all valves, or one in full; ten times a second what changes by the reading.
+
+A browser that takes longer to show it gets the next when it has shown this one, so that what it shows is never of long
+ago, however slow it is.
+"""
 
 import asyncio
 import time
 from collections.abc import Sequence
+from contextlib import suppress
+from math import inf
 
 from nicegui import app, ui
 
@@ -20,7 +26,9 @@ from positioner.pages.parts.units import Units
 
 TITLE = "positioner"
 TICK_S = 0.1
-REFRESH_EVERY = 5
+REFRESH_EVERY_S = 0.5
+BROWSER_S = 3.0
+"""What the browser may take to show a reading, before it is told the next all the same: it was away, perhaps."""
 ALL = "all valves"
 
 
@@ -53,7 +61,7 @@ class Tab:
         self._sign_in = sign_in
         self._overview: Overview | None = None
         self._panel: ValvePanel | None = None
-        self._ticks = 0
+        self._refreshed_s = -inf
 
     async def build(self) -> None:
         """Build it, and keep it up to date as long as the tab is there."""
@@ -97,12 +105,13 @@ class Tab:
             else:
                 (valve,) = (each for each in self._valves if each.place.name == chosen)
                 self._panel = ValvePanel(self._theme, valve, self._units, self._signed)
-        self._ticks = 0
+        self._refreshed_s = -inf
 
-    def _tick(self) -> None:
-        slow = self._ticks % REFRESH_EVERY == 0
-        self._ticks += 1
+    async def _tick(self) -> None:
+        """Show what is now, and wait until the browser has done so."""
         now_s = time.monotonic()
+        slow = now_s - self._refreshed_s >= REFRESH_EVERY_S - TICK_S / 2
+        self._refreshed_s = now_s if slow else self._refreshed_s
         if self._overview is not None and slow:
             for valve in self._valves:
                 self._overview.show(valve.view.at(now_s), valve.view.stroke_m)
@@ -114,3 +123,5 @@ class Tab:
         if slow:
             self._door.show()
             self._life.give()
+        with suppress(TimeoutError):
+            await ui.run_javascript("0", timeout=BROWSER_S)
