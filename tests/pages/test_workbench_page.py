@@ -17,6 +17,8 @@ pytestmark = [pytest.mark.patient, needs_chromium]
 
 SEED = 7
 """Hides a preload."""
+ROWS_APART = """table => [...table.querySelectorAll("tbody tr")].every(row => [...row.children].every(
+    cell => cell.getBoundingClientRect().bottom <= row.getBoundingClientRect().bottom + 1))"""
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +107,9 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         expect(page.get_by_test_id("found")).to_have_attribute("data-kind", "good")
         expect(page.get_by_test_id("found-sentence")).to_contain_text("preload")
         expect(page.get_by_test_id("candidates")).to_contain_text("more than 10 needed")
+        page.set_viewport_size({"width": 400, "height": 900})
+        assert page.get_by_test_id("candidates").evaluate(ROWS_APART), "nothing lies over another row"
+        page.set_viewport_size({"width": 1400, "height": 900})
         expect(page.get_by_role("button", name="add backlash", exact=True)).to_be_enabled()
         page.get_by_test_id("add").click()
         expect(page.get_by_test_id("journal-step")).to_contain_text("falls from")

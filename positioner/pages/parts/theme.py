@@ -44,6 +44,8 @@ h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; 
   .panel { padding: 8px 8px 24px; } .q-header { padding: 4px 8px; gap: 4px; }
   .candidates thead { display: none; }
   .candidates tr { display: flex; flex-flow: row wrap; align-items: center; border-top: 1px solid #80808066; }
+  .candidates .q-table tbody tr { height: auto; }
+  .candidates .q-table tbody td::before { position: static; background: none; opacity: 0.75; }
   .candidates .q-table tbody td { height: auto; border: none; padding: 2px 8px; }
   .candidates tbody td:first-child, .candidates tbody td:last-child { flex: 1 0 100%; }
   .candidates tbody td:nth-child(2)::before { content: "fitted, mm: "; }
