@@ -94,7 +94,8 @@ class SearchPanel:
         self._result.clear()
         self._show()
         self._show_race()
-        look_at("search")
+        with self._result:  # what was pressed may be gone by now
+            look_at("search")
 
     def _stop(self) -> None:
         self._desk.stop()
