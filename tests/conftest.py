@@ -23,11 +23,15 @@ REAL_TIME = "pytest.mark.real_time"
 """In a file: it is held to a clock, by a process or a wire."""
 PATIENT = "pytest.mark.patient"
 """In a file: it waits for other programs, a browser or workers, and is held to no clock."""
+SELDOM = 50_000
+"""Objects after which garbage is looked for: with the usual 700 it takes an eighth of the tests' time to look for cycles."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
 GIVES_WAY = 3
 """Niceness of a test that waits for nothing outside, half the weight: more would starve it beside busy processes."""
 
+# While all is imported, nothing of it is to be collected.
+gc.disable()
 # Of every process: threads for small matrices would only take the processors from the other workers.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Effects that tests write themselves lie in temporary folders.
@@ -76,11 +80,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Leave all that is imported by now out of garbage collection.
+    """Leave all that is imported by now out of garbage collection, and let that look at the rest seldom.
 
     To go through it takes half a second on a busy machine, in which no thread of the process answers anybody.
     """
     gc.freeze()
+    gc.set_threshold(SELDOM)
+    gc.enable()
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
