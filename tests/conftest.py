@@ -24,7 +24,7 @@ REAL_TIME = "pytest.mark.real_time"
 PATIENT = "pytest.mark.patient"
 """In a file: it waits for other programs, a browser or workers, and is held to no clock."""
 SELDOM = 50_000
-"""Objects after which garbage is looked for: with the usual 700 it takes an eighth of the tests' time to look for cycles."""
+"""Objects after which garbage is looked for: with the usual 700 that takes an eighth of the tests' time."""
 MOST_PROCESSORS = 4
 """More would not end sooner: what happens in real time takes the longest then."""
 GIVES_WAY = 3
