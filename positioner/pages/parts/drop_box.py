@@ -2,6 +2,9 @@
 
 The server keeps the routes by which files came in its caches, long after a page is gone. So the box knows what takes
 its file weakly: else every page that was ever opened would stay in memory.
+
+A file is taken when the browser has been told that it came: what takes it may draw this part of the page anew, and a
+browser that is not told by then would break the request off, and call it failed.
 """
 
 from collections.abc import Awaitable, Callable
@@ -18,13 +21,19 @@ Taken = Callable[[events.UploadEventArguments], Awaitable[None]]
 def drop_box(label: str, name: str, taken: Taken, props: str = "") -> None:
     """Show a box for a file; `taken`, a method, is called with it as long as its object is there."""
     kept = WeakMethod(taken)
+    come: list[events.UploadEventArguments] = []
 
-    async def took(event: events.UploadEventArguments) -> None:
-        take = kept()
-        if take is not None:
-            await take(event)
+    def keep(event: events.UploadEventArguments) -> None:
+        come.append(event)
 
-    box = ui.upload(label=label, on_upload=took, on_rejected=_refuse, max_file_size=MOST_BYTES, auto_upload=True)
+    async def take_all() -> None:
+        while come:
+            event, take = come.pop(0), kept()
+            if take is not None:
+                await take(event)
+
+    box = ui.upload(label=label, on_upload=keep, on_rejected=_refuse, max_file_size=MOST_BYTES, auto_upload=True)
+    box.on("uploaded", take_all, args=[])
     box.classes("w-full").props(f'flat bordered data-testid="{name}" {props}')
 
 
