@@ -20,7 +20,7 @@ test: $(READY)          ## lint, types, import contracts and the whole test suit
 	$(MAKE) --no-print-directory --jobs=2 suite lint
 
 suite: $(READY)
-	@$(MAKE) --no-print-directory browser
+	@$(MAKE) --no-print-directory browser # no prerequisite: that one ends at once, and make -j may begin the next only after lint
 	$(BIN)/pytest --numprocesses=auto
 
 lint: $(READY)

@@ -2,8 +2,8 @@
 
 A slave and a daemon run as processes of their own at 500 Hz. In turn, several times over: nobody looks; the page looks,
 with no tab open; the page looks with a tab open in a browser on this same machine, which gives way (nice 19). Of each
-turn the daemon's own statistics, and the processor time of daemon and page. Then how soon the browser shows what dies,
-and at last the page's memory over minutes.
+turn the daemon's own statistics, and the processor time of daemon and page. Before that, how soon the browser shows
+what dies, the last one in a browser that is slowed down; after it the page's memory over minutes.
 """
 
 import argparse
@@ -132,18 +132,21 @@ def _median(found: list[Turn], name: str) -> float:
 
 def _seen() -> Iterator[str]:
     """Yield how soon after it happened the browser shows what is not of now."""
-    deaths: dict[str, tuple[Callable[[Site], object], str]] = {
-        "the device is killed: fault": (lambda site: site.slave.kill(), "no reply"),
-        "the daemon stands (SIGSTOP): greyed": (lambda site: site.daemon.signal(signal.SIGSTOP), "Not live"),
-        "the daemon is killed: greyed": (lambda site: site.daemon.kill(), "Not live"),
+    deaths: dict[str, tuple[Callable[[Site], object], str, float]] = {
+        "the device is killed: fault": (lambda site: site.slave.kill(), "no reply", 1.0),
+        "the daemon stands (SIGSTOP): greyed": (lambda site: site.daemon.signal(signal.SIGSTOP), "Not live", 1.0),
+        "the daemon is killed: greyed": (lambda site: site.daemon.kill(), "Not live", 1.0),
+        "the daemon is killed, a browser six times slower: greyed": (lambda site: site.daemon.kill(), "Not live", 6.0),
     }
-    for what, (kill, shown) in deaths.items():
+    for what, (kill, shown, slower) in deaths.items():
         taken_s = []
         for _ in range(DEATHS):
             with tempfile.TemporaryDirectory() as name, valve_site(Path(name)) as site:
                 page = served("page", "--config", str(site.config), port="--listen-port")
                 with page as address, opened(address) as tab:
                     tab.get_by_test_id("figure-position").get_by_text("29.").wait_for()
+                    tab.context.new_cdp_session(tab).send("Emulation.setCPUThrottlingRate", {"rate": slower})
+                    time.sleep(SETTLE_S)
                     kill(site)
                     died_s = time.monotonic()
                     tab.get_by_text(shown).locator("visible=true").first.wait_for()

@@ -9,10 +9,7 @@ MAY_BE = {
     ("operator_page/valve_panel.py", "''"): "nothing",
     ("operator_page/overview.py", "line"): "labels of the program's own list",
     ("parts/telling.py", "f'<ul class=\"said\">{lines}</ul>'"): "each line is escaped before",
-    (
-        "parts/telling.py",
-        "f'<h2{place}>{escape(text)}</h2>'",
-    ): "escaped; the place is the program's own",
+    ("parts/telling.py", "f'<h2{place}>{escape(text)}</h2>'"): "escaped; the place is the program's own",
 }
 
 

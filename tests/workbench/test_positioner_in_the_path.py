@@ -76,11 +76,12 @@ def test_the_positioner_is_fitted_as_the_rest() -> None:
     known = valve_file(200.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
     free = (
         "coulomb_n",
+        "static_n",
         "positioner.dead_band_m",
         "positioner.filling_pa_per_s",
         "positioner.venting_pa_per_s",
     )
-    found = fit(recorded(truth, 6, 120), known, free=free, profile=False)
+    found = fit(recorded(truth, 3), known, free=free, profile=False)
     assert found.rms_m < 4e-4, "of 80 mm, some 0.1 mm of which is when a sample falls into a jump"
     value = {name: each.value for name, each in found.parameters.items()}
     assert set(value) == set(free)

@@ -7,7 +7,9 @@ A file is taken when the browser has been told that it came: what takes it may d
 browser that is not told by then would break the request off, and call it failed.
 """
 
+import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from weakref import WeakMethod
 
 from nicegui import events, ui
@@ -16,24 +18,24 @@ from positioner.pages.parts.server import MOST_BYTES
 from positioner.pages.parts.telling import tell_error
 
 Taken = Callable[[events.UploadEventArguments], Awaitable[None]]
+TOLD_WITHIN_S = 3.0
+"""A browser that does not say so by then, or whose box is gone, loses no file either."""
 
 
 def drop_box(label: str, name: str, taken: Taken, props: str = "") -> None:
     """Show a box for a file; `taken`, a method, is called with it as long as its object is there."""
-    kept = WeakMethod(taken)
-    come: list[events.UploadEventArguments] = []
+    kept, told = WeakMethod(taken), asyncio.Event()
 
-    def keep(event: events.UploadEventArguments) -> None:
-        come.append(event)
+    async def took(event: events.UploadEventArguments) -> None:
+        told.clear()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(told.wait(), TOLD_WITHIN_S)
+        take = kept()
+        if take is not None:
+            await take(event)
 
-    async def take_all() -> None:
-        while come:
-            event, take = come.pop(0), kept()
-            if take is not None:
-                await take(event)
-
-    box = ui.upload(label=label, on_upload=keep, on_rejected=_refuse, max_file_size=MOST_BYTES, auto_upload=True)
-    box.on("uploaded", take_all, args=[])
+    box = ui.upload(label=label, on_upload=took, on_rejected=_refuse, max_file_size=MOST_BYTES, auto_upload=True)
+    box.on("uploaded", told.set, args=[])
     box.classes("w-full").props(f'flat bordered data-testid="{name}" {props}')
 
 

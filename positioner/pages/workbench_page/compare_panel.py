@@ -116,16 +116,11 @@ class ComparePanel:
                 self._to_draw = False
                 rms_m = self._show_curve()
                 self._error.show(self._unit.fine(rms_m))
-                await self._draw_move()
+                await self._time.move(self._figure.data(MOVED, MOVING), MOVED_LINES)
+        except TimeoutError:
+            pass  # the browser is away; what it shows when it is back, `_settled` or the next move draws
         finally:
             self._drawing = False
-
-    async def _draw_move(self) -> None:
-        try:
-            await self._time.move(self._figure.data(MOVED, MOVING), MOVED_LINES)
-        except TimeoutError:
-            # The browser is away, or something else that it drew broke this off: no curve of before may stay.
-            self._time.restyle(self._figure.data(MOVED), MOVED_LINES)
 
     async def _settled(self) -> None:
         """Draw the curve in full; when the hand has come to rest, work out all that hangs on the parameters."""
