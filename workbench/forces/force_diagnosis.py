@@ -169,7 +169,7 @@ def _after_first(candidate: ForceCandidate, first: ForceCandidate | None) -> For
 def _candidate(number: int, name: str, before: ForceFit, fit: ForceFit) -> ForceCandidate:
     held_out, standard_errors = relative_error_reduction(before.logs, fit.logs)
     gain = Gain(before.bic - fit.bic, held_out, standard_errors, independent_share=1.0)
-    return ForceCandidate(number, name, fit.range_violation or gain.rejection_reason(explained=False), fit, gain)
+    return ForceCandidate(number, name, fit.range_violation or gain.rejection_reason(at_floor=False), fit, gain)
 
 
 def _verdict(

@@ -16,8 +16,8 @@ from workbench.select.block_errors import BlockErrors, relative_error_reduction
 
 LEAST_BIC = 10.0
 LEAST_REDUCTION = 0.05
-LEAST_STANDARD_ERRORS, WHERE_EXPLAINED = 2.0, 3.0
-"""More where nothing is left to explain: of twenty candidates one falls by two deviations by pure chance."""
+LEAST_STANDARD_ERRORS, AT_THE_FLOOR = 2.0, 3.0
+"""More where the error is at the floor: of twenty candidates one falls by two deviations by pure chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,16 +32,16 @@ class Gain:
     independent_share: float
     """Share of the samples that are independent: the evidence is worth so much of `bic`."""
 
-    def rejection_reason(self, explained: bool) -> str:
+    def rejection_reason(self, at_floor: bool) -> str:
         """Say what the candidate lacks to be accepted; empty if nothing.
 
         Args:
-            explained: whether the model before leaves nothing to explain.
+            at_floor: whether the error of the model before is at the floor, however what is left hangs on the state.
         """
-        least = WHERE_EXPLAINED if explained else LEAST_STANDARD_ERRORS
+        least = AT_THE_FLOOR if at_floor else LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
-        if explained and self.independent_share * self.bic <= LEAST_BIC:
+        if at_floor and self.independent_share * self.bic <= LEAST_BIC:
             return (
                 f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
                 f"are independent: {self.independent_share * self.bic:.2g}, more than {LEAST_BIC:g} needed"

@@ -93,7 +93,7 @@ def judged_step(
     """
     tried = {name: _candidate(number, name, before, model, library) for name, model in models.items()}
     candidates = tuple(_after_first(each, tried.get(library[each.name].after)) for each in tried.values())
-    equivalent = _bare_equivalent(candidates, before.explained, library)
+    equivalent = _bare_equivalent(candidates, before.at_floor, library)
     candidates, added = _best(_better_than(equivalent, candidates) if equivalent else candidates, library)
     suspect = None if added or equivalent else _suspect(candidates, library)
     rivals, suspected = (_rivals(candidates, each, library) if each else () for each in (added, suspect))
@@ -145,7 +145,7 @@ def _candidate(
     found = gain(before.fit, model.fit, before.errors, model.errors)
     beyond = _beyond(name, model.fit, library[name])
     same = bare_parameter(name, library)
-    reason = beyond or found.rejection_reason(before.explained)
+    reason = beyond or found.rejection_reason(before.at_floor)
     if same and not reason:
         reason = f"no record of pressure and position tells it from {same}"
     return EffectCandidate(number, name, reason, model, found, not beyond)
@@ -180,10 +180,10 @@ def _best(
 
 
 def _bare_equivalent(
-    candidates: Sequence[EffectCandidate], explained: bool, library: Mapping[str, Effect]
+    candidates: Sequence[EffectCandidate], at_floor: bool, library: Mapping[str, Effect]
 ) -> EffectCandidate | None:
     """Return the best that would be accepted but that it is the bare valve by another name, if there is one."""
-    passing = _passing(candidates, explained)
+    passing = _passing(candidates, at_floor)
     return max((each for each in passing if bare_parameter(each.name, library)), key=_evidence, default=None)
 
 
@@ -199,7 +199,7 @@ def _better_than(equivalent: EffectCandidate, candidates: Sequence[EffectCandida
 
 def _suspect(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]) -> EffectCandidate | None:
     """Return what has the most evidence of all that would be accepted if more were left to explain."""
-    passing = _passing(candidates, explained=False)
+    passing = _passing(candidates, at_floor=False)
     return max((each for each in passing if _may_be_there(each, library)), key=_evidence, default=None)
 
 
@@ -231,12 +231,12 @@ def _may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> 
     return evident and bare_parameter(candidate.name, library) is None
 
 
-def _passing(candidates: Sequence[EffectCandidate], explained: bool) -> list[EffectCandidate]:
-    """Return the physical ones that pass the rule, as it is where something is left to explain, or nothing."""
+def _passing(candidates: Sequence[EffectCandidate], at_floor: bool) -> list[EffectCandidate]:
+    """Return the physical ones that pass the rule, as it is where the error before is at the floor, or above."""
     return [
         each
         for each in candidates
-        if each.physical and not each.outdone and each.gain and not each.gain.rejection_reason(explained)
+        if each.physical and not each.outdone and each.gain and not each.gain.rejection_reason(at_floor)
     ]
 
 

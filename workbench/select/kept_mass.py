@@ -62,7 +62,7 @@ def kept_mass(diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None
         )
         models.append(evaluated(found, diagnosis.split))
     model = min(models, key=lambda each: each.fit.cost)
-    if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.explained):
+    if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.at_floor):
         return None
     fitted_kg = model.fit.valve.valve.mass_kg
     return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m)

@@ -125,7 +125,7 @@ def positioner_or_packing(
 
 def cause(friction: Gain, dead_band: Gain) -> Cause:
     """Return what the stem is held by, from what each is worth against the valve without it."""
-    needs_friction, needs_band = (not each.rejection_reason(explained=True) for each in (friction, dead_band))
+    needs_friction, needs_band = (not each.rejection_reason(at_floor=True) for each in (friction, dead_band))
     if needs_friction and needs_band:
         return "both"
     if needs_friction:
