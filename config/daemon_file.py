@@ -183,7 +183,7 @@ class SupervisoryTable(Schema):
     reserved_hosts: tuple[Host, ...] = ()
     """Addresses of the DCS: where all places are taken, another's is made free for them."""
     requests_per_s: NonNegative = 1000.0
-    """Of one host; more wait. 0 is no limit."""
+    """Of each reserved host, and of all others together, who share it evenly; more wait. 0 is no limit."""
     idle_s: NonNegative = 0.0
     """A client that asks for nothing for so long is disconnected; 0 is never."""
     local_switch: NearFile | None = None

@@ -1,5 +1,6 @@
 """Who gets a place at a server, and how long a request waits: in given times, without a socket."""
 
+from collections.abc import Mapping
 from ipaddress import ip_network
 
 import pytest
@@ -8,6 +9,7 @@ from config.daemon_file import DaemonFile
 from config.errors import InputError
 from config.loading import validated
 from fieldbus.modbus.admission import (
+    BURST_S,
     HANDSHAKES_PER_HOST,
     MOST_HANDSHAKES,
     NOT_ALLOWED,
@@ -92,9 +94,31 @@ def test_requests_of_a_host_wait_once_its_burst_is_spent_and_no_others() -> None
     places = filled(ServerLimits(requests_per_s=100.0), [STRANGER, STRANGER, PLANT])
     waits = [places.use(f"{STRANGER}:{number % 2}", 10.0) for number in range(120)]
     assert waits[:20] == [0.0] * 20
-    assert waits[-1] == pytest.approx(1.0)
+    assert waits[-1] == pytest.approx(100 / 50.0), "the other host has half"
     assert places.use(f"{PLANT}:2", 10.0) == 0.0
-    assert places.use(f"{STRANGER}:0", 11.5) == 0.0, "after a while it may ask again"
+    assert places.use(f"{STRANGER}:0", 12.5) == 0.0, "after a while it may ask again"
+
+
+def test_however_many_hosts_ask_without_end_they_share_what_one_may_and_a_reserved_one_has_its_own() -> None:
+    strangers = [f"10.0.1.{number}" for number in range(20)]
+    limits = ServerLimits(requests_per_s=100.0, reserved_hosts=frozenset((DCS,)))
+    places = filled(limits, [*strangers, DCS])
+
+    def answered_in_10_s(hosts: Mapping[int, str], from_s: float) -> int:
+        count = 0
+        for number, host in hosts.items():
+            at_s = from_s
+            while at_s < from_s + 10.0:
+                at_s += places.use(f"{host}:{number}", at_s)
+                count += 1
+        return count
+
+    bursts = len(strangers) * BURST_S * 100.0
+    assert answered_in_10_s(dict(enumerate(strangers)), 100.0) == pytest.approx(1000.0 + bursts, rel=0.05)
+    assert answered_in_10_s({len(strangers): DCS}, 100.0) == pytest.approx(1000.0 + BURST_S * 100.0, rel=0.05)
+    for number, host in enumerate(strangers[1:], 1):
+        places.leave(f"{host}:{number}")
+    assert answered_in_10_s({0: strangers[0]}, 200.0) > 1000, "alone it has all of it"
 
 
 def test_without_a_limit_nobody_waits() -> None:

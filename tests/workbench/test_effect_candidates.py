@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import log
 
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, fitted, model_of
-from workbench.select.effect_acceptance import LEAST_STANDARD_ERRORS, WHERE_EXPLAINED
+from workbench.select.effect_acceptance import LEAST_STANDARD_ERRORS, AT_THE_FLOOR
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
@@ -161,7 +161,7 @@ EXPLAINED = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M)
 
 def test_what_nothing_proves_beside_a_valve_that_explains_all_is_suspected_and_no_more() -> None:
     assert EXPLAINED.explained
-    between = 0.5 * (LEAST_STANDARD_ERRORS + WHERE_EXPLAINED)
+    between = 0.5 * (LEAST_STANDARD_ERRORS + AT_THE_FLOOR)
     step = judged(
         EXPLAINED,
         spring_hardening=off_by(between, EXPLAINED, "spring_hardening", 1.1 * AT_FLOOR),
@@ -173,8 +173,9 @@ def test_what_nothing_proves_beside_a_valve_that_explains_all_is_suspected_and_n
     assert judged(EXPLAINED, spring_hardening=off_by(3.1, EXPLAINED, "spring_hardening", 1.1 * AT_FLOOR)).added
 
 
-def test_a_valve_that_leaves_structure_is_not_explained_and_a_weaker_proof_will_do() -> None:
+def test_an_error_at_the_floor_asks_for_the_same_proof_where_what_is_left_hangs_on_the_state() -> None:
     structured = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M, structure=0.9)
     assert structured.at_floor
     assert not structured.explained
-    assert judged(structured, ip_lag=off_by(2.5, structured, "ip_lag", 1.1 * AT_FLOOR)).added
+    assert not judged(structured, ip_lag=off_by(2.5, structured, "ip_lag", 1.1 * AT_FLOOR)).added
+    assert judged(structured, ip_lag=off_by(3.1, structured, "ip_lag", 1.1 * AT_FLOOR)).added
