@@ -4,6 +4,7 @@ The proposal goes by what columns are commonly called and by what is in them. It
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -136,7 +137,7 @@ def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[s
         if chosen is None and ours == "time_s":
             chosen = next((each for each in left if _most_are(each.cells, STAMP)), None)
         if chosen is None:
-            open_.append(f"{ours} is open: no column is called like it")
+            open_.append(f"{ours} is open: no column is called like it; --column {ours}=NAME:UNIT says which is")
             continue
         left.remove(chosen)
         if ours == "time_s":
@@ -158,7 +159,9 @@ def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], sep
     """Yield what a person must look at beyond the columns that were chosen."""
     for each in left:
         if held := each.status_words:
-            yield f"{each.name!r} holds {held}: --status {_quoted(each.name + '=GOOD')} leaves the other rows out"
+            (often, _), *_ = Counter(cell for cell in each.cells if cell != "").most_common()
+            said = f"--status {_quoted(f'{each.name}={often}')} keeps the rows of that word alone"
+            yield f"{each.name!r} holds {held}: {said}, if it is the good one"
     if said := _row_a_value(columns):
         yield said
     texts = [cell for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
@@ -247,9 +250,9 @@ def _is_plain(cell: Cell) -> bool:
 
 
 def _at_the_end(ours: str, name: str) -> str | None:
-    """Return the unit in which a name ends after an underscore, as in stem_mm; None if it does not."""
-    ending = name.rpartition("_")[2] if "_" in name else ""
-    unit = unit_named(ending)
+    """Return the unit in which a name ends, as in stem_mm, Hub.Prozent or Travel mm; None if it does not."""
+    *before, ending = re.split(r"[_.\s]+", name)
+    unit = unit_named(ending) if before else None
     # `p_in` is an input, and no inch.
     return unit if unit in allowed_units(ending_of(ours)) and unit != "in" else None
 

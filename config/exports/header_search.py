@@ -61,12 +61,20 @@ def find_header(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -
     Raises:
         InputError: no line holds them all, one stands twice in it, or several sheets hold them.
     """
-    found = [header for table in tables if (header := _header_of(path, table, wanted)) is not None]
+    found: list[Header] = []
+    broken: list[InputError] = []
+    for table in tables:
+        try:
+            header = _header_of(path, table, wanted)
+        except InputError as error:  # as it would be read with a separator that is none
+            broken.append(error)
+            continue
+        found += [header] if header is not None else []
     if len({each.table.sheet for each in found}) > 1:
         sheets = ", ".join(repr(each.table.sheet) for each in found)
         raise InputError(str(path), f"the sheets {sheets} all have these columns: say which, --sheet NAME")
     if not found:
-        raise _missing(path, tables, wanted)
+        raise broken[0] if broken else _missing(path, tables, wanted)
     return _with_units(found[0])
 
 

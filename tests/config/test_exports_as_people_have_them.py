@@ -98,6 +98,9 @@ READ = {
         said="encoding: cp1252",
     ),
     "semicolons and decimal commas": Good(text(rows(";", ","))),
+    "the same with names in quotation marks, as R's write.csv2 writes it": Good(
+        text(rows(";", ",", header='"t","PV","OUT"'), encoding="utf-16-le")
+    ),
     "tabs and decimal commas": Good(text(rows("\t", ","))),
     "bars": Good(text(rows("|"))),
     "commas, decimal commas in quotation marks": Good(text(rows(",", ","))),
@@ -541,6 +544,10 @@ PROPOSED = {
     "names in capitals and small letters": (
         rows(header="LogTime,stemPos_mm,actuatorCmd_bar"),
         "--column time_s=LogTime --column position_m=stemPos_mm:mm --column command_pa=actuatorCmd_bar:bar",
+    ),
+    "units in words behind a point or a space": (
+        rows(header="Zeit,Hub.Prozent,Stelldruck mbar"),
+        "--column time_s=Zeit --column position_m=Hub.Prozent:% --column command_pa=Stelldruck mbar:mbar",
     ),
     "a clock in milliseconds": (
         rows(time=[f"{1e3 * (1_772_612_100 + t):.0f}" for t in T], header="ts,PV,OP"),

@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import log
 
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, fitted, model_of
-from workbench.select.effect_acceptance import LEAST_STANDARD_ERRORS, AT_THE_FLOOR
+from workbench.select.effect_acceptance import AT_THE_FLOOR, LEAST_STANDARD_ERRORS
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
