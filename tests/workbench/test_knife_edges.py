@@ -13,7 +13,7 @@ from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
 from workbench.data.held_out import Part, residual_m
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
-from workbench.select.knife_edges import AT_MOST, KnifeEdge, error_without, knife_edges, rms
+from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 
 TRUE = drawn_valve(np.random.default_rng(19))
 
@@ -91,7 +91,7 @@ def test_another_friction_than_was_fitted_is_no_knife_edge(part: Part) -> None:
     assert len(both(fitted=part)) > 3, "where what was fitted allows the change, all of them are"
 
 
-@pytest.mark.parametrize(("percent", "samples"), [(5, 400), (25, 200)])
+@pytest.mark.parametrize(("percent", "samples"), [(5, 400), (30, 200)])
 def test_few_slips_leave_static_friction_a_wide_interval(part: Part, percent: int, samples: int) -> None:
     """Of a few seconds fitted so much more static friction makes the same slips: what was held out asks for less."""
     higher = changed(static_n=1.0 / (1.0 - percent / 100))
@@ -99,7 +99,7 @@ def test_few_slips_leave_static_friction_a_wide_interval(part: Part, percent: in
     edges = knife_edges(higher, whole(record_of(TRUE, 23, samples)), part, error_m, NOISE_M, from_pressure=False)
     assert {(each.parameter, each.change) for each in edges} == {("static_n", -percent / 100)}
     assert f"static friction {percent} % lower, allowed by what was fitted, puts it right" in edges[0].sentence
-    assert rms_without(part.record.time_s, error_m, edges) < AT_MOST * NOISE_M
+    assert rms_without(part.record.time_s, error_m, edges) < 1.1 * NOISE_M
     assert knife_edges(higher, whole(record_of(higher, 20)), part, error_m, NOISE_M, from_pressure=False) == ()
 
 
