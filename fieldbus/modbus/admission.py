@@ -4,7 +4,7 @@
     a host has at most `clients_per_host` places; of its own, one unused for `UNUSED_S` gives way
     all `most_clients` taken     the one that has asked for nothing for longest gives way, if for `UNUSED_S` at least;
                                  to a reserved host in any case, unless all are of reserved hosts
-    requests                     a token bucket a host: `BURST_S` of them at once, then its rate. A reserved host has
+    requests                     a token bucket a host: `BURST_S` of its rate at once, then so many. A reserved host has
                                  `requests_per_s`; the others that are connected share as many evenly
 
 What answers cost the process is thereby bounded, however many hosts ask without end.
@@ -57,19 +57,23 @@ class Allowance:
     """A token bucket: so many at once, then so many a second.
 
     Args:
-        per_s: how many a second; may be changed.
+        per_s: how many a second.
         burst: how many at once.
     """
 
     def __init__(self, per_s: float, burst: float) -> None:
-        self.per_s, self._burst = per_s, burst
+        self._per_s, self._burst = per_s, burst
         self._left, self._at_s = burst, 0.0
+
+    def change(self, per_s: float, burst: float) -> None:
+        """Grant at another rate from now on; what is left of a longer burst is gone."""
+        self._per_s, self._burst, self._left = per_s, burst, min(self._left, burst)
 
     def wait_s(self, now_s: float) -> float:
         """Take one; return how long to wait for it."""
         self._refill(now_s)
         self._left -= 1.0
-        return max(0.0, -self._left / self.per_s)
+        return max(0.0, -self._left / self._per_s)
 
     def may(self, now_s: float) -> bool:
         """Take one if there is one; return whether."""
@@ -79,7 +83,7 @@ class Allowance:
         return granted
 
     def _refill(self, now_s: float) -> None:
-        self._left = min(self._burst, self._left + max(0.0, now_s - self._at_s) * self.per_s)
+        self._left = min(self._burst, self._left + max(0.0, now_s - self._at_s) * self._per_s)
         self._at_s = max(now_s, self._at_s)
 
 
@@ -161,13 +165,14 @@ class Places:
     def _allowance(self, host: str) -> Allowance:
         """Return a host's, at the rate that it has among those connected now."""
         per_s = self._limits.requests_per_s
+        if host not in self._limits.reserved_hosts:
+            per_s /= len({place.host for place in self._taken.values()} - self._limits.reserved_hosts)
+        burst = max(1.0, BURST_S * per_s)
         if host not in self._allowances:
             if len(self._allowances) >= MOST_HOSTS:
                 self._allowances.pop(next(iter(self._allowances)))
-            self._allowances[host] = Allowance(per_s, max(1.0, BURST_S * per_s))
-        if host not in self._limits.reserved_hosts:
-            sharing = {place.host for place in self._taken.values()} - self._limits.reserved_hosts
-            self._allowances[host].per_s = per_s / len(sharing)
+            self._allowances[host] = Allowance(per_s, burst)
+        self._allowances[host].change(per_s, burst)
         return self._allowances[host]
 
     def _that_gives_way(self, host: str, now_s: float) -> str | None:

@@ -71,7 +71,14 @@ def silent(port: int, number: int, stop: Event) -> None:
         stop.wait()
 
 
-RUDE: tuple[Callable[[int, int, Event], None], ...] = (flood, refused, deaf, slow, silent)
+def knocking(port: int, number: int, stop: Event) -> None:
+    """Connect and hang up, without end."""
+    while not stop.is_set():
+        with suppress(OSError):
+            caller(port, number).close()
+
+
+RUDE: tuple[Callable[[int, int, Event], None], ...] = (flood, refused, deaf, slow, silent, knocking)
 
 
 @contextmanager

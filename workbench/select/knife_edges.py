@@ -9,8 +9,8 @@ make it:
     rms over it, changed, <= max(1.75 floors, a fifth of what it was)     a knife edge
     rms over what was fitted, changed, <= 1.75 floors                     allowed; asked of changes above 2 %
 
-Of few slips, static friction is known to a tenth of itself, or to a half: any value between those of the slips that came
-and those that stayed away does as well.
+Of few slips, static friction is known to a tenth of itself, or to a half: any value between those of the slips that
+came and those that stayed away does as well.
 
 An error that no such change takes away is no knife edge. Nor are many: where these stretches hold more than a tenth of
 the slips it is the model's, unless one change puts all of them right and what was fitted allows it. A friction that
