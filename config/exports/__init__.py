@@ -6,6 +6,7 @@ From the file to the recording:
     text_table                              encodings, separators, quotation marks
     typed_tables                            Excel workbooks, MATLAB files, Parquet
     measurement_files                       HDF5, MATLAB 7.3, TDMS, MDF4
+    mdf4_reader                             MDF4, in a process of its own
     line_protocol                           InfluxDB's line protocol
     export_units                            units, by all the names people give them
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read

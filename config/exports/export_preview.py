@@ -160,8 +160,8 @@ def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], sep
     for each in left:
         if held := each.status_words:
             (often, _), *_ = Counter(cell for cell in each.cells if cell != "").most_common()
-            said = f"--status {_quoted(f'{each.name}={often}')} keeps the rows of that word alone"
-            yield f"{each.name!r} holds {held}: {said}, if it is the good one"
+            keeps = f"--status {_quoted(f'{each.name}={often}')} keeps the rows of that word alone"
+            yield f"{each.name!r} holds {held}: {keeps}, if it is the good one"
     if said := _row_a_value(columns):
         yield said
     texts = [cell for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]

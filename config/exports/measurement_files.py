@@ -1,13 +1,11 @@
-"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), MDF4 (asammdf).
+"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), MDF4 (`mdf4_reader`).
 
 Each group of channels of one length is a table. A channel is named by its path, joined by points, with its unit behind
 it in brackets where the file says it; a time that is not stored as numbers (TDMS' waveforms, MDF's masters) is
 `time [s]`.
 """
 
-import gc
 import logging
-import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,14 +16,13 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
+from config.exports.mdf4_reader import NUMBERS, mdf4_groups
 from config.exports.raw_table import RawTable
 from config.exports.typed_tables import by_length, column_rows, first_line, no_vectors
 from config.extras import needed
 from config.plain_file import require_moderate
 
 Columns = dict[str, Any]
-NUMBERS = "fiub"
-"""Kinds of numpy's types that are numbers."""
 
 
 def hdf5(path: Path) -> list[RawTable]:
@@ -125,55 +122,13 @@ def _tdms_group(group: Any) -> Columns:
 
 
 def mdf4(path: Path) -> list[RawTable]:
-    """Return the channel groups of an MDF file of version 4, as loggers of test rigs write it.
+    """Return the channel groups of an MDF file of version 4.
 
     Raises:
         InputError: it is of another version, is damaged, or holds no channels of numbers.
         ModuleNotFoundError: asammdf is not installed; names the extra.
     """
-    asammdf = needed("asammdf", str(path))
-    try:
-        with warnings.catch_warnings(action="ignore"), _opened_mdf(asammdf, path) as file:
-            if not file.version.startswith("4"):
-                raise InputError(str(path), f"is MDF of version {file.version}, allowed is 4: save it as MDF4")
-            groups = [(f"group {index + 1}", _mdf_group(path, file, index)) for index in range(len(file.groups))]
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file fails anywhere in its reader
-        raise InputError(str(path), f"is a damaged MDF file: {first_line(error)}") from None
-    return _required(path, [table for name, columns in groups for table in _tables(columns, name)])
-
-
-def _opened_mdf(asammdf: Any, path: Path) -> Any:
-    """Return a file of asammdf, whose objects, where they were not made, complain of that when they go.
-
-    Raises:
-        InputError: it is damaged.
-    """
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    try:
-        try:
-            return asammdf.MDF(path)
-        except Exception as error:  # a damaged file fails anywhere in its reader
-            said = first_line(error)
-        gc.collect()
-    finally:
-        sys.unraisablehook = hook
-    raise InputError(str(path), f"is a damaged MDF file: {said}")
-
-
-def _mdf_group(path: Path, file: Any, index: int) -> Columns:
-    group = file.groups[index]
-    require_moderate(path, group.channel_group.cycles_nr, len(group.channels))
-    columns: Columns = {}
-    for number, channel in enumerate(group.channels):
-        if number == file.masters_db.get(index):
-            continue
-        signal = file.get(group=index, index=number)
-        if signal.samples.ndim == 1 and signal.samples.dtype.kind in NUMBERS:
-            columns.setdefault("time [s]", np.asarray(signal.timestamps, dtype=np.float64))
-            columns[_named(channel.name, signal.unit or "")] = signal.samples.astype(np.float64)
-    return columns
+    return _required(path, [table for name, columns in mdf4_groups(path) for table in _tables(columns, name)])
 
 
 def _tables(columns: Columns, name: str) -> list[RawTable]:

@@ -1,12 +1,16 @@
 """HDF5, MATLAB 7.3, TDMS and MDF4 as their own libraries write them: the same recording out of each."""
 
+import shutil
+import struct
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from config.errors import InputError
+from config.exports import mdf4_reader
 from config.exports.column_mapping import read_mapping
 from config.exports.export_preview import preview
 from config.historian_export import read_export
@@ -14,6 +18,8 @@ from config.historian_export import read_export
 TIME_S = np.arange(0.0, 2.0, 0.01)
 POSITION_MM = 20.0 + 10.0 * np.sin(TIME_S)
 COMMAND_BAR = 0.6 + 0.2 * np.cos(TIME_S)
+LINKS = 24
+"""Where the links of a block of MDF 4 begin; the first is that to the next."""
 
 
 def write_hdf5(path: Path) -> None:
@@ -110,6 +116,23 @@ def test_a_torn_file_is_one_line_or_what_is_left_of_it(name: str, kept: float, t
     content = (tmp_path / name).read_bytes()
     (tmp_path / name).write_bytes(content[: round(kept * len(content))])
     assert said_of(tmp_path / name, words).count("\n") == 0
+
+
+def test_a_file_that_ends_its_reader_or_keeps_it_for_ever_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a channel group whose second channel is followed by the first again asammdf reads channels without end."""
+    write_mdf(tmp_path / "run.mf4")
+    content = bytearray((tmp_path / "run.mf4").read_bytes())
+    first, second = [at for at in range(len(content)) if content[at : at + 4] == b"##CN"][:2]
+    content[second + LINKS : second + LINKS + 8] = struct.pack("<Q", first)
+    (tmp_path / "run.mf4").write_bytes(content)
+    monkeypatch.setattr(mdf4_reader, "LONGEST_S", 3.0)
+    with pytest.raises(InputError, match="is a damaged MDF file: its reader comes to no end in 3 s"):
+        preview(tmp_path / "run.mf4")
+    monkeypatch.setattr(mdf4_reader, "sys", SimpleNamespace(executable=shutil.which("false")))
+    with pytest.raises(InputError, match="is a damaged MDF file: its reader breaks down, status 1"):
+        preview(tmp_path / "run.mf4")
 
 
 def said_of(path: Path, words: list[str]) -> str:

@@ -155,17 +155,6 @@ def _tdms(path: Path) -> None:
         file.write_segment([nptdms.ChannelObject("log", name, values, wave) for name, values in COLUMNS.items()])
 
 
-def _mdf4(path: Path) -> None:
-    import asammdf
-
-    signals = [
-        asammdf.Signal(values, COLUMNS["t"], name=name, unit="%") for name, values in COLUMNS.items() if name != "t"
-    ]
-    with asammdf.MDF(version="4.10") as file:
-        file.append(signals)
-        file.save(path, overwrite=True)
-
-
 def _history(path: Path) -> None:
     with HistoryReader(path) as history:
         history.events(limit=20)
@@ -286,7 +275,6 @@ def file_parsers() -> dict[str, Parser]:
         "export, MATLAB": Parser(of_file("x.mat", _preview, _import), _matlab(), 2),
         "export, HDF5": Parser(of_file("x.h5", _preview, _import), Later(lambda: _saved(_hdf5, "good.h5")), 0.3),
         "export, TDMS": Parser(of_file("x.tdms", _preview, _import), Later(lambda: _saved(_tdms, "good.tdms")), 0.3),
-        "export, MDF4": Parser(of_file("x.mf4", _preview, _import), Later(lambda: _saved(_mdf4, "good.mf4")), 0.3),
         "mapping file": Parser(of_file("m.toml", read_mapping_file), (MAPPING,), 4, True),
         "export, workbook": Parser(of_file("x.xlsx", _preview, _import), workbook, 0.3),
         "memory file": Parser(memory, (kept,), 2, True),
