@@ -60,8 +60,10 @@ def rows(seconds: float, clients: int) -> Iterator[str]:
 def busy() -> Iterator[None]:
     """Keep the core that this process runs on busy."""
     with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as process:
-        yield
-        process.kill()
+        try:
+            yield
+        finally:
+            process.kill()
 
 
 def _row(dcs: Dcs, pid: int, clients: int, seconds: float) -> str:

@@ -65,11 +65,10 @@ def find_header(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -
     broken: list[InputError] = []
     for table in tables:
         try:
-            header = _header_of(path, table, wanted)
+            if header := _header_of(path, table, wanted):
+                found.append(header)
         except InputError as error:  # as it would be read with a separator that is none
             broken.append(error)
-            continue
-        found += [header] if header is not None else []
     if len({each.table.sheet for each in found}) > 1:
         sheets = ", ".join(repr(each.table.sheet) for each in found)
         raise InputError(str(path), f"the sheets {sheets} all have these columns: say which, --sheet NAME")

@@ -19,19 +19,16 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
-from config.exports.typed_tables import first_line
+from config.exports.typed_tables import NUMBERS, Columns, first_line, with_unit
 from config.extras import needed
 from config.plain_file import require_moderate
 
-NUMBERS = "fiub"
-"""Kinds of numpy's types that are numbers."""
 REFUSED = 2
 LONGEST_S, BYTES_A_S = 20.0, 1e6
 """For which it may read; more of a large file. A megabyte takes it a tenth of a second."""
-Group = dict[str, Any]
 
 
-def mdf4_groups(path: Path) -> list[tuple[str, Group]]:
+def mdf4_groups(path: Path) -> list[tuple[str, Columns]]:
     """Return the channels of numbers, float64, by their names with their units, of each group, by its name.
 
     Raises:
@@ -62,7 +59,7 @@ def _damaged(path: Path, why: str) -> InputError:
     return InputError(str(path), f"is a damaged MDF file: {why}")
 
 
-def _read(path: Path) -> list[tuple[str, Group]]:
+def _read(path: Path) -> list[tuple[str, Columns]]:
     """Read a file, here and now.
 
     Raises:
@@ -80,18 +77,17 @@ def _read(path: Path) -> list[tuple[str, Group]]:
         raise _damaged(path, first_line(error)) from None
 
 
-def _group(path: Path, file: Any, index: int) -> Group:
+def _group(path: Path, file: Any, index: int) -> Columns:
     group = file.groups[index]
     require_moderate(path, group.channel_group.cycles_nr, len(group.channels))
-    columns: Group = {}
+    columns: Columns = {}
     for number, channel in enumerate(group.channels):
         if number == file.masters_db.get(index):
             continue
         signal = file.get(group=index, index=number)
         if signal.samples.ndim == 1 and signal.samples.dtype.kind in NUMBERS:
             columns.setdefault("time [s]", np.asarray(signal.timestamps, dtype=np.float64))
-            name = f"{channel.name} [{signal.unit}]" if signal.unit else channel.name
-            columns[name] = signal.samples.astype(np.float64)
+            columns[with_unit(channel.name, signal.unit or "")] = signal.samples.astype(np.float64)
     return columns
 
 

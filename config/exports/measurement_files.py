@@ -16,13 +16,11 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
-from config.exports.mdf4_reader import NUMBERS, mdf4_groups
+from config.exports.mdf4_reader import mdf4_groups
 from config.exports.raw_table import RawTable
-from config.exports.typed_tables import by_length, column_rows, first_line, no_vectors
+from config.exports.typed_tables import NUMBERS, Columns, by_length, column_rows, first_line, no_vectors, with_unit
 from config.extras import needed
 from config.plain_file import require_moderate
-
-Columns = dict[str, Any]
 
 
 def hdf5(path: Path) -> list[RawTable]:
@@ -68,10 +66,10 @@ def _channels(name: str, dataset: Any) -> Iterator[tuple[str, Any]]:
     values = np.asarray(dataset[...], dtype=np.float64)
     unit = next((_text(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs), "")
     if values.ndim == 1 or 1 in values.shape:
-        yield _named(name, unit), values.ravel()
+        yield with_unit(name, unit), values.ravel()
         return
     for index, column in enumerate(values if kind is not None else values.T, start=1):
-        yield _named(f"{name}(:,{index})", unit), column
+        yield with_unit(f"{name}(:,{index})", unit), column
 
 
 def tdms(path: Path) -> list[RawTable]:
@@ -117,7 +115,7 @@ def _tdms_group(group: Any) -> Columns:
             if channel.properties.get("wf_increment") and "time [s]" not in columns:
                 columns["time [s]"] = channel.time_track()
             unit = channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or ""
-            columns[_named(channel.name, str(unit))] = values.astype(np.float64)
+            columns[with_unit(channel.name, str(unit))] = values.astype(np.float64)
     return columns
 
 
@@ -144,10 +142,6 @@ def _required(path: Path, tables: list[RawTable]) -> list[RawTable]:
     if not tables:
         raise no_vectors(path)
     return tables
-
-
-def _named(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
 
 
 def _text(value: object) -> str:

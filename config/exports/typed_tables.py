@@ -15,6 +15,11 @@ from config.exports.raw_table import Cell, RawTable
 from config.extras import needed
 from config.plain_file import require_moderate
 
+Columns = dict[str, Any]
+"""Vectors by the names of their columns."""
+NUMBERS = "fiub"
+"""Kinds of numpy's types that are numbers."""
+
 
 def workbook(path: Path, sheet: str | None = None) -> list[RawTable]:
     """Return the sheets of an Excel workbook, or the one that is named.
@@ -109,7 +114,7 @@ def _vectors(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _vectors(value, f"{prefix}{name}.")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1:
+        elif isinstance(value, np.ndarray) and value.dtype.kind in NUMBERS and value.size > 1:
             if value.ndim == 1:
                 yield prefix + name, value.astype(np.float64)
             elif value.ndim == 2:
@@ -142,6 +147,11 @@ def column_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, list[Cell]]]:
     yield 1, list(columns)
     for number, row in enumerate(zip(*columns.values(), strict=True), start=2):
         yield number, list(row)
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Return a column's name with the unit that its file says, in brackets."""
+    return f"{name} [{unit}]" if unit else name
 
 
 def first_line(error: Exception) -> str:
