@@ -30,7 +30,7 @@ from workbench.blind.hiding import Hidden, hide, strength
 from workbench.blind.trial import Trial, refitted_rmse_m
 from workbench.compare.comparison import Comparison, compare
 from workbench.compare.measures import rms
-from workbench.fleet.examination import AT_FLOOR, floor_to_reach_m, refit, refits
+from workbench.fleet.examination import AT_FLOOR, floor_to_reach_m, is_structured, refit, refits
 
 EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 3.0, np.inf)
 VISIBLE = 0.5
@@ -63,9 +63,10 @@ def case(seed: int) -> Line:
 
 
 def _passes(known_floor_m: float | None, *comparisons: Comparison) -> float | None:
-    """Return how many floors a look and refits must be allowed for one of them to pass; None: none is adequate."""
-    adequate = [(each.rms_m, floor_to_reach_m(each, known_floor_m)) for each in comparisons if each.adequate]
-    return min((rms_m / floor_m for rms_m, floor_m in adequate if floor_m), default=None)
+    """Return how many floors a look and refits must be allowed for one of them to pass; None: none can."""
+    passing = [each for each in comparisons if each.adequate and not is_structured(each)]
+    floors_m = [(each.rms_m, floor_to_reach_m(each, known_floor_m)) for each in passing]
+    return min((rms_m / floor_m for rms_m, floor_m in floors_m if floor_m), default=None)
 
 
 def _weakened(name: str, bare: Hidden, generator: np.random.Generator) -> EffectTable:

@@ -37,7 +37,7 @@ from sim.effect import first_effects
 from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import NOISE_M, Trial
 from workbench.fleet.engine import cluster
-from workbench.fleet.examination import AS_BEFORE, AT_FLOOR, CHANGED, Examination
+from workbench.fleet.examination import AS_BEFORE, CHANGED
 from workbench.fleet.fleet import Fleet, fleet
 from workbench.fleet.tables import write_tables
 
@@ -146,16 +146,12 @@ def score(found: Fleet, truth: Mapping[str, str]) -> Score:
         found=suspected & hidden,
         false=suspected - hidden,
         missed=hidden - suspected,
-        untried={name for name in hidden - suspected if _is_at_floor(last[name])},
+        untried={name for name in hidden - suspected if not last[name].candidates},
         moved=hidden & changed,
         named={name for name in suspected & hidden if truth[name] in (*gravest[name].effects, *gravest[name].rivals)},
         tightened={name for name in changed if truth[name] == PACKING},
         unchanged={name for name in gravest if not truth[name]},
     )
-
-
-def _is_at_floor(found: Examination) -> bool:
-    return (found.error_after_m or 0.0) <= AT_FLOOR * (found.floor_m or 0.0)
 
 
 def main(words: Sequence[str] | None = None) -> None:

@@ -106,6 +106,16 @@ class Comparison(Result):
     friction: FrictionBalance
     by_setpoint: bool = False
 
+    @property
+    def valid_samples(self) -> int:
+        """Number of samples whose error counts."""
+        return int(np.isfinite(self.residual_m).sum())
+
+    @property
+    def structured_m(self) -> float:
+        """The part of the error, rms, that goes on from sample to sample (`residuals.Correlation.structured_share`)."""
+        return self.rms_m * float(np.sqrt(self.autocorrelation.structured_share))
+
     def blocks(self) -> list[Block]:
         """Say where the model fails, the gravest first, and by how much in each phase."""
         return [

@@ -2,6 +2,7 @@
 
     r_xy(k) = sum_i x_i y_(i+k) / sqrt(sum x^2 sum y^2)                     lags k = 0..25 (residual), -25..25 (input)
     white residual: |r_ee(k)| < 2.58 / sqrt n                               99 % band
+    structured share: mean of r_ee(1..5), at least 0        of the residual's power; of white noise 0 +- 1 / sqrt(5 n)
     independent input: |r_ue(k)| < 2.58 sqrt(sum_l r_uu(l) r_ee(l) / n)     99 % band (Bartlett), both with their memory
 
 A residual of a simulation need not be white, but it must not depend on the input.
@@ -16,6 +17,8 @@ from config.recording import Column
 from config.results.result import Brief
 
 LAGS = 25
+NEXT = 5
+"""Samples over which what is no noise goes on."""
 BAND_99 = 2.576
 MEMORY = 0.2
 """Part of the record over which correlations are summed for the input's band."""
@@ -49,6 +52,11 @@ class Correlation(Brief):
         """Number of lags, 0 of an autocorrelation excepted, outside the band."""
         seen = np.abs(self.value) > self.band
         return int(seen[(self.lag != 0) | (np.abs(self.value) < 1.0 - 1e-12)].sum())
+
+    @property
+    def structured_share(self) -> float:
+        """Part of the power that goes on from sample to sample, of an autocorrelation of two samples and more."""
+        return max(0.0, float(np.mean(self.value[(self.lag >= 1) & (self.lag <= NEXT)])))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

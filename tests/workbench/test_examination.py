@@ -1,0 +1,41 @@
+"""What explains a recording so well that nothing need be diagnosed: as close as chance allows, and without structure."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from config.valve_file import valve
+from tests.workbench.fleets import record
+from workbench.compare.comparison import Comparison, compare
+from workbench.fleet.examination import AT_FLOOR, floors_allowed, is_at_floor, is_structured
+
+NOISE_M = 5e-5
+SEED = valve("seed")
+
+
+def compared(folder: Path, *, wave_m: float = 0.0, rows: int | None = None) -> Comparison:
+    """The seed's valve against its own recording, to which a slow wave, rms, is added."""
+    record(SEED, folder / "recordings" / "V.csv", 3)
+    made = Recording.read(folder / "recordings" / "V.csv")
+    columns = {name: each[:rows] for name, each in made.columns.items()}
+    wave = np.sqrt(2.0) * wave_m * np.sin(2.0 * columns["time_s"])
+    return compare(Recording({**columns, "position_m": columns["position_m"] + wave}, made.metadata), SEED)
+
+
+@pytest.mark.parametrize(("floors", "explained"), [(0.0, True), (0.15, True), (0.45, False)])
+def test_what_goes_on_from_sample_to_sample_is_no_noise(tmp_path: Path, floors: float, explained: bool) -> None:
+    found = compared(tmp_path, wave_m=floors * NOISE_M)
+    assert found.adequate
+    assert found.rms_m < AT_FLOOR * (found.floor_m or 0.0), "the error alone would not tell"
+    assert found.structured_m == pytest.approx(floors * NOISE_M, abs=0.12 * NOISE_M)
+    assert is_structured(found) == (not explained)
+    assert is_at_floor(found, SEED) == explained
+
+
+def test_of_few_samples_the_error_may_lie_higher_by_chance(tmp_path: Path) -> None:
+    many, few = compared(tmp_path), compared(tmp_path, rows=250)
+    assert (many.valid_samples, few.valid_samples) == (1000, 250)
+    assert floors_allowed(many) == pytest.approx(1.1, abs=0.005)
+    assert floors_allowed(few) == pytest.approx(1.2, abs=0.005)
