@@ -8,7 +8,15 @@ import pytest
 from config.codes import Fault, Mode
 from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
-from positioner.cli.demo import LARGEST_ERROR_PU, ComparedEstimate, DemoOutcome, StepOutcome
+from positioner.cli.demo import (
+    ALPHA_PA,
+    IDENTIFICATIONS,
+    LARGEST_ERROR_PU,
+    ComparedEstimate,
+    DemoOutcome,
+    StepOutcome,
+    identify,
+)
 from positioner.cli.main import main
 from positioner.cli.parts import simulated_plant
 from positioner.cli.parts.children import port_in
@@ -52,8 +60,34 @@ def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
     assert {each["name"] for each in told["identified"]} == {"a", "b", "c", "k", "b_over_c", "k_over_c"}
     assert (tmp_path / "out" / "run.png").read_bytes().startswith(b"\x89PNG")
     (recording,) = (tmp_path / "out" / "recordings").glob("*.csv")
+    identified = any(not each["refusal"] for each in told["identified"])
     states = set(read_recording(recording).columns["state"].tolist())
-    assert states == {0.0, 1.0, 2.0, 3.0}
+    assert states == ({0.0, 1.0, 2.0, 3.0} if identified else {0.0, 3.0}), "what is refused moves no stem"
+
+
+class RefusedAtFirst:
+    """A DCS to whom an identification is refused so many times."""
+
+    def __init__(self, refused: int) -> None:
+        self.problems = [*["too many samples lost"] * refused, None]
+        self.asked = 0
+
+    def identify(self, *_: object) -> str | None:
+        self.asked += 1
+        return self.problems[min(self.asked, len(self.problems)) - 1]
+
+    def get_all(self, *names: str) -> dict[str, float]:
+        return dict.fromkeys(names, 0.0)
+
+
+@pytest.mark.parametrize(("refused", "asked"), [(0, 1), (1, 2), (9, IDENTIFICATIONS)])
+def test_an_identification_that_is_refused_is_made_anew_a_few_times(
+    refused: int, asked: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dcs = RefusedAtFirst(refused)
+    identify(dcs, "new", ALPHA_PA, load_valve(shipped_valve("seed")).valve)  # type: ignore[arg-type]
+    assert dcs.asked == asked
+    assert capsys.readouterr().out.count("failed: too many samples lost") == min(refused, asked)
 
 
 @pytest.mark.parametrize(
