@@ -1,5 +1,7 @@
 """The integral identity (8)-(12), symbolically, on a general motion."""
 
+from functools import cache
+
 import sympy as sp
 
 t, a, b, c, k = sp.symbols("t a b c k")
@@ -14,22 +16,30 @@ def P(f: sp.Expr, n: int) -> sp.Expr:  # noqa: N802 - the paper's name
     return f
 
 
-Q1 = P(-(t**3) * x, 1) + 9 * P(t**2 * x, 2) + 18 * P(-t * x, 3) + 6 * P(x, 4)
-P11 = P(-(t**3) * x, 2) + 6 * P(t**2 * x, 3) + 6 * P(-t * x, 4)
-P11_PRINTED = P(-(t**3) * x, 2) + 6 * P(-(t**2) * x, 3) + 6 * P(-t * x, 4)
-P12 = P(-(t**3) * x, 3) + 3 * P(t**2 * x, 4)
-P13 = P(-(t**3) * u, 3) + 3 * P(t**2 * u, 4)
+@cache
+def terms() -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
+    """Q1, P11, P12, P13."""
+    return (
+        P(-(t**3) * x, 1) + 9 * P(t**2 * x, 2) + 18 * P(-t * x, 3) + 6 * P(x, 4),
+        P(-(t**3) * x, 2) + 6 * P(t**2 * x, 3) + 6 * P(-t * x, 4),
+        P(-(t**3) * x, 3) + 3 * P(t**2 * x, 4),
+        P(-(t**3) * u, 3) + 3 * P(t**2 * u, 4),
+    )
 
 
 def test_corrected_identity_holds_for_any_start_and_any_friction() -> None:
-    assert sp.expand(Q1 - a * P11 - b * P12 - c * P13) == 0
+    q1, p11, p12, p13 = terms()
+    assert sp.expand(q1 - a * p11 - b * p12 - c * p13) == 0
 
 
 def test_identity_as_printed_in_10_does_not_hold() -> None:
-    assert sp.expand(Q1 - a * P11_PRINTED - b * P12 - c * P13) != 0
+    q1, _, p12, p13 = terms()
+    printed = P(-(t**3) * x, 2) + 6 * P(-(t**2) * x, 3) + 6 * P(-t * x, 4)
+    assert sp.expand(q1 - a * printed - b * p12 - c * p13) != 0
 
 
 def test_identity_with_the_coefficient_printed_in_7_does_not_hold() -> None:
+    q1, p11, _, _ = terms()
     p12 = P(-(t**3) * x, 3) + P(t**2 * x, 4)
     p13 = P(-(t**3) * u, 3) + P(t**2 * u, 4)
-    assert sp.expand(Q1 - a * P11 - b * p12 - c * p13) != 0
+    assert sp.expand(q1 - a * p11 - b * p12 - c * p13) != 0

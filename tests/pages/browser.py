@@ -45,7 +45,7 @@ def opened(
     """Open a page in a browser of its own."""
     complaints: list[str] = []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=executable, args=["--no-sandbox", "--disable-gpu"])
         context = browser.new_context(
             viewport={"width": width_px, "height": 900}, color_scheme="dark" if dark else "light"
         )
