@@ -3,8 +3,9 @@
     python -m benchmarks.fleet_scaling FOLDER [--recordings 100 1000 10000] [--workers 1 2]
 
 The recordings are short (5 s at 50 Hz), ten a valve, and of valves that are as their files say, the first explained by
-a look: so nearly all end at the look, which is the hardest case for whatever is paid by the task. Each line is a run into a folder of its own, in a process of
-its own; what was measured is kept in `scaling.jsonl`, so that the command can be broken off and goes on.
+a look: so nearly all end at the look, which is the hardest case for whatever is paid by the task. Each line is a run
+into a folder of its own, in a process of its own; what was measured is kept in `scaling.jsonl`, so that the command can
+be broken off and goes on.
 
 Seconds of processor (CPU) are told beside those of the clock, as only they mean anything on a machine that is shared:
 of the client, in whose process the scheduler runs, and of its workers. Starting up is in them; what one more recording
@@ -59,7 +60,7 @@ def make(folder: Path, recordings: int) -> None:
 
 
 def _valve(folder: Path, name: str, seed: int) -> None:
-    """Write a valve and its recordings; of few samples it may be off by a slip that hangs on a knife edge: not these."""
+    """Write a valve and its recordings; not one of a slip on a knife edge, by which few samples may be off."""
     for attempt in count():
         draw = np.random.default_rng([seed, attempt])
         file = ValveFile(valve=drawn_valve(draw))
