@@ -1,4 +1,4 @@
-"""What explains a recording so well that nothing need be diagnosed: as close as chance allows, and without structure."""
+"""What explains a recording so well that nothing is diagnosed: as close as chance allows, and without structure."""
 
 from pathlib import Path
 
