@@ -67,7 +67,8 @@ def _valve(folder: Path, name: str, seed: int) -> None:
         composition = Composition.from_file(file)
         trial = Trial(excitation(file.valve, draw, SAMPLES), PERIOD_S)
         clean_m = trial.answer_m(composition, composition.theta)
-        made = [trial.recording(clean_m, Sensor(noise_std_m=NOISE_M, seed=seed + i)) for i in range(A_VALVE)]
+        sensors = [Sensor(noise_std_m=NOISE_M, seed=int(draw.integers(2**31))) for _ in range(A_VALVE)]
+        made = [trial.recording(clean_m, each) for each in sensors]
         if is_at_floor(compare(made[0], file), file):
             break
     write_valve(folder / "valves" / f"{name}.toml", file)
