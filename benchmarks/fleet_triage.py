@@ -30,12 +30,13 @@ from workbench.blind.hiding import Hidden, hide, strength
 from workbench.blind.trial import Trial, refitted_rmse_m
 from workbench.compare.comparison import Comparison, compare
 from workbench.compare.measures import rms
-from workbench.fleet.examination import AT_FLOOR, floor_to_reach_m, is_structured, refit, refits
+from workbench.fleet.examination import floor_to_reach_m, floors_allowed, is_structured, refit, refits
 
 EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 3.0, np.inf)
 VISIBLE = 0.5
 WEAKEST = 0.03
-ALLOWED = (1.05, 1.1, 1.15, 1.2, 1.5)
+DEFAULT = floors_allowed(round(DURATION_S / PERIOD_S))
+ALLOWED = (1.05, 1.1, DEFAULT, 1.2, 1.5)
 
 
 def case(seed: int) -> Line:
@@ -64,7 +65,7 @@ def case(seed: int) -> Line:
 
 def _passes(known_floor_m: float | None, *comparisons: Comparison) -> float | None:
     """Return how many floors a look and refits must be allowed for one of them to pass; None: none can."""
-    passing = [each for each in comparisons if each.adequate and not is_structured(each)]
+    passing = [each for each in comparisons if each.adequate and not is_structured(each, known_floor_m)]
     floors_m = [(each.rms_m, floor_to_reach_m(each, known_floor_m)) for each in passing]
     return min((rms_m / floor_m for rms_m, floor_m in floors_m if floor_m), default=None)
 
@@ -86,7 +87,7 @@ def _answer_m(trial: Trial, valve: ValveFile) -> Column:
 
 def table(cases: Sequence[Line]) -> list[str]:
     """Return lines: the share left undiagnosed by strength, for each error that a look or a refit may leave."""
-    head = "".join(f"{f'{floors:g} floors':>14}" for floors in ALLOWED)
+    head = "".join(f"{f'{floors:.4g} floors':>14}" for floors in ALLOWED)
     lines = [f"{'strength, floors':18}{'cases':>7}{head}"]
     ranges = [*pairwise(EDGES), (VISIBLE, np.inf), (1.0, np.inf)]
     for low, high in ranges:
@@ -102,7 +103,7 @@ def _share(passes: Sequence[float | None], most: float) -> str:
     return f"{f'{through} ({100 * through / len(passes):.1f} %)' if passes else '':>14}"
 
 
-def _is_through(passes: float | None, most: float = AT_FLOOR) -> bool:
+def _is_through(passes: float | None, most: float = DEFAULT) -> bool:
     return passes is not None and passes <= most
 
 
@@ -123,7 +124,7 @@ def main(words: Sequence[str] | None = None) -> None:
     there = {each["seed"] for each in cases}
     wanted = [(seed,) for seed in range(given.seed, given.seed + given.cases) if seed not in there]
     cases += run(given.file, case, wanted, given.workers)
-    print(f"left undiagnosed, by what a look or a refit may leave; the fleet's is {AT_FLOOR:g} floors")
+    print(f"left undiagnosed, by what a look or a refit may leave; the fleet's is {DEFAULT:.4g} floors")
     print("\n".join(table(cases)))
 
 

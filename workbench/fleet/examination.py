@@ -7,7 +7,7 @@
 
 Explained is what `compare` calls adequate, and closer, as what a refit bends itself round would be missed:
 
-    e <= max(1.1, 1 + 3.2 / sqrt n) floor        rms over n samples: of few, it scatters by itself
+    e <= max(1.1, 1 + 5 / sqrt n) floor          rms over n samples: of few, it and the floor scatter by themselves
     sqrt(share) e <= 0.3 floor                   the part of it that goes on from sample to sample, which noise does not
 
 The rules of "missing" are those of `diagnose`. The same recording and model give the same examination, on
@@ -44,9 +44,8 @@ LEAST_CHANGE_OF_EFFECT = 0.2
 AT_FLOOR = 1.1
 """Times the floor that a look or a refit may leave of many samples; more is diagnosed. `python -m
 benchmarks.fleet_triage` has what each value misses."""
-BY_CHANCE = 3.2
-"""Standard deviation of e / floor times sqrt n, and nearly three of them: floors are estimated, too. Of 620 valves as
-their models say, 1000 samples each, 1.3 % lie above."""
+BY_CHANCE = 5.0
+"""Some four standard deviations of e / floor, times sqrt n: floors are estimated, too, from the samples at rest."""
 STRUCTURED = 0.3
 """Times the floor that the structured part of the error may have."""
 RISEN = 1.25
@@ -201,20 +200,25 @@ def is_at_floor(comparison: Comparison, model: ValveFile, known_floor_m: float |
         model: a valve file.
         known_floor_m: of the recording behind the model, rms; None: unknown.
     """
-    reached_m = floors_allowed(comparison) * (floor_to_reach_m(comparison, known_floor_m) or 0.0)
+    reached_m = floors_allowed(comparison.valid_samples) * (floor_to_reach_m(comparison, known_floor_m) or 0.0)
     close = comparison.rms_m <= max(reached_m, NUMERICAL * model.valve.stroke_m)
-    return comparison.adequate and close and not is_structured(comparison)
+    return comparison.adequate and close and not is_structured(comparison, known_floor_m)
 
 
-def floors_allowed(comparison: Comparison) -> float:
-    """Return how many floors a look or a refit may leave of a recording of that many samples."""
-    return max(AT_FLOOR, 1.0 + BY_CHANCE / float(np.sqrt(comparison.valid_samples)))
+def floors_allowed(samples: int) -> float:
+    """Return how many floors a look or a refit may leave of so many samples."""
+    return max(AT_FLOOR, 1.0 + BY_CHANCE / float(np.sqrt(samples)))
 
 
-def is_structured(comparison: Comparison) -> bool:
-    """Whether the error goes on from sample to sample by more than noise does; where laps differ, it does anyhow."""
-    noise_m, floor_m = comparison.noise_m, comparison.floor_m
-    if noise_m is None or floor_m is None or floor_m > RISEN * noise_m:
+def is_structured(comparison: Comparison, known_floor_m: float | None = None) -> bool:
+    """Whether the error goes on from sample to sample by more than noise does; of a valve whose laps differ, it does.
+
+    Args:
+        comparison: of the recording with the model.
+        known_floor_m: of the recording behind the model, rms, m: laps that differ there, too, are how this valve is.
+    """
+    noise_m, floor_m = comparison.noise_m, floor_to_reach_m(comparison, known_floor_m)
+    if noise_m is None or floor_m is None or (known_floor_m or floor_m) > RISEN * noise_m:
         return False
     return comparison.structured_m > STRUCTURED * floor_m
 
