@@ -16,8 +16,8 @@ from sim.composition import Composition
 from sim.karnopp import TOLERANCE, Vector
 
 STEP_S = 1e-5
-PATH_ROWS, INDICATED = 5, 4
-"""Rows that the kernel writes: t, p, x, v, indicated; which of them is the last."""
+PATH_ROWS, PRESSURE, INDICATED = 5, 1, 4
+"""Rows that the kernel writes: t, p, x, v, indicated; which of them are the second and the last."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -3,6 +3,7 @@
 Its files:
 
     free_run             simulates it whole, on the command alone
+    initial_state        where a segment begins, and the pressure that nobody told
     multiple_shooting    the same, put back to the measured stem before each slip
     sampling             with inertia, without, or landing by landing: by how far apart the samples are
     parameters           the coordinates of a fit

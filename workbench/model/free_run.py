@@ -8,8 +8,7 @@ rate, begins with the pressure nearest to the first command of those that balanc
     at rest      |A p - k_s x| <= F_s
     in motion    A p = k_s x + F_v v + F_c sign v
 
-Behind a positioner no command is a pressure: it begins at rest, with that in the middle of those that balance, and
-the positioner brings it to where it moves.
+Behind a positioner no command is a pressure: it begins at rest, with what the record tells of it (`initial_state`).
 
 Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
 of the measurements at its ends. A measured load acts as the pressure load / A besides.
@@ -34,12 +33,22 @@ from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
-from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS, Composition
+from sim.composition import AREA, Composition
 from sim.karnopp import SLIP, Vector, read, write
-from sim.open_loop import INDICATED, PATH_ROWS, at_rest, checked_commands, checked_periods, checked_step
+from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
 from sim.quasi_static import FREE
 from workbench.data.record import Mask, Record
 from workbench.data.stillness import eventful
+from workbench.model.initial_state import (
+    BeforeStart,
+    InitialState,
+    before_start,
+    broke_loose_pa,
+    equilibrium_pa,
+    held,
+    initial_state,
+    landed_pa,
+)
 from workbench.model.sampling import Motion, Sampling, landings, sampling
 
 
@@ -63,14 +72,6 @@ LOOKS = (0.25, 0.5)
 """Parts of a stretch without a gap after which somebody looks whether it is worth while to go on."""
 MOST_CORRECTIONS = 3
 """Of the stem at the start, until the model indicates what was measured there."""
-STILL = 4.0
-"""Standard deviations of the noise within which the stem stands still."""
-LONGEST_START = 50
-"""Samples of the start that are averaged at most."""
-SHORT = 4
-"""Samples within which a stem that leaves its place is in motion from the start."""
-
-
 CASCADE = 16
 """Steps to a sample where effects of the pressure path with a memory follow each other, without inertia."""
 JUDGED = 10
@@ -87,20 +88,14 @@ class Run(Brief):
     pressure_pa: Column
 
 
-@dataclass(frozen=True, slots=True)
-class InitialState:
-    """Where a segment begins: position, m, and velocity, m/s."""
-
-    position_m: float
-    velocity_m_per_s: float
-
-
 class Segment(NamedTuple):
     """A stretch of a record without a gap, rows first to end (half open), as it is simulated."""
 
     first: int
     end: int
     begin: InitialState
+    before: BeforeStart | None
+    """Behind a positioner: what is known of it from before."""
     drive_pa: Vector
     """Held from each of its samples to the next, Pa."""
     load_n: Vector | None
@@ -144,7 +139,10 @@ class FreeRun:
             self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure)
             return
         longest_s = accuracy.steps * self._composition.step_s
-        self._segments = [_segment(record, drive_pa, first, end, longest_s) for first, end in record.segments]
+        by_setpoint = self._composition.by_setpoint
+        self._segments = [
+            _segment(record, drive_pa, first, end, longest_s, by_setpoint=by_setpoint) for first, end in record.segments
+        ]
 
     @property
     def judged(self) -> Mask:
@@ -227,13 +225,33 @@ class FreeRun:
         """Return the pressures of a segment's periods, Pa, and the state that it begins with."""
         drive_pa = segment.drive_pa if segment.load_n is None else segment.drive_pa + segment.load_n / theta[AREA]
         time_s = float(self.record.time_s[segment.first])
-        return drive_pa, self._begin(theta, segment.begin, time_s, float(drive_pa[0]))
+        if segment.before is None:
+            return drive_pa, self._begin(theta, segment.begin, time_s, float(drive_pa[0]))
+        stem_m = segment.begin.position_m
+        state = self._begin(theta, segment.begin, time_s, landed_pa(theta, stem_m, segment.before.came))
+        if segment.before.leaves:
+            broken_pa = self._held_until(theta, state, segment, segment.before.rests)
+            begin_pa = broke_loose_pa(theta, stem_m, segment.before.leaves, broken_pa)
+            state = self._begin(theta, segment.begin, time_s, begin_pa)
+        return drive_pa, state
+
+    def _held_until(self, theta: Vector, state: Vector, segment: Segment, rests: int) -> float:
+        """Return by how much the positioner raises the pressure until the middle of a period, the stem held, Pa."""
+        path = np.empty((PATH_ROWS, rests + 1))
+        self._composition.kernel.respond(
+            held(theta),
+            state.copy(),
+            segment.drive_pa[:rests],
+            segment.periods_s[:rests],
+            segment.step_s,
+            self._tolerance,
+            path,
+        )
+        pressure_pa = path[PRESSURE]
+        return float(0.5 * (pressure_pa[-1] + pressure_pa[-2]) - pressure_pa[0])
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         stem_m = begin.position_m
-        if self._composition.by_setpoint:
-            begin = InitialState(stem_m, 0.0)
-            pressure_pa = float(theta[SPRING] * stem_m / theta[AREA])
         for _ in range(MOST_CORRECTIONS):
             held_pa = equilibrium_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
             state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
@@ -305,37 +323,14 @@ def _told(record: Record, composition: Composition) -> tuple[Column, Mask]:
     return told, judged
 
 
-def _segment(record: Record, drive_pa: Column, first: int, end: int, longest_s: float) -> Segment:
+def _segment(record: Record, drive_pa: Column, first: int, end: int, longest_s: float, *, by_setpoint: bool) -> Segment:
     held_pa = checked_commands(drive_pa[first : end - 1])
     load_n = None if record.load_n is None else checked_commands(record.load_n[first : end - 1])
     periods_s = checked_periods(np.diff(record.time_s[first:end]), held_pa)
     step_s = checked_step(min(float(periods_s.max()), longest_s))
-    return Segment(first, end, initial_state(record, first, end), held_pa, load_n, periods_s, step_s)
-
-
-def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
-    """Return the pressure, Pa, nearest to a command with which the forces are in balance; theta, (parameters,)."""
-    middle_n = theta[SPRING] * position_m + theta[VISCOUS] * velocity_m_per_s
-    if velocity_m_per_s:
-        return float((middle_n + theta[COULOMB] * np.sign(velocity_m_per_s)) / theta[AREA])
-    least_pa, most_pa = ((middle_n + sign * theta[STATIC]) / theta[AREA] for sign in (-1.0, 1.0))
-    return float(min(max(command_pa, least_pa), most_pa))
-
-
-def initial_state(record: Record, first: int, end: int, *, moving: bool = True) -> InitialState:
-    """Return where a segment begins, from its first valid samples; at rest unless it may be moving."""
-    rows = first + np.flatnonzero(record.valid[first:end])
-    if not rows.size:
-        raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
-    position_m = record.position_m[rows[:LONGEST_START]]
-    time_s = record.time_s[rows[:LONGEST_START]]
-    band_m = STILL * record.scale_m
-    away = np.abs(position_m - position_m[0]) > 2.0 * band_m
-    still = int(away.argmax()) if away.any() else position_m.size
-    if still >= SHORT or position_m.size < SHORT or not moving:
-        return InitialState(float(np.median(position_m[: max(1, still - 1)])), 0.0)
-    slope, place = np.polyfit(time_s[:SHORT] - time_s[0], position_m[:SHORT], 1)
-    return InitialState(float(place), float(slope))
+    before = before_start(record, first, end) if by_setpoint else None
+    begin = initial_state(record, first, end, moving=not by_setpoint)
+    return Segment(first, end, begin, before, held_pa, load_n, periods_s, step_s)
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:

@@ -1,0 +1,114 @@
+"""Where a segment of a record begins: what its samples say; behind a positioner, the pressure that none of them says.
+
+A valve stands still with any pressure of a band, |A p - k_s x| <= F_s. A positioner brings the pressure from where it
+is to where the stem breaks loose, and how long that takes tells where it was:
+
+    the stem was seen to come:   A p = k_s x + sigma F_c                    where a slide ended
+    it is seen to leave, at t:   A p(t) = k_s x + sigma F_s                 p(t) - p(0) by the positioner, the stem held
+    neither:                     A p = k_s x                                the middle of the band
+
+sigma direction of that motion, +1 opening.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.errors import InputError
+from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS
+from sim.karnopp import Vector
+from workbench.data.record import Record
+
+STILL = 4.0
+"""Standard deviations of the noise within which the stem stands still."""
+LONGEST_START = 50
+"""Samples of the start that are averaged at most."""
+SHORT = 4
+"""Samples within which a stem that leaves its place is in motion from the start."""
+IMMOVABLE_N = 1e12
+"""Friction that holds the stem wherever it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class InitialState:
+    """Where a segment begins: position, m, and velocity, m/s."""
+
+    position_m: float
+    velocity_m_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class BeforeStart:
+    """What a record tells of the pressure that a segment begins with, behind a positioner."""
+
+    came: int
+    """Direction in which the stem was seen to come to where it begins, +1 opening; 0: it was not."""
+    leaves: int
+    """Direction in which it leaves; 0: it was seen to come, or never leaves."""
+    rests: int
+    """Periods until then; it leaves in the last of them."""
+
+
+def initial_state(record: Record, first: int, end: int, *, moving: bool = True) -> InitialState:
+    """Return where a segment begins, from its first valid samples; at rest unless it may be moving.
+
+    Raises:
+        InputError: no sample of it has a position.
+    """
+    rows = first + np.flatnonzero(record.valid[first:end])
+    if not rows.size:
+        raise InputError("recording", f"samples {first + 1} to {end}: no position is a number")
+    position_m = record.position_m[rows[:LONGEST_START]]
+    time_s = record.time_s[rows[:LONGEST_START]]
+    band_m = STILL * record.scale_m
+    away = np.abs(position_m - position_m[0]) > 2.0 * band_m
+    still = int(away.argmax()) if away.any() else position_m.size
+    if still >= SHORT or position_m.size < SHORT or not moving:
+        return InitialState(float(np.median(position_m[: max(1, still - 1)])), 0.0)
+    slope, place = np.polyfit(time_s[:SHORT] - time_s[0], position_m[:SHORT], 1)
+    return InitialState(float(place), float(slope))
+
+
+def before_start(record: Record, first: int, end: int) -> BeforeStart:
+    """Return what the samples around the first of a segment tell of the pressure before it."""
+    place_m = initial_state(record, first, end, moving=False).position_m
+    band_m = 2.0 * STILL * record.scale_m
+    # What was left out as it was in motion lies right before the segment, without a gap.
+    unbroken = first > 0 and record.time_s[first] - record.time_s[first - 1] < 1.5 * record.period_s
+    if unbroken and record.valid[first - 1] and not any(last == first for _, last in record.segments):
+        away_m = place_m - record.position_m[:first][record.valid[:first]]
+        moved = np.flatnonzero(np.abs(away_m) > band_m)
+        if moved.size:
+            return BeforeStart(int(np.sign(away_m[moved[-1]])), 0, 0)
+    rows = first + np.flatnonzero(record.valid[first:end])
+    off_m = record.position_m[rows] - place_m
+    left = np.flatnonzero(np.abs(off_m) > band_m)
+    if not left.size or rows[left[0]] == first:
+        return BeforeStart(0, 0, 0)
+    return BeforeStart(0, int(np.sign(off_m[left[0]])), int(rows[left[0]] - first))
+
+
+def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
+    """Return the pressure, Pa, nearest to a command with which the forces are in balance; theta, (parameters,)."""
+    middle_n = theta[SPRING] * position_m + theta[VISCOUS] * velocity_m_per_s
+    if velocity_m_per_s:
+        return float((middle_n + theta[COULOMB] * np.sign(velocity_m_per_s)) / theta[AREA])
+    least_pa, most_pa = ((middle_n + sign * theta[STATIC]) / theta[AREA] for sign in (-1.0, 1.0))
+    return float(min(max(command_pa, least_pa), most_pa))
+
+
+def landed_pa(theta: Vector, position_m: float, came: int) -> float:
+    """Return the pressure, Pa, with which a slide of direction `came` ends; 0: the middle of all that hold the stem."""
+    return float((theta[SPRING] * position_m + came * theta[COULOMB]) / theta[AREA])
+
+
+def broke_loose_pa(theta: Vector, position_m: float, leaves: int, risen_pa: float) -> float:
+    """Return the pressure, Pa, from which a rise of so many leads to where the stem breaks loose in a direction."""
+    return float((theta[SPRING] * position_m + leaves * theta[STATIC]) / theta[AREA] - risen_pa)
+
+
+def held(theta: Vector) -> Vector:
+    """Return the parameters, (parameters,), of the same valve with a stem that nothing moves."""
+    still = np.array(theta)
+    still[COULOMB] = still[STATIC] = IMMOVABLE_N
+    return still
