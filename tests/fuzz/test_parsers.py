@@ -39,7 +39,7 @@ def worked_s(parser: Parser, data: bytes) -> float:
 
 def inputs(parser: Parser) -> int:
     """Return how many inputs a parser gets: by its share, which says how fast it is."""
-    return max(FEWEST, min(MOST, round(30 * parser.share)))
+    return max(FEWEST, min(MOST, round(50 * parser.share)))
 
 
 @pytest.mark.parametrize("name", PARSERS)

@@ -1,6 +1,7 @@
 """A fit of a record that is rounded: right, or not trusted."""
 
 import numpy as np
+import pytest
 
 from config.recording import Recording
 from config.valve_file import ValveFile
@@ -20,8 +21,9 @@ def true_cost(recording: Recording, truth: ValveFile) -> float:
     return error.cost(np.zeros(0))
 
 
-def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth() -> None:
-    hidden = hide(52027)
+@pytest.mark.parametrize("seed", [52027, 52055])
+def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth(seed: int) -> None:
+    hidden = hide(seed)
     assert [each.name for each in hidden.truth.effect] == ["quantisation"]
     base = fit(hidden.fit, hidden.base, workers=1, profile=False)
     found = fit(hidden.fit, hidden.base, effects=("quantisation",), workers=1, base=base, profile=False)

@@ -230,12 +230,12 @@ class FreeRun:
         stem_m = segment.begin.position_m
         state = self._begin(theta, segment.begin, time_s, landed_pa(theta, stem_m, segment.before.came))
         if segment.before.leaves:
-            broken_pa = self._held_until(theta, state, segment, segment.before.rests)
-            begin_pa = broke_loose_pa(theta, stem_m, segment.before.leaves, broken_pa)
+            risen_pa = self._risen_pa(theta, state, segment, segment.before.rests)
+            begin_pa = broke_loose_pa(theta, stem_m, segment.before.leaves, risen_pa)
             state = self._begin(theta, segment.begin, time_s, begin_pa)
         return drive_pa, state
 
-    def _held_until(self, theta: Vector, state: Vector, segment: Segment, rests: int) -> float:
+    def _risen_pa(self, theta: Vector, state: Vector, segment: Segment, rests: int) -> float:
         """Return by how much the positioner raises the pressure until the middle of a period, the stem held, Pa."""
         path = np.empty((PATH_ROWS, rests + 1))
         self._composition.kernel.respond(
@@ -328,8 +328,8 @@ def _segment(record: Record, drive_pa: Column, first: int, end: int, longest_s: 
     load_n = None if record.load_n is None else checked_commands(record.load_n[first : end - 1])
     periods_s = checked_periods(np.diff(record.time_s[first:end]), held_pa)
     step_s = checked_step(min(float(periods_s.max()), longest_s))
-    before = before_start(record, first, end) if by_setpoint else None
     begin = initial_state(record, first, end, moving=not by_setpoint)
+    before = before_start(record, first, end, begin.position_m) if by_setpoint else None
     return Segment(first, end, begin, before, held_pa, load_n, periods_s, step_s)
 
 

@@ -69,9 +69,8 @@ def initial_state(record: Record, first: int, end: int, *, moving: bool = True) 
     return InitialState(float(place), float(slope))
 
 
-def before_start(record: Record, first: int, end: int) -> BeforeStart:
-    """Return what the samples around the first of a segment tell of the pressure before it."""
-    place_m = initial_state(record, first, end, moving=False).position_m
+def before_start(record: Record, first: int, end: int, place_m: float) -> BeforeStart:
+    """Return what the samples around the first of a segment, at rest at a place, m, tell of the pressure before it."""
     band_m = 2.0 * STILL * record.scale_m
     # What was left out as it was in motion lies right before the segment, without a gap.
     unbroken = first > 0 and record.time_s[first] - record.time_s[first - 1] < 1.5 * record.period_s
