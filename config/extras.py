@@ -5,6 +5,7 @@ from typing import Any
 
 EXTRAS = {
     "numba": "sim,plot",
+    "llvmlite": "sim,plot",
     "scipy": "sim,plot",
     "matplotlib": "sim,plot",
     "pandas": "frame",

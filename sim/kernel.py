@@ -2,14 +2,11 @@
 
 The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which
 the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
-effects' texts, of the elements they share and of this file, and the numba version. numba keeps the machine code beside
-it. A change in any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the
-very text that was hashed. (numba's own cache does not see a change in a callee's file.) No fast-math: the order of
-operations is the text's.
+effects' texts, of the elements they share, of this file and of the compiler, and the numba version. Beside it is kept
+what `kernel_compiler` makes of it, so that numba is started only where a kernel is new. A change in any of them is
+another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
 
 Of several processes that need a kernel at once, one compiles and the others wait: the file is locked meanwhile.
-
-numba is untyped: its types stop here.
 """
 
 import atexit
@@ -17,45 +14,34 @@ import fcntl
 import hashlib
 import os
 import re
-import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-from types import FunctionType, ModuleType
 from typing import Any, Protocol
 
-import numba
-
-from config.errors import InputError
-from sim import first_order_lag, karnopp, quasi_static
-from sim.effect import Effect, execute
+from sim import karnopp, quasi_static
+from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
-from sim.kernel_source import kernel_source
+from sim.kernel_source import SHARED, kernel_source
+from sim.machine_code import MATRIX, NUMBER, VECTOR, loaded
 
 BASE = Path(karnopp.__file__)
 SLOW = Path(quasi_static.__file__)
+COMPILER = Path(__file__).with_name("kernel_compiler.py")
 WRITABLE_BY_OTHERS = 0o022
 KARNOPP_IMPORT = re.compile(r"^from sim\.karnopp import \([^)]*\)\n", re.MULTILINE)
 """What stands in one text with `karnopp.py` need not be imported from it."""
-SHARED = (first_order_lag,)
-"""Elements that effects may import; compiled with them."""
-OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
-"""numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
-INNER: Mapping[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Of functions that only compiled ones call: to make them callable from Python would take a third of the time."""
-NOT_INLINED = ("bogacki_shampine", "push", "balanced", "breaks", "landed", "passed")
-"""Left to the compiler to inline: large, and called from several places."""
-NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
-VECTOR, MATRIX, NUMBER = "f8[::1]", "f8[:,::1]", "f8"
+BITCODE = ".bc"
 REST = (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER)
-ENTRIES: Mapping[str, tuple[str, ...]] = {
+ENTRIES: Mapping[str, tuple[int, ...]] = {
     "rest": REST,
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
 }
-SLOW_ENTRIES: Mapping[str, tuple[str, ...]] = {
+SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
     "rest": REST,
     "glide": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
 }
@@ -78,6 +64,18 @@ class _Respond(Protocol):
         /,
     ) -> None: ...
 
+    def bound(
+        self,
+        theta: Vector,
+        state: Vector,
+        commands: Vector,
+        periods: Vector,
+        longest_step: float,
+        tolerance: float,
+        path: Vector,
+        /,
+    ) -> Callable[[], None]: ...
+
 
 class _Glide(Protocol):
     def __call__(
@@ -98,6 +96,8 @@ class Kernel:
     """`rest` and `respond` of `karnopp.py`, compiled with the effects in their places."""
 
     digest: str
+    bitcode: bytes = field(repr=False)
+    """LLVM's, of the functions as `sim.machine_code` calls them."""
     state_size: int
     rest: _Rest
     respond: _Respond
@@ -120,8 +120,8 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
         InputError: an effect's function is not what numba can compile; names its file.
     """
     text = _text(effects, BASE.read_text(encoding="utf-8"))
-    digest, compiled = _compiled(text, _sources(effects), tuple(ENTRIES.items()))
-    return Kernel(digest, _state_size(effects), **compiled)
+    digest, bitcode, compiled = _compiled(text, _sources(effects), tuple(ENTRIES.items()))
+    return Kernel(digest, bitcode, _state_size(effects), **compiled)
 
 
 def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
@@ -132,7 +132,7 @@ def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
     """
     slow = KARNOPP_IMPORT.sub("", SLOW.read_text(encoding="utf-8"))
     text = _text(effects, "\n".join([BASE.read_text(encoding="utf-8"), slow]))
-    digest, compiled = _compiled(text, _sources(effects), tuple(SLOW_ENTRIES.items()))
+    digest, _, compiled = _compiled(text, _sources(effects), tuple(SLOW_ENTRIES.items()))
     return QuasiStaticKernel(digest, _state_size(effects), **compiled)
 
 
@@ -146,53 +146,23 @@ def _state_size(effects: Sequence[Effect]) -> int:
 
 @cache
 def _compiled(
-    text: str, sources: tuple[tuple[Path, str], ...], signatures: tuple[tuple[str, tuple[str, ...]], ...]
-) -> tuple[str, dict[str, Any]]:
-    """Return the text's digest and its compiled entries by name."""
+    text: str, sources: tuple[tuple[Path, str], ...], entries: tuple[tuple[str, tuple[int, ...]], ...]
+) -> tuple[str, bytes, dict[str, Any]]:
+    """Return the text's digest, its bitcode and its entries by name."""
     digest = hashlib.sha256(text.encode()).hexdigest()
-    module = _module(f"valve_kernel_{digest}")
     file = kernel_file(digest, text)
-    exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
-    for i, (path, source) in enumerate(sources):
-        part = _module(f"{module.__name__}_{i}")
-        execute(source, path, part.__dict__)
-        _inlined(part.__dict__)
-        module.__dict__.update({f"{name}_{i}": value for name, value in part.__dict__.items() if name[0] != "_"})
-    entries = {name: getattr(module, name) for name, _ in signatures}
-    _inlined(module.__dict__)
-    try:
-        with _locked(file):
-            return digest, {
-                name: numba.njit(f"void({','.join(signature)})", cache=True, nogil=True, **OPTIONS)(entries[name])
-                for name, signature in signatures
-            }
-    except Exception as error:
-        if not sources:
-            raise
-        where = ", ".join(str(path) for path, _ in sources)
-        raise InputError(where, f"cannot be compiled: {_reason(error)}") from None
+    kept = file.with_suffix(BITCODE)
+    with _locked(file):
+        if kept.is_file():
+            code = kept.read_bytes()
+            with suppress(RuntimeError):  # torn by a machine that went down
+                return digest, code, loaded(code, dict(entries))
+        from sim.kernel_compiler import bitcode  # numba takes half a second to begin
 
-
-def _reason(error: Exception) -> str:
-    """Return what numba says first: the cause and its line, without the callers that follow."""
-    return " ".join(NESTED.sub("", str(error).partition("During: ")[0]).split())
-
-
-def _module(name: str) -> ModuleType:
-    """Return a new module where numba finds it when it reads a cached function."""
-    sys.modules[name] = ModuleType(name)
-    return sys.modules[name]
-
-
-def _inlined(namespace: dict[str, Any]) -> None:
-    """Make the functions of a namespace compiled ones; inlining them triples the speed."""
-    for name, value in list(namespace.items()):
-        if isinstance(value, FunctionType) and (value.__globals__ is namespace or _is_shared(value)):
-            namespace[name] = numba.njit(forceinline=name not in NOT_INLINED, **INNER)(value)
-
-
-def _is_shared(function: FunctionType) -> bool:
-    return any(function.__globals__ is each.__dict__ for each in SHARED)
+        code = bitcode(text, file, sources, dict(entries))
+        with suppress(OSError):  # a full disk
+            _replace(kept, code)
+    return digest, code, loaded(code, dict(entries))
 
 
 def kernel_file(digest: str, text: str) -> Path:
@@ -205,15 +175,20 @@ def kernel_file(digest: str, text: str) -> Path:
 
 
 def _write(path: Path, text: str) -> Path:
-    (path.parent / "__pycache__").mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     _make_private(path.parent)
-    if not os.access(path.parent / "__pycache__", os.W_OK):
+    if not os.access(path.parent, os.W_OK):
         raise PermissionError
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
-            file.write(text)
-        Path(file.name).replace(path)
+        _replace(path, text.encode())
     return path
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file so that nobody ever sees a part of it."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(content)
+    Path(file.name).replace(path)
 
 
 def _make_private(folder: Path) -> None:
@@ -231,7 +206,7 @@ def _make_private(folder: Path) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Keep other processes from compiling the file meanwhile: numba's index of the cache is not safe against them.
+    """Keep other processes from compiling the file meanwhile.
 
     Where the file system has no locks each compiles for itself.
     """
@@ -251,7 +226,7 @@ def _temporary_folder() -> Path:
 def _text(effects: Sequence[Effect], laws: str) -> str:
     """Return a kernel's text: the laws, and their places filled."""
     digests = {each.name: hashlib.sha256(each.source.encode()).hexdigest() for each in effects}
-    files = (__file__, *(str(each.__file__) for each in SHARED))
+    files = (__file__, str(COMPILER), *(str(each.__file__) for each in SHARED))
     parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
-    head = f"# numba {numba.__version__}, {parts}, effects {digests}"
+    head = f"# numba {version('numba')}, {parts}, effects {digests}"
     return "\n".join([head, laws, kernel_source(effects) if effects else "", ""])

@@ -8,9 +8,12 @@ for the old memory, carries its memory over the step, and shows its output for t
 from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
+from sim import first_order_lag
 from sim.effect import PLACES, Effect
 from sim.karnopp import BASE_PARAMETERS, MEMORY
 
+SHARED = (first_order_lag,)
+"""Elements that effects may import; compiled with them."""
 STEM = {name: f"stem.{name}" for name in ("t", "x", "v", "p")} | {"middle": "stem.t"}
 LEVELS = {name: name for name in ("F_c", "F_s", "direction")}
 MOVED = {name: name for name in ("F_e", "stiffness", "x", "v")}

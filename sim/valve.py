@@ -1,5 +1,6 @@
 """A control valve in virtual time: hold a command for a period, read where the stem is."""
 
+from collections.abc import Callable
 from math import isfinite
 from typing import Self
 
@@ -9,7 +10,7 @@ import numpy.typing as npt
 from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.karnopp import TOLERANCE, karnopp, read
-from sim.open_loop import STEP_S, Response, at_rest, checked_step, follow
+from sim.open_loop import PATH_ROWS, STEP_S, Response, at_rest, checked_step, follow
 
 
 class Valve:
@@ -19,9 +20,9 @@ class Valve:
         self._composition = composition
         self._theta = composition.theta.copy()
         self._step_s = checked_step(step_s)
-        self._respond = composition.kernel.respond
-        self._command, self._period, self._path = np.zeros(1), np.zeros(1), np.zeros((5, 2))
+        self._command, self._period, self._path = np.zeros(1), np.zeros(1), np.zeros((PATH_ROWS, 2))
         self._state = at_rest(composition, self._theta, 0.0, 0.0, 0.0)
+        self._respond = self._bound()
 
     @classmethod
     def from_file(cls, file: ValveFile, *, step_s: float = STEP_S, source: str = "valve file") -> Self:
@@ -41,6 +42,7 @@ class Valve:
         valve = karnopp(self._theta)
         held = valve.k_s * position_m / valve.A if pressure_pa is None else pressure_pa
         self._state = at_rest(self._composition, self._theta, self.time_s, position_m, held)
+        self._respond = self._bound()
 
     def advance(self, command_pa: float, duration_s: float) -> None:
         """Hold a command (Pa) for a duration (s), cut into equal steps of at most step_s.
@@ -52,7 +54,7 @@ class Valve:
             raise ValueError(f"cannot hold {command_pa} Pa for {duration_s} s")
         self._command[0] = command_pa
         self._period[0] = duration_s
-        self._respond(self._theta, self._state, self._command, self._period, self._step_s, TOLERANCE, self._path)
+        self._respond()
 
     def run(self, command_pa: npt.ArrayLike, period_s: npt.ArrayLike) -> Response:
         """Hold n commands (Pa) in turn, each for its period (s, one for all or n); as n calls of `advance`.
@@ -71,6 +73,12 @@ class Valve:
             InputError: an unknown name or a value that is not physical; nothing is changed then.
         """
         self._theta = self._composition.changed(self._theta, parameters)
+        self._respond = self._bound()
+
+    def _bound(self) -> Callable[[], None]:
+        return self._composition.kernel.respond.bound(
+            self._theta, self._state, self._command, self._period, self._step_s, TOLERANCE, self._path
+        )
 
     @property
     def by_setpoint(self) -> bool:

@@ -43,10 +43,13 @@ typedef struct {
     Callbacks calls;
 } Instance;
 
-/* The kernel's functions, in numba's convention: where a result and an exception would go, then the arguments. */
-int32_t valve_rest(void **, void **, double *theta, double *state, double time, double position, double command);
-int32_t valve_respond(void **, void **, double *theta, double *state, double *command, double *period, double longest,
-                      double tolerance, double *path);
+/* The kernel's functions, in numba's convention: where a result and an exception would go, then the arguments, an array
+ * as its address and its shape. */
+int32_t valve_rest(void **, void **, double *theta, intptr_t parameters, double *state, intptr_t size, double time,
+                   double position, double command);
+int32_t valve_respond(void **, void **, double *theta, intptr_t parameters, double *state, intptr_t size,
+                      double *command, intptr_t commands, double *period, intptr_t periods, double longest,
+                      double tolerance, double *path, intptr_t rows, intptr_t columns);
 
 /* What the kernel's text names of numba's run time and never comes to: its arrays are ours, nothing is freed. */
 void NRT_MemInfo_call_dtor(void *memory) { (void)memory; }
@@ -89,8 +92,8 @@ static Status rest(Instance *it) {
     if (!isfinite(valve->values[FIRST_POSITION]) || !isfinite(valve->values[FIRST_COMMAND]))
         return said(it, ERROR, "initial position or command is not finite: %g", valve->values[FIRST_POSITION]);
     memset(valve->state, 0, sizeof valve->state);
-    if (valve_rest(&result, &exception, valve->values + FIRST_PARAMETER, valve->state, valve->start_time,
-                   valve->values[FIRST_POSITION], valve->values[FIRST_COMMAND]))
+    if (valve_rest(&result, &exception, valve->values + FIRST_PARAMETER, PARAMETERS, valve->state, STATE,
+                   valve->start_time, valve->values[FIRST_POSITION], valve->values[FIRST_COMMAND]))
         return said(it, ERROR, "an effect cannot be at rest at %g m", valve->values[FIRST_POSITION]);
     /* The state begins with time, position, velocity, pressure, mode, direction, indicated position. */
     path[2 * ROW_X + 1] = valve->state[1];
@@ -189,8 +192,8 @@ API Status fmi2DoStep(void *c, double now, double duration, int no_return) {
     if (!(duration > 0.0 && isfinite(duration))) return said(it, ERROR, "cannot step over %g s", duration);
     Status status = check(it);
     if (status != OK) return status;
-    if (valve_respond(&result, &exception, it->valve.values + FIRST_PARAMETER, it->valve.state, &it->valve.values[INPUT],
-                      &duration, STEP_S, TOLERANCE, path))
+    if (valve_respond(&result, &exception, it->valve.values + FIRST_PARAMETER, PARAMETERS, it->valve.state, STATE,
+                      &it->valve.values[INPUT], 1, &duration, 1, STEP_S, TOLERANCE, path, ROWS, 2))
         return said(it, ERROR, "an effect failed in the step from %g s", now);
     show(&it->valve, path);
     return OK;

@@ -84,8 +84,12 @@ def test_help_needs_nothing_but_the_standard_library() -> None:
     assert not {"numpy", "numba", "pydantic", "pymodbus", "scipy", "sim", "matplotlib"} & set(loaded)
 
 
-def test_a_gateway_without_the_model_side_is_told_what_is_missing(tmp_path: Path) -> None:
-    (tmp_path / "numba.py").write_text("raise ModuleNotFoundError(\"No module named 'numba'\", name='numba')\n")
+@pytest.mark.parametrize("missing", ["numba", "llvmlite"])
+def test_a_gateway_without_the_model_side_is_told_what_is_missing(missing: str, tmp_path: Path) -> None:
+    """numba where no kernel is there yet, without which nothing can be simulated in any case."""
+    (tmp_path / f"{missing}.py").write_text(
+        f"raise ModuleNotFoundError(\"No module named '{missing}'\", name='{missing}')\n"
+    )
     (tmp_path / "pressure.csv").write_text("time_s,command_pa\n0,0\n1,0\n")
     words = ["simulate", "seed", "--input", str(tmp_path / "pressure.csv"), "-o", str(tmp_path / "out.csv")]
     done = subprocess.run(
@@ -93,10 +97,10 @@ def test_a_gateway_without_the_model_side_is_told_what_is_missing(tmp_path: Path
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        env={**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path)},
     )
     assert done.returncode == 2
-    assert "needs numba, which is not installed: pip install 'positioner[sim,plot]'" in done.stderr
+    assert f"needs {missing}, which is not installed: pip install 'positioner[sim,plot]'" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -55,12 +55,12 @@ def test_importing_it_loads_nothing_but_the_standard_library() -> None:
 
 def test_a_gateway_has_all_that_needs_no_extra() -> None:
     named = "Device Driver Reading NoReply Recording InputError valve respond estimate write_valve Port"
-    absent = without("numba", "scipy", "matplotlib", "pandas", "pyarrow", "plotly", "canopen")
+    absent = without("numba", "llvmlite", "scipy", "matplotlib", "pandas", "pyarrow", "plotly", "canopen")
     done = python(absent + "\n".join(f"pos.{name}" for name in named.split()))
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(("name", "missing"), [("compare", "numba"), ("fit", "scipy"), ("simulate", "numba")])
+@pytest.mark.parametrize(("name", "missing"), [("compare", "llvmlite"), ("fit", "scipy"), ("simulate", "llvmlite")])
 def test_what_needs_an_extra_names_it_in_one_line(name: str, missing: str) -> None:
     done = python(without(missing) + f"pos.{name}")
     assert done.stderr.splitlines()[-1] == (

@@ -19,6 +19,7 @@ ASYMMETRIC = ValveFile(
     effect=(EffectTable.model_validate({"name": "asymmetric_friction", "asymmetry": 0.2}),),
 )
 PROBE = """
+import sys
 from config.valve_file import load_valve, shipped_valve
 from sim.composition import Composition
 from sim.valve import Valve
@@ -26,8 +27,7 @@ from sim.valve import Valve
 composition = Composition.from_file(load_valve(shipped_valve("seed")))
 valve = Valve(composition)
 valve.advance(60e3, 0.02)
-stats = composition.kernel.respond.stats
-print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()), valve.position_m.hex())
+print("numba" in sys.modules, valve.position_m.hex())
 """
 
 
@@ -36,8 +36,8 @@ def test_of_processes_that_begin_at_once_one_compiles_and_the_others_take_its_ke
     command = [sys.executable, "-c", PROBE]
     probes = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     said = [process.communicate()[0].split() for process in probes]
-    assert sorted(each[:2] for each in said) == [["0", "1"], ["1", "0"], ["1", "0"]], "hits, misses"
-    assert len({position for _, _, position in said}) == 1
+    assert sorted(compiles for compiles, _ in said) == ["False", "False", "True"], "the others do not even start numba"
+    assert len({position for _, position in said}) == 1
 
 
 def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:
@@ -72,6 +72,17 @@ def test_edited_physics_is_another_kernel(tmp_path: Path, monkeypatch: pytest.Mo
     valve.advance(1.9 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
     assert composition.kernel.digest != before
     assert valve.position_m == 0.0
+
+
+def test_a_torn_kernel_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    torn = compiled.kernel_file("digest", "text").parent
+    whole = Composition.from_file(SEED).kernel
+    (torn / f"{whole.digest}{compiled.BITCODE}").write_bytes(whole.bitcode[:1000])
+    compiled._compiled.cache_clear()
+    anew = Composition.from_file(SEED).kernel.bitcode
+    assert len(anew) > 0.9 * len(whole.bitcode)
+    assert (torn / f"{whole.digest}{compiled.BITCODE}").read_bytes() == anew
 
 
 def test_without_a_writable_cache_the_text_lies_in_a_private_folder(

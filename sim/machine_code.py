@@ -1,0 +1,120 @@
+"""A kernel's machine code: made of its bitcode for this processor when it is loaded, called with numpy's arrays.
+
+Neither takes numba, whose start takes longer than all of this. The functions are of its convention: where a result and
+an exception would go, then the arguments, an array as its address and its shape; they return a status, 0 if all is
+well. Other threads go on while one runs. No operations are fused: the numbers are those of the kernel's text.
+"""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from ctypes import CFUNCTYPE, byref, c_double, c_int32, c_ssize_t, c_void_p, cast
+from functools import cache
+from itertools import count
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from llvmlite import binding
+
+NUMBER, VECTOR, MATRIX = range(3)
+"""Kinds of arguments, by their dimensions: of float64, arrays contiguous."""
+TYPES: Mapping[int, tuple[Any, ...]] = {
+    kind: (c_void_p, *[c_ssize_t] * kind) if kind else (c_double,) for kind in (NUMBER, VECTOR, MATRIX)
+}
+FLOAT64 = np.dtype(np.float64)
+INTRINSIC = "llvm."
+UNREACHED = ("NRT_MemInfo_call_dtor", "NRT_Free")
+"""What is named of numba's run time and never comes to: the arrays are numpy's, nothing is freed."""
+_nothing = CFUNCTYPE(None, c_void_p)(lambda _: None)
+_libraries = count()
+_one_at_a_time = Lock()
+
+
+class Entry:
+    """A compiled function of a kernel, to be called as the function of its text.
+
+    Raises when called:
+        TypeError: an array that is no contiguous one of float64, or of other dimensions.
+        RuntimeError: an effect raised an exception.
+    """
+
+    def __init__(self, name: str, kinds: Sequence[int], code: Any) -> None:
+        self._name, self._kinds = name, kinds
+        self._code = code
+        """Kept as long as anybody may call it."""
+        types = [each for kind in kinds for each in TYPES[kind]]
+        self._function = CFUNCTYPE(c_int32, c_void_p, c_void_p, *types)(code[name])
+
+    def __call__(self, *values: Any) -> None:
+        """Call it once."""
+        self.bound(*values)()
+
+    def bound(self, *values: Any) -> Callable[[], None]:
+        """Return the call with these values, to be made many times: of arrays, with what is in them then."""
+        words = [word for kind, value in zip(self._kinds, values, strict=True) for word in self._words(kind, value)]
+        result, exception = c_void_p(), c_void_p()
+        given = (byref(result), byref(exception), *words)
+        function = self._function
+
+        def call(_kept: object = values) -> None:
+            if function(*given):
+                raise RuntimeError(f"an effect failed in {self._name}")
+
+        return call
+
+    def _words(self, kind: int, value: Any) -> tuple[Any, ...]:
+        if kind == NUMBER:
+            return (value,)
+        if value.dtype != FLOAT64 or value.ndim != kind or not value.flags.c_contiguous:
+            raise TypeError(f"{self._name} takes contiguous float64, not {value.dtype} of shape {value.shape}")
+        return (value.ctypes.data, *value.shape)
+
+
+def loaded(bitcode: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Entry]:
+    """Return the functions of these names, whose arguments are of these kinds.
+
+    Raises:
+        RuntimeError: it is no bitcode, or names what is nowhere to be found.
+    """
+    with _one_at_a_time:
+        compiler = _compiler()
+        module = binding.parse_bitcode(bitcode)
+        builder = binding.JITLibraryBuilder().add_object_img(_processor().emit_object(module))
+        for function in module.functions:
+            if function.is_declaration and not function.name.startswith(INTRINSIC):
+                builder.import_symbol(function.name, _address(function.name))
+        for name in entries:
+            builder.export_symbol(name)
+        code = builder.add_current_process().link(compiler, f"kernel {next(_libraries)}")
+    return {name: Entry(name, kinds, code) for name, kinds in entries.items()}
+
+
+def _address(name: str) -> int:
+    if name in UNREACHED:
+        return cast(_nothing, c_void_p).value or 0
+    found = binding.address_of_symbol(name)
+    if found is None:  # an effect makes arrays of its own
+        from numba.core.registry import cpu_target
+
+        cpu_target.target_context.refresh()
+        found = binding.address_of_symbol(name)
+    if found is None:
+        raise RuntimeError(f"a kernel names {name}, which is nowhere to be found")
+    return int(found)
+
+
+@cache
+def _compiler() -> Any:
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding.create_lljit_compiler()
+
+
+@cache
+def _processor() -> Any:
+    """Return what translates for this processor, or for the one that numba is told of as well."""
+    name, features = os.environ.get("NUMBA_CPU_NAME"), ""
+    if not name:
+        name, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    target = binding.Target.from_triple(binding.get_process_triple())
+    return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic", codemodel="default")
