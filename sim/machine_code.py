@@ -11,7 +11,7 @@ from ctypes import CFUNCTYPE, byref, c_double, c_int32, c_ssize_t, c_void_p, cas
 from functools import cache
 from itertools import count
 from threading import Lock
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from llvmlite import binding
@@ -61,6 +61,10 @@ class Entry:
                 raise RuntimeError(f"an effect failed in {self._name}")
 
         return call
+
+    def __deepcopy__(self, _: object) -> Self:
+        """Return itself: nothing in it changes."""
+        return self
 
     def _words(self, kind: int, value: Any) -> tuple[Any, ...]:
         if kind == NUMBER:

@@ -1,8 +1,8 @@
 """A control valve in virtual time: hold a command for a period, read where the stem is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import isfinite
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +73,15 @@ class Valve:
             InputError: an unknown name or a value that is not physical; nothing is changed then.
         """
         self._theta = self._composition.changed(self._theta, parameters)
+        self._respond = self._bound()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy takes over: all but the call, which is made for these arrays."""
+        return {name: value for name, value in self.__dict__.items() if name != "_respond"}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Become a copy, which moves by itself."""
+        self.__dict__.update(state)
         self._respond = self._bound()
 
     def _bound(self) -> Callable[[], None]:

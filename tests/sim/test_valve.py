@@ -1,6 +1,7 @@
 """The valve as the other rooms use it."""
 
 import math
+from copy import deepcopy
 from dataclasses import fields
 
 import numpy as np
@@ -45,6 +46,16 @@ def test_a_run_goes_on_where_the_last_one_ended() -> None:
     response = whole.run(COMMANDS, 1e-3)
     assert np.concatenate([first.position_m, second.position_m[1:]]).tolist() == response.position_m.tolist()
     assert first.time_s[-1] == second.time_s[0]
+
+
+def test_a_copy_moves_by_itself() -> None:
+    valve = Valve.from_file(SEED)
+    valve.advance(60e3, 0.05)
+    before_m, copied = valve.position_m, deepcopy(valve)
+    copied.advance(90e3, 0.05)
+    assert valve.position_m == before_m
+    valve.advance(90e3, 0.05)
+    assert copied.position_m == valve.position_m > before_m
 
 
 def test_a_period_that_is_no_multiple_of_the_step() -> None:
