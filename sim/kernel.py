@@ -2,9 +2,10 @@
 
 The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which
 the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
-effects' texts, of the elements they share, of this file and of the compiler, and the numba version. Beside it is kept
-what `kernel_compiler` makes of it, so that numba is started only where a kernel is new. A change in any of them is
-another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
+effects' texts, of the elements they share, of this file and of the compiler, and the numba version. A change in any of
+them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was
+hashed. Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a processor, so
+that numba is started, and LLVM translates, only where a kernel is new.
 
 Of several processes that need a kernel at once, one compiles and the others wait: the file is locked meanwhile.
 """
@@ -27,7 +28,7 @@ from sim import karnopp, quasi_static
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import SHARED, kernel_source
-from sim.machine_code import MATRIX, NUMBER, VECTOR, loaded
+from sim.machine_code import MATRIX, NUMBER, VECTOR, loaded, processor, translated
 
 BASE = Path(karnopp.__file__)
 SLOW = Path(quasi_static.__file__)
@@ -151,18 +152,18 @@ def _compiled(
     """Return the text's digest, its bitcode and its entries by name."""
     digest = hashlib.sha256(text.encode()).hexdigest()
     file = kernel_file(digest, text)
-    kept = file.with_suffix(BITCODE)
+    kept, code = file.with_suffix(BITCODE), file.with_suffix(f".{processor()}.o")
     with _locked(file):
-        if kept.is_file():
-            code = kept.read_bytes()
-            with suppress(RuntimeError):  # torn by a machine that went down
-                return digest, code, loaded(code, dict(entries))
+        with suppress(OSError, RuntimeError):  # not there, or torn by a machine that went down
+            return digest, kept.read_bytes(), loaded(code.read_bytes(), dict(entries))
         from sim.kernel_compiler import bitcode  # numba takes half a second to begin
 
-        code = bitcode(text, file, sources, dict(entries))
+        made = bitcode(text, file, sources, dict(entries))
+        machine_code = translated(made)
         with suppress(OSError):  # a full disk
-            _replace(kept, code)
-    return digest, code, loaded(code, dict(entries))
+            _replace(kept, made)
+            _replace(code, machine_code)
+    return digest, made, loaded(machine_code, dict(entries))
 
 
 def kernel_file(digest: str, text: str) -> Path:

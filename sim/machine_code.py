@@ -1,10 +1,11 @@
-"""A kernel's machine code: made of its bitcode for this processor when it is loaded, called with numpy's arrays.
+"""A kernel's machine code: translated from its bitcode for this processor, loaded, called with numpy's arrays.
 
 Neither takes numba, whose start takes longer than all of this. The functions are of its convention: where a result and
 an exception would go, then the arguments, an array as its address and its shape; they return a status, 0 if all is
 well. Other threads go on while one runs. No operations are fused: the numbers are those of the kernel's text.
 """
 
+import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import CFUNCTYPE, byref, c_double, c_int32, c_ssize_t, c_void_p, cast
@@ -13,6 +14,7 @@ from itertools import count
 from threading import Lock
 from typing import Any, Self
 
+import llvmlite
 import numpy as np
 from llvmlite import binding
 
@@ -74,23 +76,40 @@ class Entry:
         return (value.ctypes.data, *value.shape)
 
 
-def loaded(bitcode: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Entry]:
-    """Return the functions of these names, whose arguments are of these kinds.
+def processor() -> str:
+    """Return what the code is translated for, as a word: whether what is kept fits here."""
+    return hashlib.sha256(repr((llvmlite.__version__, *_features())).encode()).hexdigest()[:16]
+
+
+def translated(bitcode: bytes) -> bytes:
+    """Return the machine code of bitcode: a line of the names that it takes from elsewhere, then an object file.
 
     Raises:
-        RuntimeError: it is no bitcode, or names what is nowhere to be found.
+        RuntimeError: it is no bitcode.
     """
     with _one_at_a_time:
-        compiler = _compiler()
         module = binding.parse_bitcode(bitcode)
-        builder = binding.JITLibraryBuilder().add_object_img(_processor().emit_object(module))
-        for function in module.functions:
-            if function.is_declaration and not function.name.startswith(INTRINSIC):
-                builder.import_symbol(function.name, _address(function.name))
+        names = [each.name for each in module.functions if each.is_declaration]
+        code = bytes(_machine().emit_object(module))
+    return " ".join(each for each in names if not each.startswith(INTRINSIC)).encode() + b"\n" + code
+
+
+def loaded(code: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Entry]:
+    """Return the functions of these names, whose arguments are of these kinds, of translated bitcode.
+
+    Raises:
+        RuntimeError: it is no such code, or names what is nowhere to be found.
+    """
+    names, _, object_file = code.partition(b"\n")
+    with _one_at_a_time:
+        compiler = _compiler()  # before names are looked up: LLVM then knows this process
+        builder = binding.JITLibraryBuilder().add_object_img(object_file)
+        for each in names.decode(errors="replace").split():
+            builder.import_symbol(each, _address(each))
         for name in entries:
             builder.export_symbol(name)
-        code = builder.add_current_process().link(compiler, f"kernel {next(_libraries)}")
-    return {name: Entry(name, kinds, code) for name, kinds in entries.items()}
+        library = builder.add_current_process().link(compiler, f"kernel {next(_libraries)}")
+    return {name: Entry(name, kinds, library) for name, kinds in entries.items()}
 
 
 def _address(name: str) -> int:
@@ -109,16 +128,20 @@ def _address(name: str) -> int:
 
 @cache
 def _compiler() -> Any:
-    binding.initialize_native_target()
-    binding.initialize_native_asmprinter()
+    _machine()
     return binding.create_lljit_compiler()
 
 
 @cache
-def _processor() -> Any:
-    """Return what translates for this processor, or for the one that numba is told of as well."""
-    name, features = os.environ.get("NUMBA_CPU_NAME"), ""
-    if not name:
-        name, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+def _machine() -> Any:
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    name, features = _features()
     target = binding.Target.from_triple(binding.get_process_triple())
     return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic", codemodel="default")
+
+
+def _features() -> tuple[str, str]:
+    """Return this processor's name and features, or the name of the one that numba is told of as well."""
+    told = os.environ.get("NUMBA_CPU_NAME")
+    return (told, "") if told else (binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())

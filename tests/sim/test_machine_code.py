@@ -12,7 +12,8 @@ from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.effect import read_effect
 from sim.karnopp import TOLERANCE
-from sim.machine_code import loaded
+from sim.kernel import ENTRIES
+from sim.machine_code import loaded, translated
 from sim.valve import Valve
 
 SEED = load_valve(shipped_valve("seed"))
@@ -75,6 +76,11 @@ def test_an_effect_that_makes_arrays_runs_where_it_was_compiled_and_where_it_is_
     assert again.stdout.strip() == valve.position_m.hex(), again.stderr
 
 
-def test_what_is_no_bitcode_is_an_error_and_not_the_end_of_the_process() -> None:
+@pytest.mark.parametrize("part", [0.0, 0.01, 0.5, 0.99])
+def test_what_is_torn_is_an_error_and_not_the_end_of_the_process(part: float) -> None:
+    bitcode = Composition.from_file(SEED).kernel.bitcode
+    code = translated(bitcode)
     with pytest.raises(RuntimeError):
-        loaded(b"BC\xc0\xde torn", {"rest": (1,)})
+        translated(bitcode[: round(part * len(bitcode))])
+    with pytest.raises(RuntimeError):
+        loaded(code[: round(part * len(code))], ENTRIES)
