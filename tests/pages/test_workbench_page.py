@@ -96,7 +96,7 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
 
         # Dragging changes the error, and undo takes it back.
         slider = page.get_by_test_id("slider-spring_n_per_m")
-        slider.scroll_into_view_if_needed()
+        slider.hover()  # once it stands still: plots that are drawn anew above it move it
         box, said = slider.bounding_box(), page.get_by_test_id("sentences").inner_text()
         assert box is not None
         middle_y = box["y"] + box["height"] / 2
