@@ -2,10 +2,10 @@
 
 The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which
 the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
-effects' texts, of the elements they share, of this file and of the compiler, and the numba version. A change in any of
-them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was
-hashed. Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a processor, so
-that numba is started, and LLVM translates, only where a kernel is new.
+effects' texts, of the elements they share, of this file and of those that compile, and the numba version. A change in
+any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that
+was hashed. Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a
+processor, so that numba is started, and LLVM translates, only where a kernel is new.
 
 Of several processes that need a kernel at once, one compiles and the others wait: the file is locked meanwhile.
 """
@@ -16,19 +16,19 @@ import hashlib
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from sim import karnopp, quasi_static
+from sim import karnopp, machine_code, quasi_static
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import SHARED, kernel_source
-from sim.machine_code import MATRIX, NUMBER, VECTOR, loaded, processor, translated
+from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, loaded, processor, translated
 
 BASE = Path(karnopp.__file__)
 SLOW = Path(quasi_static.__file__)
@@ -48,50 +48,6 @@ SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
 }
 
 
-class _Rest(Protocol):
-    def __call__(self, theta: Vector, state: Vector, time: float, position: float, command: float, /) -> None: ...
-
-
-class _Respond(Protocol):
-    def __call__(
-        self,
-        theta: Vector,
-        state: Vector,
-        commands: Vector,
-        periods: Vector,
-        longest_step: float,
-        tolerance: float,
-        path: Vector,
-        /,
-    ) -> None: ...
-
-    def bound(
-        self,
-        theta: Vector,
-        state: Vector,
-        commands: Vector,
-        periods: Vector,
-        longest_step: float,
-        tolerance: float,
-        path: Vector,
-        /,
-    ) -> Callable[[], None]: ...
-
-
-class _Glide(Protocol):
-    def __call__(
-        self,
-        theta: Vector,
-        state: Vector,
-        commands: Vector,
-        periods: Vector,
-        told: Vector,
-        longest_step: float,
-        path: Vector,
-        /,
-    ) -> None: ...
-
-
 @dataclass(frozen=True, slots=True)
 class Kernel:
     """`rest` and `respond` of `karnopp.py`, compiled with the effects in their places."""
@@ -100,8 +56,8 @@ class Kernel:
     bitcode: bytes = field(repr=False)
     """LLVM's, of the functions as `sim.machine_code` calls them."""
     state_size: int
-    rest: _Rest
-    respond: _Respond
+    rest: Entry[Vector, Vector, float, float, float]
+    respond: Entry[Vector, Vector, Vector, Vector, float, float, Vector]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +66,8 @@ class QuasiStaticKernel:
 
     digest: str
     state_size: int
-    rest: _Rest
-    glide: _Glide
+    rest: Entry[Vector, Vector, float, float, float]
+    glide: Entry[Vector, Vector, Vector, Vector, Vector, float, Vector]
 
 
 def kernel(effects: Sequence[Effect]) -> Kernel:
@@ -227,7 +183,7 @@ def _temporary_folder() -> Path:
 def _text(effects: Sequence[Effect], laws: str) -> str:
     """Return a kernel's text: the laws, and their places filled."""
     digests = {each.name: hashlib.sha256(each.source.encode()).hexdigest() for each in effects}
-    files = (__file__, str(COMPILER), *(str(each.__file__) for each in SHARED))
+    files = (__file__, str(COMPILER), machine_code.__file__, *(str(each.__file__) for each in SHARED))
     parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
     head = f"# numba {version('numba')}, {parts}, effects {digests}"
     return "\n".join([head, laws, kernel_source(effects) if effects else "", ""])

@@ -12,7 +12,7 @@ from ctypes import CFUNCTYPE, byref, c_double, c_int32, c_ssize_t, c_void_p, cas
 from functools import cache
 from itertools import count
 from threading import Lock
-from typing import Any, Self
+from typing import Any, Generic, Self, TypeVarTuple
 
 import llvmlite
 import numpy as np
@@ -27,12 +27,13 @@ FLOAT64 = np.dtype(np.float64)
 INTRINSIC = "llvm."
 UNREACHED = ("NRT_MemInfo_call_dtor", "NRT_Free")
 """What is named of numba's run time and never comes to: the arrays are numpy's, nothing is freed."""
+Arguments = TypeVarTuple("Arguments")
 _nothing = CFUNCTYPE(None, c_void_p)(lambda _: None)
 _libraries = count()
 _one_at_a_time = Lock()
 
 
-class Entry:
+class Entry(Generic[*Arguments]):
     """A compiled function of a kernel, to be called as the function of its text.
 
     Raises when called:
@@ -47,13 +48,14 @@ class Entry:
         types = [each for kind in kinds for each in TYPES[kind]]
         self._function = CFUNCTYPE(c_int32, c_void_p, c_void_p, *types)(code[name])
 
-    def __call__(self, *values: Any) -> None:
+    def __call__(self, *values: *Arguments) -> None:
         """Call it once."""
         self.bound(*values)()
 
-    def bound(self, *values: Any) -> Callable[[], None]:
+    def bound(self, *values: *Arguments) -> Callable[[], None]:
         """Return the call with these values, to be made many times: of arrays, with what is in them then."""
-        words = [word for kind, value in zip(self._kinds, values, strict=True) for word in self._words(kind, value)]
+        each: tuple[Any, ...] = values
+        words = [word for kind, value in zip(self._kinds, each, strict=True) for word in self._words(kind, value)]
         result, exception = c_void_p(), c_void_p()
         given = (byref(result), byref(exception), *words)
         function = self._function
@@ -90,11 +92,11 @@ def translated(bitcode: bytes) -> bytes:
     with _one_at_a_time:
         module = binding.parse_bitcode(bitcode)
         names = [each.name for each in module.functions if each.is_declaration]
-        code = bytes(_machine().emit_object(module))
+        code = bytes(target_machine(*_features()).emit_object(module))
     return " ".join(each for each in names if not each.startswith(INTRINSIC)).encode() + b"\n" + code
 
 
-def loaded(code: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Entry]:
+def loaded(code: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Any]:
     """Return the functions of these names, whose arguments are of these kinds, of translated bitcode.
 
     Raises:
@@ -128,15 +130,15 @@ def _address(name: str) -> int:
 
 @cache
 def _compiler() -> Any:
-    _machine()
+    target_machine(*_features())  # LLVM then knows this machine
     return binding.create_lljit_compiler()
 
 
 @cache
-def _machine() -> Any:
+def target_machine(name: str = "", features: str = "") -> Any:
+    """Return what translates for a processor; by default for any of this machine's kind."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    name, features = _features()
     target = binding.Target.from_triple(binding.get_process_triple())
     return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic", codemodel="default")
 

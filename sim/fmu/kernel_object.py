@@ -8,16 +8,14 @@ either, so that the numbers are those of our own simulation.
 from llvmlite import binding
 
 from sim.composition import Composition
+from sim.machine_code import target_machine
 
 NAMES = {"rest": "valve_rest", "respond": "valve_respond"}
 
 
 def kernel_object(composition: Composition) -> bytes:
     """Return an object file (ELF) with `valve_rest` and `valve_respond`."""
-    bitcode = composition.kernel.bitcode  # whose making has told LLVM of this machine
-    module = binding.parse_bitcode(bitcode)
+    module = binding.parse_bitcode(composition.kernel.bitcode)
     for function in module.functions:
         function.name = NAMES.get(function.name, function.name)
-    target = binding.Target.from_triple(binding.get_process_triple())
-    machine = target.create_target_machine(cpu="", opt=3, reloc="pic", codemodel="default")
-    return bytes(machine.emit_object(module))
+    return bytes(target_machine().emit_object(module))
