@@ -34,9 +34,9 @@ is solved exactly, however stiff, by the response g to an impulse (g(0) = 0, g'(
 for n = n_0 + n_1 tau / s + n_2 (tau / s)^2. On the bare valve beyond the Stribeck range n is a straight line: there a
 step has no error. The error estimate is what the quadratic term changes of v.
 
-The file is plain Python and runs as it stands: the bare valve. `sim.kernel` compiles this text after putting the
-effects of a valve file into the places at its end, which stand empty here. All that is compiled must stand in
-this file or in an effect's own: a kernel is cached under the digest of these texts.
+The file is plain Python and runs as it stands: the bare valve. `sim.kernel` compiles this text, and in place of the
+functions at its end, which stand empty here, those that the effects of a valve file fill. All that is compiled must
+stand in this file or in an effect's own: a kernel is cached under the digest of these texts.
 """
 
 # ruff: noqa: ARG001 -- an empty place takes what a full one needs.

@@ -1,11 +1,12 @@
 """Compiles the bare valve with a set of effects in their places into one kernel, cached across processes.
 
-The kernel's text is `karnopp.py` with its empty places filled: each effect's functions called in the order in which
-the effects are listed. The text is written to a cache folder under its own SHA-256; its head holds the digests of the
-effects' texts, of the elements they share, of this file and of those that compile, and the numba version. A change in
-any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that
-was hashed. Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a
-processor, so that numba is started, and LLVM translates, only where a kernel is new.
+The laws, `karnopp.py`, are compiled once, with their places open; a kernel's own text is what fills these: each
+effect's functions called in the order in which the effects are listed. Both texts are written to a cache folder under
+their own SHA-256. The laws' head holds the digests of the elements that effects share, of this file and of those that
+compile, and the numba version; a kernel's head those of the laws and of the effects' texts. A change in any of them is
+another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
+Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a processor, so that
+numba is started, and LLVM translates, only where a kernel is new.
 
 Of several processes that need a kernel at once, one compiles and the others wait: the file is locked meanwhile.
 """
@@ -16,7 +17,7 @@ import hashlib
 import os
 import re
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -28,7 +29,7 @@ from sim import karnopp, machine_code, quasi_static
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import SHARED, kernel_source
-from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, loaded, processor, translated
+from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, is_bitcode, loaded, processor, translated
 
 BASE = Path(karnopp.__file__)
 SLOW = Path(quasi_static.__file__)
@@ -76,8 +77,7 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
     Raises:
         InputError: an effect's function is not what numba can compile; names its file.
     """
-    text = _text(effects, BASE.read_text(encoding="utf-8"))
-    digest, bitcode, compiled = _compiled(text, _sources(effects), tuple(ENTRIES.items()))
+    digest, bitcode, compiled = _of(effects, BASE.read_text(encoding="utf-8"), ENTRIES)
     return Kernel(digest, bitcode, _state_size(effects), **compiled)
 
 
@@ -88,38 +88,68 @@ def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
         InputError: as `kernel`.
     """
     slow = KARNOPP_IMPORT.sub("", SLOW.read_text(encoding="utf-8"))
-    text = _text(effects, "\n".join([BASE.read_text(encoding="utf-8"), slow]))
-    digest, _, compiled = _compiled(text, _sources(effects), tuple(SLOW_ENTRIES.items()))
+    laws = "\n".join([BASE.read_text(encoding="utf-8"), slow])
+    digest, _, compiled = _of(effects, laws, SLOW_ENTRIES)
     return QuasiStaticKernel(digest, _state_size(effects), **compiled)
-
-
-def _sources(effects: Sequence[Effect]) -> tuple[tuple[Path, str], ...]:
-    return tuple((each.path, each.source) for each in effects)
 
 
 def _state_size(effects: Sequence[Effect]) -> int:
     return MEMORY + sum(each.memory for each in effects)
 
 
+def _of(
+    effects: Sequence[Effect], laws: str, entries: Mapping[str, tuple[int, ...]]
+) -> tuple[str, bytes, dict[str, Any]]:
+    """Return the digest, the bitcode and the entries, by name, of the kernel of these laws and effects."""
+    laws = _with_head(laws)
+    sources = tuple((each.path, each.source) for each in effects)
+    return _compiled(laws, _text(effects, laws), sources, _state_size(effects), tuple(entries.items()))
+
+
 @cache
 def _compiled(
-    text: str, sources: tuple[tuple[Path, str], ...], entries: tuple[tuple[str, tuple[int, ...]], ...]
+    laws: str,
+    text: str,
+    sources: tuple[tuple[Path, str], ...],
+    state_size: int,
+    entries: tuple[tuple[str, tuple[int, ...]], ...],
 ) -> tuple[str, bytes, dict[str, Any]]:
-    """Return the text's digest, its bitcode and its entries by name."""
-    digest = hashlib.sha256(text.encode()).hexdigest()
+    digest, kinds = _digest(text), dict(entries)
     file = kernel_file(digest, text)
-    kept, code = file.with_suffix(BITCODE), file.with_suffix(f".{processor()}.o")
-    with _locked(file):
-        with suppress(OSError, RuntimeError):  # not there, or torn by a machine that went down
-            return digest, kept.read_bytes(), loaded(code.read_bytes(), dict(entries))
-        from sim.kernel_compiler import bitcode  # numba takes half a second to begin
+    code = file.with_suffix(f".{processor()}.o")
 
-        made = bitcode(text, file, sources, dict(entries))
-        machine_code = translated(made)
-        with suppress(OSError):  # a full disk
-            _replace(kept, made)
-            _replace(code, machine_code)
-    return digest, made, loaded(machine_code, dict(entries))
+    def filled() -> bytes:
+        from sim import kernel_compiler  # numba takes half a second to begin
+
+        file_of_laws = kernel_file(_digest(laws), laws)
+        with _locked(file_of_laws):
+            of_laws = _bitcode(file_of_laws, lambda: kernel_compiler.laws(laws, file_of_laws, kinds))
+        return kernel_compiler.filled(of_laws, text, file, sources, state_size, kinds)
+
+    with _locked(file):
+        bitcode = _bitcode(file, filled)
+        with suppress(OSError, RuntimeError):  # not there, or torn by a machine that went down
+            return digest, bitcode, loaded(code.read_bytes(), kinds)
+        machine_code = translated(bitcode)
+        _keep(code, machine_code)
+    return digest, bitcode, loaded(machine_code, kinds)
+
+
+def _bitcode(file: Path, compiled: Callable[[], bytes]) -> bytes:
+    """Return what is kept beside a text, or else compile it and keep it."""
+    kept = file.with_suffix(BITCODE)
+    with suppress(OSError):
+        found = kept.read_bytes()
+        if is_bitcode(found):  # or torn by a machine that went down
+            return found
+    made = compiled()
+    _keep(kept, made)
+    return made
+
+
+def _keep(file: Path, content: bytes) -> None:
+    with suppress(OSError):  # a full disk
+        _replace(file, content)
 
 
 def kernel_file(digest: str, text: str) -> Path:
@@ -181,9 +211,17 @@ def _temporary_folder() -> Path:
 
 
 def _text(effects: Sequence[Effect], laws: str) -> str:
-    """Return a kernel's text: the laws, and their places filled."""
-    digests = {each.name: hashlib.sha256(each.source.encode()).hexdigest() for each in effects}
+    """Return a kernel's text: what it is made of, and the laws' places, filled."""
+    digests = {each.name: _digest(each.source) for each in effects}
+    return f"# laws {_digest(laws)}, effects {digests}\n{kernel_source(effects)}\n"
+
+
+def _with_head(laws: str) -> str:
+    """Return the laws after a line of what compiles them."""
     files = (__file__, str(COMPILER), machine_code.__file__, *(str(each.__file__) for each in SHARED))
     parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
-    head = f"# numba {version('numba')}, {parts}, effects {digests}"
-    return "\n".join([head, laws, kernel_source(effects) if effects else "", ""])
+    return f"# numba {version('numba')}, {parts}\n{laws}\n"
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

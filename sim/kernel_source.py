@@ -1,11 +1,12 @@
 """Writes the functions that fill the empty places of `karnopp.py` with the effects of a valve file.
 
+A place that none of them fills is not written: it stays as it stands there.
 Effect i's functions stand in the kernel as `force_i`, `advance_i`, ...; q[i] is its parameters, z[i] its memory.
 A signal that passes through an element is known at the start and at the end of a step: the element shows its output
 for the old memory, carries its memory over the step, and shows its output for the new one.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import accumulate
 
 from sim import first_order_lag
@@ -20,7 +21,7 @@ MOVED = {name: name for name in ("F_e", "stiffness", "x", "v")}
 
 
 def kernel_source(effects: Sequence[Effect]) -> str:
-    """Return the text of the places, filled."""
+    """Return the text of the places that these effects fill, and of what reads their parameters and memories."""
     at = {place: [i for i, each in enumerate(effects) if place in each.functions] for place in PLACES}
     remembering = {i for i, each in enumerate(effects) if each.memory}
     at_stem = sorted({*at["force"], *at["friction"], *at["motion"]} & remembering)
@@ -45,44 +46,37 @@ def kernel_source(effects: Sequence[Effect]) -> str:
             lines += ["start = shown"]
         return lines
 
+    at_rest = [call("start", i, signal="y", F_e="F_e") for i in at_stem] + started("sensor", "y")
     through_pressure = passed("pressure", "u", "stem.t", "stem.t + 0.5 * h", "stem.t + h")
     ends_of_pressure = passed("pressure", "u", "stem.t", None, "stem.t + h")
     through_sensor = passed("sensor", "y", "stem.t - h", "stem.t - 0.5 * h", "stem.t")
+    forces = [f"F += {call('force', i)}" for i in at["force"]]
+    levels = [f"F_c, F_s = {call('friction', i, **LEVELS)}" for i in at["friction"]]
+    motions = [f"x, v = {call('motion', i, **MOVED)}" for i in at["motion"]]
+    carried = [call("advance", i, before="x0", after="stem.x", h="h") for i in at_stem]
 
     return "\n".join(
         [
             _function("parameters(theta)", [], f"({_parameters(effects)})"),
             _function("memories(state)", [], f"({_memories(effects)})"),
-            _function("start_pressure(u, stem, q, z)", started("pressure", "u"), "u"),
-            _function(
-                "start_stem(F_e, stem, q, z)",
-                ["y = stem.x", *(call("start", i, signal="y", F_e="F_e") for i in at_stem), *started("sensor", "y")],
-                "y",
-            ),
-            _function("pressure(u, h, stem, q, z)", ["start, end = u, u", *through_pressure], "start, end"),
-            _function("pressure_ends(u, h, stem, q, z)", ["start, end = u, u", *ends_of_pressure], "start, end"),
-            _function("force(stem, q, z)", [], " + ".join(["0.0", *(call("force", i) for i in at["force"])])),
-            _function(
-                "friction(F_c, F_s, direction, stem, q, z)",
-                (f"F_c, F_s = {call('friction', i, **LEVELS)}" for i in at["friction"]),
-                "F_c, F_s",
-            ),
-            _function(
-                "motion(F_e, stiffness, stem, q, z)",
-                ["x, v = stem.x, stem.v", *(f"x, v = {call('motion', i, **MOVED)}" for i in at["motion"])],
-                "x, v",
-            ),
-            _function(
-                "remember(x0, h, stem, q, z)",
-                (call("advance", i, before="x0", after="stem.x", h="h") for i in at_stem),
-                "None",
-            ),
-            _function("sensor(x0, h, stem, q, z)", ["start, end = x0, stem.x", *through_sensor], "end"),
+            _place("start_pressure(u, stem, q, z)", [], started("pressure", "u"), "u"),
+            _place("start_stem(F_e, stem, q, z)", ["y = stem.x"], at_rest, "y"),
+            _place("pressure(u, h, stem, q, z)", ["start, end = u, u"], through_pressure, "start, end"),
+            _place("pressure_ends(u, h, stem, q, z)", ["start, end = u, u"], ends_of_pressure, "start, end"),
+            _place("force(stem, q, z)", ["F = 0.0"], forces, "F"),
+            _place("friction(F_c, F_s, direction, stem, q, z)", [], levels, "F_c, F_s"),
+            _place("motion(F_e, stiffness, stem, q, z)", ["x, v = stem.x, stem.v"], motions, "x, v"),
+            _place("remember(x0, h, stem, q, z)", [], carried, "None"),
+            _place("sensor(x0, h, stem, q, z)", ["start, end = x0, stem.x"], through_sensor, "end"),
         ]
     )
 
 
-def _function(head: str, body: Iterable[str], result: str) -> str:
+def _place(head: str, enters: Sequence[str], body: Sequence[str], leaves: str) -> str:
+    return _function(head, [*enters, *body], leaves) if body else ""
+
+
+def _function(head: str, body: Sequence[str], result: str) -> str:
     return "\n    ".join([f"\ndef {head}:", *body, f"return {result}"])
 
 

@@ -80,7 +80,17 @@ class Entry(Generic[*Arguments]):
 
 def processor() -> str:
     """Return what the code is translated for, as a word: whether what is kept fits here."""
-    return hashlib.sha256(repr((llvmlite.__version__, *_features())).encode()).hexdigest()[:16]
+    return hashlib.sha256(repr((llvmlite.__version__, *features())).encode()).hexdigest()[:16]
+
+
+def is_bitcode(content: bytes) -> bool:
+    """Return whether it is whole."""
+    with _one_at_a_time:
+        try:
+            binding.parse_bitcode(content)
+        except RuntimeError:
+            return False
+    return True
 
 
 def translated(bitcode: bytes) -> bytes:
@@ -92,7 +102,7 @@ def translated(bitcode: bytes) -> bytes:
     with _one_at_a_time:
         module = binding.parse_bitcode(bitcode)
         names = [each.name for each in module.functions if each.is_declaration]
-        code = bytes(target_machine(*_features()).emit_object(module))
+        code = bytes(target_machine(*features()).emit_object(module))
     return " ".join(each for each in names if not each.startswith(INTRINSIC)).encode() + b"\n" + code
 
 
@@ -114,9 +124,14 @@ def loaded(code: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Any]:
     return {name: Entry(name, kinds, library) for name, kinds in entries.items()}
 
 
+def nothing() -> int:
+    """Return the address of a function that does nothing, for a name that is never called."""
+    return cast(_nothing, c_void_p).value or 0
+
+
 def _address(name: str) -> int:
     if name in UNREACHED:
-        return cast(_nothing, c_void_p).value or 0
+        return nothing()
     found = binding.address_of_symbol(name)
     if found is None:  # an effect makes arrays of its own
         from numba.core.registry import cpu_target
@@ -130,7 +145,7 @@ def _address(name: str) -> int:
 
 @cache
 def _compiler() -> Any:
-    target_machine(*_features())  # LLVM then knows this machine
+    target_machine(*features())  # LLVM then knows this machine
     return binding.create_lljit_compiler()
 
 
@@ -143,7 +158,7 @@ def target_machine(name: str = "", features: str = "") -> Any:
     return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic", codemodel="default")
 
 
-def _features() -> tuple[str, str]:
-    """Return this processor's name and features, or the name of the one that numba is told of as well."""
+def features() -> tuple[str, str]:
+    """Return this processor's name and its features, or the name of the one that numba is told of as well."""
     told = os.environ.get("NUMBA_CPU_NAME")
     return (told, "") if told else (binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())

@@ -9,6 +9,7 @@ import pytest
 
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim import kernel as compiled
+from sim import kernel_compiler
 from sim.composition import Composition
 from sim.effect import SHIPPED, read_effect
 from sim.machine_code import processor
@@ -39,6 +40,29 @@ def test_of_processes_that_begin_at_once_one_compiles_and_the_others_take_its_ke
     said = [process.communicate()[0].split() for process in probes]
     assert sorted(compiles for compiles, _ in said) == ["False", "False", "True"], "the others do not even start numba"
     assert len({position for _, position in said}) == 1
+
+
+def test_where_the_machine_code_is_of_another_processor_the_bitcode_is_translated_without_numba(tmp_path: Path) -> None:
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    command = [sys.executable, "-c", PROBE]
+    said = [subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()]
+    (code,) = tmp_path.rglob("*.o")
+    code.rename(code.with_suffix(".another.o"))
+    said += [subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()]
+    assert [compiles for compiles, _ in said] == ["True", "False"]
+    assert said[0][1] == said[1][1]
+
+
+def test_the_laws_are_compiled_once_for_all_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    compiled._compiled.cache_clear()
+    Valve(Composition.from_file(SEED))
+    monkeypatch.delattr(kernel_compiler, "laws")
+    valve = Valve(Composition.from_file(ASYMMETRIC))
+    valve.advance(1.1 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
+    assert valve.position_m == 0.0, "opening is the harder direction"
+    valve.advance(1.3 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
+    assert valve.position_m > 0.0
 
 
 def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:
