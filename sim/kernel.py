@@ -100,7 +100,10 @@ def _state_size(effects: Sequence[Effect]) -> int:
 def _of(
     effects: Sequence[Effect], laws: str, entries: Mapping[str, tuple[int, ...]]
 ) -> tuple[str, bytes, dict[str, Any]]:
-    """Return the digest, the bitcode and the entries, by name, of the kernel of these laws and effects."""
+    """Return the digest, the bitcode and the entries, by name, of the kernel of these laws and effects.
+
+    The compiled entries are kept by the texts, for an effect that was edited is another one.
+    """
     laws = _with_head(laws)
     sources = tuple((each.path, each.source) for each in effects)
     return _compiled(laws, _text(effects, laws), sources, _state_size(effects), tuple(entries.items()))

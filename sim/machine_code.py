@@ -34,7 +34,7 @@ _one_at_a_time = Lock()
 
 
 class Entry(Generic[*Arguments]):
-    """A compiled function of a kernel, to be called as the function of its text.
+    """A compiled function of a kernel, to be called as the function of its text, with arrays that do not overlap.
 
     Raises when called:
         TypeError: an array that is no contiguous one of float64, or of other dimensions.
