@@ -1,15 +1,20 @@
 """A tab that is closed stops its work and leaves nothing; one that is loaded again finds it."""
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+from nicegui import Client, ui
 
 from positioner.pages.workbench_page.background import Progressed, Tell, Work
 from positioner.pages.workbench_page.desk import Desk, NamedValve
 from positioner.pages.workbench_page.opening import Opened
 from positioner.pages.workbench_page.page import MOST_LEFT, Workbench
+from positioner.pages.workbench_page.search_panel import SearchPanel
 from workbench.blind.hiding import hide
 
 pytestmark = pytest.mark.patient
@@ -28,14 +33,22 @@ def workbench() -> Iterator[Workbench]:
     workbench.clear()
 
 
+def ends(*_: object) -> str:
+    return "found"
+
+
 def goes_on(work: Work) -> bool:
     return work.is_alive
 
 
-def busy(desk: Desk) -> Desk:
+def laid(desk: Desk) -> Desk:
     desk.take_valve(NamedValve("valve.toml", Path("valve.toml"), HIDDEN.base))
     desk.take_recording(Opened.of("fit.csv", Path("fit.csv"), HIDDEN.fit))
-    search = desk.begin("diagnose", never_ends)
+    return desk
+
+
+def busy(desk: Desk) -> Desk:
+    search = laid(desk).begin("diagnose", never_ends)
     while not search.doing:
         search.look()
     return desk
@@ -54,6 +67,21 @@ def test_a_diagnosis_goes_on_while_its_page_is_loaded_again_and_stops_when_it_is
     assert not goes_on(work)
     assert desk.search.is_running is False
     assert desk.folder.exists()
+
+
+def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbench: Workbench) -> None:
+    desk = laid(workbench.desk("a"))
+    search = desk.begin("diagnose", ends)
+    while search.work.is_alive:
+        pass
+
+    async def looks() -> None:
+        with Client(ui.page("/")):  # no browser shows it
+            await SearchPanel._look(cast(SearchPanel, SimpleNamespace(_desk=desk)))
+
+    asyncio.run(looks())
+    assert search.look(), "it is still there for the new page"
+    assert (search.result, search.failed) == ("found", "")
 
 
 def test_of_many_closed_tabs_the_oldest_leave_nothing(workbench: Workbench) -> None:

@@ -34,6 +34,14 @@ async def aside(work: Callable[..., T], *arguments: object) -> T:
     return await asyncio.to_thread(work, *arguments)
 
 
+def is_looked_at() -> bool:
+    """Return whether a browser shows the page: of one that was loaded again the old one is kept for a while.
+
+    What comes but once, as the result of a search, is not for that one: nobody would see it.
+    """
+    return ui.context.client.has_socket_connection
+
+
 def sentences(items: Sequence[str], name: str) -> None:
     """Show sentences as a list."""
     lines = "".join(f"<li>{escape(each)}</li>" for each in items)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from positioner.pages.parts.telling import errors_told
+from positioner.pages.parts.telling import errors_told, is_looked_at
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.background import Failed, Progressed
 from positioner.pages.workbench_page.desk import Desk
@@ -54,7 +54,7 @@ class EffectPanel:
 
     def _look(self) -> None:
         """See whether the check has come to an end."""
-        if self._desk.checking is None:
+        if self._desk.checking is None or not is_looked_at():
             return
         for each in self._desk.checking.news():
             if isinstance(each, Progressed):

@@ -6,7 +6,7 @@ from math import inf, log10
 from nicegui import events, ui
 
 from positioner.pages.parts.figure_view import Figure, FigureView
-from positioner.pages.parts.telling import aside, errors_told, heading, look_at, tell_error
+from positioner.pages.parts.telling import aside, errors_told, heading, is_looked_at, look_at, tell_error
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.background import diagnosed, extended, refitted
 from positioner.pages.workbench_page.desk import Desk
@@ -104,7 +104,7 @@ class SearchPanel:
     async def _look(self) -> None:
         """Show what the search has told since."""
         search = self._desk.search
-        if search is None or not search.look():
+        if search is None or not is_looked_at() or not search.look():
             return
         self._show()
         self._show_race()
