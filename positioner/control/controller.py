@@ -293,14 +293,21 @@ def _outcome(
 ) -> SlideOutcome | None:
     """Return what a change of the command did, in the step in which it is known.
 
-    Of a device that was found anew or left alone nobody knows what it did meanwhile: that is no slide of a command.
+    Of a device that was left alone, or is found with another command than it was given, nobody knows what it did
+    meanwhile: that is no slide of a command. One that still holds what it was given after a lost reply has obeyed.
     """
-    if sample.held_pa is not None or sample.unattended_s > 0.0:
+    if sample.unattended_s > 0.0 or not _obeyed(memory, sample, settings):
         statics.detector.interrupt()
         return None
     path, valve = memory.path, settings.valve
     arrived = path is None or valve is None or path.has_arrived(sample.now_s, valve.inverse)
     return statics.update(sample.now_s, sample.position_m, memory.wanted_pa, sample.pressure_pa, arrived=arrived)
+
+
+def _obeyed(memory: ControllerMemory, sample: Sample, settings: Settings) -> bool:
+    """Whether the device holds the last command, where it was looked at anew."""
+    held_pa = sample.held_pa
+    return held_pa is None or abs(held_pa - memory.command_pa) <= settings.limits.restart_tolerance_pa
 
 
 def _path(
