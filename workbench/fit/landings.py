@@ -209,14 +209,8 @@ class Landings:
         The moves are made in the parameters themselves, of which most stand linearly in the balance.
         """
         error = self._error
-        # From the last motion to when the rest has settled.
-        ranges = [_range(pressure_pa[each.moved : each.first + SETTLING]) for each in self._landed]
-        scale_n = self._scale_n(error.theta(z), np.array(ranges))
-        landed = [
-            Loaded(each, each.first, pressures[each.direction > 0], each.direction)
-            for each, pressures in zip(self._landed, ranges, strict=True)
-        ]
-        left = self._balance_n(error.theta(z), landed) / scale_n
+        landed, scale_n = self.landed(error.theta(z), pressure_pa)
+        left = self.balance_n(error.theta(z), landed) / scale_n
         indices = [error.parameters[i].index for i in free]
         begin = error.theta(z)[indices]
         held = HELD / np.abs(self._steps(z, free)) * DIFFERENCE
@@ -226,7 +220,7 @@ class Landings:
             for index, step in zip(indices, steps.tolist(), strict=True):
                 there = theta.copy()
                 there[index] += step
-                columns.append((self._balance_n(there, landed) / scale_n - left) / step)
+                columns.append((self.balance_n(there, landed) / scale_n - left) / step)
             outlier = OUTLIER * max(1.0, float(np.median(np.abs(left))))
             weights = (1.0 + (left / outlier) ** 2) ** -0.25
             matrix = np.vstack([weights[:, None] * np.array(columns).T, np.diag(held)])
@@ -235,13 +229,23 @@ class Landings:
                 there = theta.copy()
                 there[indices] += part * move
                 reached = error.coordinates(there)
-                after = self._balance_n(error.theta(reached), landed) / scale_n
+                after = self.balance_n(error.theta(reached), landed) / scale_n
                 if np.abs(after).sum() < np.abs(left).sum():
                     break
             else:
                 break
             z, left = reached, after
         return z, left
+
+    def landed(self, theta: Vector, pressure_pa: Column) -> tuple[list[Loaded], Vector]:
+        """Return each landing, under the pressure in which it came to rest, and sigma_j, N, (landings,)."""
+        # From the last motion to when the rest has settled.
+        ranges = [_range(pressure_pa[each.moved : each.first + SETTLING]) for each in self._landed]
+        landed = [
+            Loaded(each, each.first, pressures[each.direction > 0], each.direction)
+            for each, pressures in zip(self._landed, ranges, strict=True)
+        ]
+        return landed, self._scale_n(theta, np.array(ranges).reshape(-1, 2))
 
     def _steps(self, z: Vector, free: Sequence[int]) -> Vector:
         """Return by how much each free parameter changes with its coordinate's step."""
@@ -253,7 +257,7 @@ class Landings:
             steps.append(self._error.theta(there)[index] - theta[index])
         return np.array(steps)
 
-    def _balance_n(self, theta: Vector, landed: Sequence[Loaded]) -> Vector:
+    def balance_n(self, theta: Vector, landed: Sequence[Loaded]) -> Vector:
         """Return A p - k_s x + F - s F_c of the landings, N."""
         slow = SLOW * float(theta[STRIBECK])
         forces = self._forces_n(theta, landed, slow)
@@ -268,8 +272,8 @@ class Landings:
 
     def _static_n(self, theta: Vector, pressure_pa: Column) -> float:
         """Return the static friction that the break-aways contradict least: the middle of the best stretch."""
-        lower = self._static_at_n(theta, self._holding(pressure_pa))
-        upper = self._static_at_n(theta, self._breaking(pressure_pa))
+        lower = self.static_at_n(theta, self.holding(pressure_pa))
+        upper = self.static_at_n(theta, self.breaking(pressure_pa))
         least, most = float(theta[COULOMB]), MOST_STATIC * float(theta[COULOMB])
         edges = np.unique(np.concatenate([lower, upper, [least, most]]))
         edges = edges[(edges >= least) & (edges <= most)]
@@ -281,7 +285,7 @@ class Landings:
         contradicted = (below / (1.0 + below)).sum(axis=1) + (above / (1.0 + above)).sum(axis=1)
         return float(middles[np.argmin(contradicted)])
 
-    def _holding(self, pressure_pa: Column) -> list[Loaded]:
+    def holding(self, pressure_pa: Column) -> list[Loaded]:
         """Return each rest under the highest and the lowest pressure that it bore."""
         return [
             Loaded(each, each.end - 1, pressure, way)
@@ -289,7 +293,7 @@ class Landings:
             for way, pressure in zip((-1, 1), _range(pressure_pa[each.first : each.end]), strict=True)
         ]
 
-    def _breaking(self, pressure_pa: Column) -> list[Loaded]:
+    def breaking(self, pressure_pa: Column) -> list[Loaded]:
         """Return each rest that was left, under the pressure that it did not bear."""
         return [
             Loaded(each, each.leaves, _range(pressure_pa[each.end - 1 : each.leaves + 1])[way > 0], way)
@@ -297,7 +301,7 @@ class Landings:
             if (way := each.leaves_to)
         ]
 
-    def _static_at_n(self, theta: Vector, at: Sequence[Loaded]) -> Vector:
+    def static_at_n(self, theta: Vector, at: Sequence[Loaded]) -> Vector:
         """Return the static friction of the bare valve with which each would be on the verge of breaking away, N."""
         more = theta.copy()
         more[STATIC] *= 1.01

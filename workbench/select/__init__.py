@@ -15,6 +15,7 @@ Its files:
     experiment, experiment_design                 the input that tells rivals apart: off a menu, or designed
     discrimination                                rivals told apart by one experiment after another
     rival_race                                    the rivals weighed against each other in all recordings so far
+    slip_evidence                                 what slips say of a rival: forces, whatever came between
     residual_structure                            the meter of what is unexplained
     extension, extension_json                     adds what was found; the same as JSON
     extension_journal                             what was added when, and why

@@ -37,8 +37,8 @@ BUDGET = 60
 """Moves."""
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
-IMITATED = 1.001
-"""A separation below it is none."""
+IMITATED, NOTHING = 1.001, 0.5
+"""A separation below it is none; log odds that all moves left together must promise."""
 
 Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
 
@@ -214,7 +214,7 @@ def discriminate(
     while outcome is None:
         left = budget - used
         chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
-        if chosen is None or chosen.separation < IMITATED:
+        if chosen is None or (chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING):
             outcome = "not_separable"
             break
         played = player(chosen)

@@ -9,12 +9,19 @@ So the noise is what the best itself scatters by: where break-away jitters, its 
 counts once. Besides, lambda_i is at most z_i^2 / 2 as long as the errors of the two, second by second, differ by less
 than z_i = 2 standard errors (`block_errors`), as they must for a diagnosis to tell them apart.
 
+What slips say (`slip_evidence`) is weighed beside the run: where both speak for the same rival the stronger counts, for
+they come from the same samples; where they disagree the one takes from the other.
+
+    lambda = the stronger of lambda_run and lambda_slips, or their sum if they disagree
+    lambda_slips = l - l_i + (k_i - k)/2 log N_slips
+
 Nothing is named by a search that failed: rivals that have lost are searched anew from many starts before the best one
 is named, and the best must explain the experiments as well as a model can.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import exp, inf, log
 from typing import Any, Literal
@@ -42,29 +49,47 @@ from workbench.select.block_errors import (
 )
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import DesignedExperiment
+from workbench.select.slip_evidence import Slips, slips
 
 ODDS = 100.0
 """Of the best against all others, that name it."""
+FORCES_A_MOVE = 2
+"""That slips tell: a break-away and a landing."""
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
 
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A rival in all recordings so far: its fit, log rms of its error by blocks, and what is independent of it."""
+    """A rival in all recordings so far: its fit, log rms of its error by blocks, what is independent, its slips."""
 
     fit: Fit
     logs: np.ndarray[Any, np.dtype[np.float64]]
     share: float
+    slips: Slips | None = None
 
 
 def log_odds(best: Weighed, rival: Weighed) -> float:
-    """Return lambda of the best against a rival: 0 where nothing speaks against it."""
+    """Return lambda_run of the best against a rival: 0 where nothing speaks against it."""
     n = best.share * best.fit.count
     ratio = log(max(rival.fit.cost, np.finfo(float).tiny) / max(best.fit.cost, np.finfo(float).tiny))
-    evidence = 0.5 * (n * ratio + (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0)))
+    by_cost = 0.5 * (n * ratio + (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0)))
     _, z = relative_error_reduction(rival.logs, best.logs)
-    return max(0.0, evidence if z >= SAME_STANDARD_ERRORS else min(evidence, 0.5 * max(0.0, z) ** 2))
+    return max(0.0, by_cost if z >= SAME_STANDARD_ERRORS else min(by_cost, 0.5 * max(0.0, z) ** 2))
+
+
+def slip_odds(one: Weighed, other: Weighed) -> float:
+    """Return lambda_slips of one rival against another, of either sign; 0 where slips do not tell of both."""
+    if one.slips is None or other.slips is None:
+        return 0.0
+    price = 0.5 * (len(other.fit.parameters) - len(one.fit.parameters)) * log(one.slips.count)
+    return one.slips.log_likelihood - other.slips.log_likelihood + price
+
+
+def evidence(one: Weighed, other: Weighed) -> float:
+    """Return lambda of one rival against another, of either sign."""
+    by_run, by_slips = log_odds(one, other) - log_odds(other, one), slip_odds(one, other)
+    return by_run + by_slips if by_run * by_slips < 0.0 else max(by_run, by_slips, key=abs)
 
 
 class RivalRace:
@@ -83,16 +108,29 @@ class RivalRace:
         self._workers = workers
         self.fits = dict(fits)
         self._sigma_m = self.record.scale_m or np.finfo(float).tiny
-        weighed = {name: self._weighed(each) for name, each in fits.items()}
-        self._all = weighed
-        # The likeliest, by the cost and the number of its parameters.
-        self.best = min(weighed, key=lambda name: _criterion(weighed[name].fit))
+
+    @cached_property
+    def _all(self) -> dict[str, Weighed]:
+        weighed = on_threads(self._weighed, list(self.fits.values()), self._workers)
+        return dict(zip(self.fits, weighed, strict=True))
+
+    @cached_property
+    def best(self) -> str:
+        """The likeliest: against whom the least is said; of equals by cost and number of parameters."""
+
+        def least_said(name: str) -> tuple[float, float]:
+            others = (evidence(self._all[name], each) for other, each in self._all.items() if other != name)
+            return min(others, default=0.0), -_criterion(self.fits[name])
+
+        return max(self.fits, key=least_said)
 
     @property
     def relative(self) -> Mapping[str, float]:
         """The odds of each rival against the best."""
         best = self._all[self.best]
-        return {name: exp(-log_odds(best, each)) if name != self.best else 1.0 for name, each in self._all.items()}
+        return {
+            name: exp(-max(0.0, evidence(best, each))) if name != self.best else 1.0 for name, each in self._all.items()
+        }
 
     @property
     def alive(self) -> list[Fit]:
@@ -116,11 +154,19 @@ class RivalRace:
     def promised(self, chosen: DesignedExperiment) -> float:
         """Return by how much an experiment is to raise the log odds."""
         samples = (chosen.course.duration_s - REST_S) / self.record.period_s
-        return 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
+        by_run = 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
+        return by_run + FORCES_A_MOVE * chosen.course.moves * self._told_by_a_force
 
     def promised_by(self, chosen: DesignedExperiment, moves: int) -> float:
         """Return by how much an experiment is to raise the log odds, repeated for so many moves."""
         return self.promised(chosen) * max(1.0, moves / max(1, chosen.course.moves))
+
+    @cached_property
+    def _told_by_a_force(self) -> float:
+        """What a slip's force has raised the log odds by so far, between the best and its nearest rival."""
+        best = self._all[self.best]
+        told = [max(0.0, slip_odds(best, each)) for name, each in self._all.items() if name != self.best]
+        return min(told, default=0.0) / best.slips.count if best.slips else 0.0
 
     @property
     def explained(self) -> bool:
@@ -199,7 +245,8 @@ class RivalRace:
         negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
         parts = np.cumsum([0, *map(len, self._recordings)])
         logs = [block_logs(self.record.time_s[a:b], error_m[a:b], negligible_m) for a, b in pairwise(parts.tolist())]
-        return Weighed(found, np.concatenate(logs), _independent_share(error_m / self._sigma_m, self.record.period_s))
+        share = _independent_share(error_m / self._sigma_m, self.record.period_s)
+        return Weighed(found, np.concatenate(logs), share, slips(found, self.record, parts[:-1].tolist()))
 
 
 def _typical_m(time_s: np.ndarray[Any, Any], error_m: np.ndarray[Any, Any]) -> float:

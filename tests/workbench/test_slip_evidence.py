@@ -1,0 +1,131 @@
+"""What slips say of rivals on a valve whose friction scatters, and when they say nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import t
+
+from config.recording import Recording
+from config.slave_file import Sensor
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from tests.workbench.valves import PERIOD_S, drawn_valve, pressures, with_effect
+from workbench.blind.trial import LEVELS, NOISE_M, Trial
+from workbench.data.held_out import joined
+from workbench.data.record import Record, ready
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
+from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
+from workbench.select.slip_evidence import Slips, _log_between, _log_density, slips
+
+BARE = drawn_valve(np.random.default_rng(11))
+PRELOADED = with_effect(BARE, "preload", force_n=60.0)
+RIVALS = ("preload", "spring_hardening", "sensor_offset")
+ROWS = 3000
+
+
+def dirty(valve: ValveFile, seed: int) -> Recording:
+    """Return a recording of a valve with pressure noise and break-away jitter, by a transmitter of 12 bits."""
+    generator = np.random.default_rng(seed)
+    trial = Trial(pressures(generator, ROWS), PERIOD_S)
+    answer_m = trial.with_disturbances_m(Composition.from_file(valve), generator)
+    return trial.recording(answer_m, Sensor(noise_std_m=NOISE_M, quantum_m=valve.valve.stroke_m / LEVELS, seed=seed))
+
+
+@pytest.fixture(scope="module")
+def recordings() -> list[Recording]:
+    return [dirty(PRELOADED, seed) for seed in (1, 2)]
+
+
+@pytest.fixture(scope="module")
+def record(recordings: list[Recording]) -> Record:
+    return ready(joined(recordings))
+
+
+@pytest.fixture(scope="module")
+def fits(recordings: list[Recording]) -> dict[str, Fit]:
+    whole = joined(recordings)
+    base = fit(whole, BARE, profile=False)
+    return {name: fit(whole, BARE, effects=(name,), base=base, profile=False) for name in RIVALS}
+
+
+@pytest.fixture(scope="module")
+def told(fits: dict[str, Fit], record: Record) -> dict[str, Slips]:
+    found = {name: slips(each, record, [0, ROWS]) for name, each in fits.items()}
+    return {name: each for name, each in found.items() if each is not None}
+
+
+def test_slips_tell_a_preload_from_a_hardening_spring(told: dict[str, Slips]) -> None:
+    assert told["preload"].count == told["spring_hardening"].count > 40
+    assert told["preload"].log_likelihood - told["spring_hardening"].log_likelihood > np.log(100.0)
+
+
+def test_what_is_one_by_algebra_is_one_by_slips(told: dict[str, Slips]) -> None:
+    assert told["preload"].log_likelihood == pytest.approx(told["sensor_offset"].log_likelihood, abs=1.0)
+
+
+def test_larger_forces_all_alike_say_nothing(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:
+    """Area, spring, friction and mass of a valve 1.3 times as large: it moves as before."""
+    one = fits["preload"]
+    forces = ("diaphragm_area_m2", "spring_n_per_m", "coulomb_n", "static_n", "viscous_ns_per_m", "mass_kg")
+    larger = one.valve.valve.model_copy(update={name: 1.3 * getattr(one.valve.valve, name) for name in forces})
+    preload_n = one.valve.effect[0].parameters["force_n"]
+    assert isinstance(preload_n, float)
+    found = slips(
+        replace(one, valve=with_effect(ValveFile(valve=larger), "preload", force_n=1.3 * preload_n)), record, [0, ROWS]
+    )
+    assert found is not None
+    assert found.log_likelihood == pytest.approx(told["preload"].log_likelihood, abs=1.0)
+
+
+def test_a_rival_that_does_not_land_where_its_balance_says_is_not_told(fits: dict[str, Fit], record: Record) -> None:
+    """Friction that rises from some speed down stops a slide before the balance at rest."""
+    one = fits["preload"]
+    rising = with_effect(
+        ValveFile(valve=one.valve.valve), "stribeck", excess_n=120.0, velocity_m_per_s=0.01, exponent=2.0
+    )
+    own = {name: each for name, each in one.parameters.items() if "." not in name}
+    assert slips(replace(one, valve=rising, parameters=own), record, [0, ROWS]) is None
+    assert slips(replace(one, valve=ValveFile(valve=one.valve.valve), parameters=own), record, [0, ROWS]) is not None
+
+
+def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recording]) -> None:
+    short = Recording({name: column[:300] for name, column in recordings[0].columns.items()})
+    assert slips(fits["preload"], ready(short), [0]) is None
+
+
+def test_likelihoods_are_students() -> None:
+    off = np.array([-30.0, -1.0, 0.0, 2.0, 3e3])
+    assert _log_density(off) == pytest.approx(t.logpdf(off, 4))
+    assert _log_between(off - 0.5, off + 0.5) == pytest.approx(
+        np.log(t.sf(abs(off) - 0.5, 4) - t.sf(abs(off) + 0.5, 4))
+    )
+
+
+def weighed(one: Fit, cost: float, apart: float, log_likelihood: float | None) -> Weighed:
+    told = None if log_likelihood is None else Slips(log_likelihood, 100)
+    logs = np.array([apart * (1.0 + 0.1 * (-1.0) ** i) for i in range(20)])
+    return Weighed(replace(one, cost=cost, count=1000), logs, 1.0, told)
+
+
+@pytest.mark.parametrize(
+    ("log_likelihood", "expected"),
+    [(None, 0.0), (-3.0, 0.0), (-300.0, 300.0 - 500.0 * np.log(1.1)), (20.0, -20.0)],
+    ids=["not told", "the run is stronger", "slips are stronger", "they disagree"],
+)
+def test_the_stronger_counts_unless_they_disagree(
+    fits: dict[str, Fit], log_likelihood: float | None, expected: float
+) -> None:
+    best = weighed(fits["preload"], 500.0, 0.0, 0.0)
+    rival = weighed(fits["preload"], 550.0, 0.05, log_likelihood)
+    by_run = log_odds(best, rival)
+    assert by_run == pytest.approx(500.0 * np.log(1.1))
+    assert evidence(best, rival) == pytest.approx(by_run + expected)
+    assert evidence(rival, best) == pytest.approx(-(by_run + expected))
+
+
+def test_a_parameter_more_is_paid_for(fits: dict[str, Fit]) -> None:
+    one = fits["preload"]
+    more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})
+    assert slip_odds(weighed(one, 500.0, 0.0, 7.0), weighed(more, 500.0, 0.0, 7.0)) == pytest.approx(0.5 * np.log(100))

@@ -1,0 +1,164 @@
+"""What slips say of a rival: the forces under which they began and ended, whatever came between.
+
+    e_j = s (A p - k_s x + F) - F_c          at landing j, N; see `workbench.fit.landings`
+    lower_k <= F_s,k - F_s <= upper_k        at break-away k, N: the last sample at rest, the first in motion
+
+    l = sum_j log t(e_j - d_r; S_j) |de_j/dx|             S_j^2 = S_c^2 + sigma_j^2
+      + sum_k log (T(upper_k - g_r; S_s) - T(lower_k - g_r; S_s))
+      - 2 sum_r (d_r / S_c)^2 + (g_r / S_s)^2
+
+is the log likelihood of where slides landed and under which pressures they began, on a valve whose friction scatters:
+by S_c and S_s, N, from slip to slip, and half as much, by d_r and g_r, from recording to recording r. t is Student's
+density of 4 degrees of freedom, T its distribution function: a slip may be told wrongly. A rival is weighed by the most
+that its parameters, scatters and offsets make of l. A slip mistimed by luck spoils seconds of a free run, and no force.
+
+Parameters are held loosely to the fit, so that what slips do not tell stays. Of a rival whose own simulation does not
+land where its static balance says slips tell nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import lgamma, log, pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import stdtr
+
+from sim.composition import STATIC, VISCOUS, Composition
+from sim.karnopp import Vector
+from workbench.data.record import Record
+from workbench.fit.fit_result import Fit
+from workbench.fit.landings import FEWEST, Landings, Loaded, rests
+from workbench.fit.objective import SimulationError
+from workbench.model.free_run import FreeRun
+from workbench.model.parameters import free_parameters
+
+FREEDOM = 4.0
+"""Degrees of freedom of t."""
+BETWEEN = 0.5
+"""Scatter from recording to recording, over that from slip to slip."""
+LEAST_N, MOST_N = 1.0, 1e4
+"""Scatter."""
+GUESSED_N = 30.0
+"""Scatter of static friction to begin with."""
+HELD = 0.5
+"""Of a coordinate, from the fit: a standard deviation."""
+PADDING = 0.05
+"""Of the scatter, by which the interval of a break-away is wider either way: noise may have broken it."""
+SHIFT = 2e-3
+"""Of the stroke, over which a landing's slope is taken: wider than a sensor's steps."""
+TOLD, MOSTLY = 0.5, 0.75
+"""So near, in scatters, must so many of its own landings lie where a rival's balance says."""
+NORMAL = lgamma(0.5 * (FREEDOM + 1.0)) - lgamma(0.5 * FREEDOM) - 0.5 * log(FREEDOM * pi)
+TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True, slots=True)
+class Slips:
+    """What slips say of a rival: their log likelihood, and of how many landings and break-aways it is."""
+
+    log_likelihood: float
+    count: int
+
+
+def slips(fit: Fit, record: Record, first_rows: Sequence[int]) -> Slips | None:
+    """Return what slips say of a fitted valve; None where there are too few, or its balance does not tell them.
+
+    Args:
+        fit: the rival.
+        record: of all recordings.
+        first_rows: of each recording in the record.
+    """
+    forces = _Forces(fit, record, first_rows)
+    if forces.landings.count < FEWEST:
+        return None
+    found = minimize(forces.loss, forces.first(), method="L-BFGS-B", bounds=forces.bounds)
+    own = replace(record, position_m=forces.error.run.position_m(forces.error.composition.theta))
+    lands = _Forces(fit, own, first_rows)
+    off_n, _, _, _ = lands.left(lands.fitted)
+    off = np.abs(off_n) / np.hypot(np.exp(found.x[-2]), lands.own_n)
+    if off.size < FEWEST or np.quantile(off, MOSTLY) > TOLD:
+        return None
+    return Slips(-float(found.fun), forces.count)
+
+
+class _Forces:
+    """The forces of a rival's slips, and their loss over u: coordinates, offsets and log scatters.
+
+    u = ((z - z_fit) / HELD of what is free, d_r / (S_c / 2), g_r / (S_s / 2), log S_c, log S_s)
+    """
+
+    def __init__(self, fit: Fit, record: Record, first_rows: Sequence[int]) -> None:
+        composition = Composition.from_file(fit.valve)
+        theta = composition.theta
+        parameters = free_parameters(composition, tuple(fit.parameters))
+        self.error = SimulationError(FreeRun(composition, record), composition, parameters, theta)
+        self.fitted = self.error.coordinates(theta)
+        self.landings = Landings(self.error, rests(record))
+        pressure_pa = self.error.run.run(theta).pressure_pa
+        self._landed, self.own_n = self.landings.landed(theta, pressure_pa)
+        self._broke = self.landings.breaking(pressure_pa)
+        self._bore = [each for each in self.landings.holding(pressure_pa) if each.direction == each.rest.leaves_to]
+        self._way = np.array([each.direction for each in self._landed])
+        self._shift_m = SHIFT * composition.valve.stroke_m
+        self._landed_in, self._broke_in = (_recordings(each, first_rows) for each in (self._landed, self._broke))
+        self._free = [i for i, each in enumerate(parameters) if each.index != VISCOUS]
+        self._recordings = len(first_rows)
+        self.count = len(self._landed) + len(self._broke)
+
+    @property
+    def bounds(self) -> list[tuple[float | None, float | None]]:
+        """Of u."""
+        scatter = (log(LEAST_N), log(MOST_N))
+        return [*[(None, None)] * (len(self._free) + 2 * self._recordings), scatter, scatter]
+
+    def first(self) -> Vector:
+        """Return u to begin with: the fit."""
+        e_n, _, _, _ = self.left(self.fitted)
+        scatters_n = (max(3.0 * LEAST_N, 1.5 * float(np.median(np.abs(e_n)))), GUESSED_N)
+        return np.concatenate([np.zeros(len(self._free) + 2 * self._recordings), np.log(scatters_n)])
+
+    def loss(self, u: Vector) -> float:
+        """Return -l, and what the parameters' distance from the fit costs."""
+        free, recordings = len(self._free), self._recordings
+        z = self.fitted.copy()
+        z[self._free] += HELD * u[:free]
+        e_n, slope_n_per_m, lower_n, upper_n = self.left(np.clip(z, self.error.lower, self.error.upper))
+        coulomb_n, static_n = np.exp(u[-2:])
+        d_n = BETWEEN * coulomb_n * u[free : free + recordings][self._landed_in]
+        g_n = BETWEEN * static_n * u[free + recordings : -2][self._broke_in]
+        scale_n = np.hypot(coulomb_n, self.own_n)
+        landed = _log_density((e_n - d_n) / scale_n) + np.log(slope_n_per_m / scale_n)
+        broke = _log_between((lower_n - g_n) / static_n - PADDING, (upper_n - g_n) / static_n + PADDING)
+        return float(0.5 * (u[:-2] @ u[:-2]) - landed.sum() - broke.sum())
+
+    def left(self, z: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+        """Return e_j, |de_j/dx|, N/m, and the bounds of F_s,k - F_s."""
+        theta = self.error.theta(z)
+        up_n, down_n = (self.landings.balance_n(theta, self._shifted(way * self._shift_m)) for way in (1, -1))
+        slope_n_per_m = np.maximum(np.abs(up_n - down_n) / (2.0 * self._shift_m), TINY)
+        bounds_n = [self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke)]
+        e_n = self._way * self.landings.balance_n(theta, self._landed)
+        return e_n, slope_n_per_m, np.minimum(*bounds_n), np.maximum(*bounds_n)
+
+    def _shifted(self, by_m: float) -> list[Loaded]:
+        """Return the landings as if the stem had come to rest elsewhere."""
+        return [each._replace(rest=each.rest._replace(position_m=each.rest.position_m + by_m)) for each in self._landed]
+
+
+def _recordings(at: Sequence[Loaded], first_rows: Sequence[int]) -> NDArray[np.intp]:
+    """Return in which recording each lies."""
+    return np.searchsorted(first_rows, [each.row for each in at], side="right") - 1
+
+
+def _log_density(off: Vector) -> Vector:
+    """Return log t of distances in scatters."""
+    return np.asarray(NORMAL - 0.5 * (FREEDOM + 1.0) * np.log1p(off**2 / FREEDOM))
+
+
+def _log_between(lower: Vector, upper: Vector) -> Vector:
+    """Return log (T(upper) - T(lower)), taken in the lower tail, where it is exact."""
+    flipped = lower > 0.0
+    low, high = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
+    return np.asarray(np.log(np.maximum(stdtr(FREEDOM, high) - stdtr(FREEDOM, low), TINY)))
