@@ -17,7 +17,7 @@ from workbench.data.record import Record, ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
-from workbench.select.slip_evidence import Slips, _log_between, _log_density, slips
+from workbench.select.slip_evidence import Slips, _Forces, _log_between, _log_density, slips
 
 BARE = drawn_valve(np.random.default_rng(11))
 PRELOADED = with_effect(BARE, "preload", force_n=60.0)
@@ -93,6 +93,16 @@ def test_a_rival_that_does_not_land_where_its_balance_says_is_not_told(fits: dic
 def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recording]) -> None:
     short = Recording({name: column[:300] for name, column in recordings[0].columns.items()})
     assert slips(fits["preload"], ready(short), [0]) is None
+
+
+def test_the_slope_is_that_of_the_loss(fits: dict[str, Fit], record: Record) -> None:
+    forces = _Forces(fits["preload"], record, [0, ROWS])
+    u = forces.first() + 0.05 * np.random.default_rng(0).standard_normal(forces.first().size)
+    apart = [
+        (forces.loss_and_slope(u + step)[0] - forces.loss_and_slope(u - step)[0]) / 2e-4
+        for step in 1e-4 * np.eye(u.size)
+    ]
+    assert forces.loss_and_slope(u)[1] == pytest.approx(apart, rel=1e-3, abs=0.01)
 
 
 def test_likelihoods_are_students() -> None:

@@ -16,9 +16,10 @@ Parameters are held loosely to the fit, so that what slips do not tell stays. Of
 land where its static balance says slips tell nothing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import lgamma, log, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from sim.composition import STATIC, VISCOUS, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import FEWEST, Landings, Loaded, rests
+from workbench.fit.landings import DIFFERENCE, FEWEST, Landings, Loaded, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -73,14 +74,22 @@ def slips(fit: Fit, record: Record, first_rows: Sequence[int]) -> Slips | None:
     forces = _Forces(fit, record, first_rows)
     if forces.landings.count < FEWEST:
         return None
-    found = minimize(forces.loss, forces.first(), method="L-BFGS-B", bounds=forces.bounds)
+    found = minimize(forces.loss_and_slope, forces.first(), jac=True, method="L-BFGS-B", bounds=forces.bounds)
     own = replace(record, position_m=forces.error.run.position_m(forces.error.composition.theta))
     lands = _Forces(fit, own, first_rows)
-    off_n, _, _, _ = lands.left(lands.fitted)
-    off = np.abs(off_n) / np.hypot(np.exp(found.x[-2]), lands.own_n)
+    off = np.abs(lands.left(lands.fitted).e_n) / np.hypot(np.exp(found.x[-2]), lands.own_n)
     if off.size < FEWEST or np.quantile(off, MOSTLY) > TOLD:
         return None
     return Slips(-float(found.fun), forces.count)
+
+
+class Left(NamedTuple):
+    """Of each landing e_j and |de_j/dx|; of each break-away the bounds of F_s,k - F_s; or slopes over any of these."""
+
+    e_n: Vector
+    slope_n_per_m: Vector
+    lower_n: Vector
+    upper_n: Vector
 
 
 class _Forces:
@@ -119,28 +128,63 @@ class _Forces:
         scatters_n = (max(3.0 * LEAST_N, 1.5 * float(np.median(np.abs(e_n)))), GUESSED_N)
         return np.concatenate([np.zeros(len(self._free) + 2 * self._recordings), np.log(scatters_n)])
 
-    def loss(self, u: Vector) -> float:
-        """Return -l, and what the parameters' distance from the fit costs."""
+    def loss_and_slope(self, u: Vector) -> tuple[float, Vector]:
+        """Return -l, and what the parameters' distance from the fit costs; and its slope over u.
+
+        The forces are followed over the parameters by differences, all else by hand: it is cheap, and there are two
+        offsets more for each recording.
+        """
         free, recordings = len(self._free), self._recordings
         z = self.fitted.copy()
         z[self._free] += HELD * u[:free]
-        e_n, slope_n_per_m, lower_n, upper_n = self.left(np.clip(z, self.error.lower, self.error.upper))
+        z = np.clip(z, self.error.lower, self.error.upper)
+        left = self.left(z)
         coulomb_n, static_n = np.exp(u[-2:])
         d_n = BETWEEN * coulomb_n * u[free : free + recordings][self._landed_in]
         g_n = BETWEEN * static_n * u[free + recordings : -2][self._broke_in]
         scale_n = np.hypot(coulomb_n, self.own_n)
-        landed = _log_density((e_n - d_n) / scale_n) + np.log(slope_n_per_m / scale_n)
-        broke = _log_between((lower_n - g_n) / static_n - PADDING, (upper_n - g_n) / static_n + PADDING)
-        return float(0.5 * (u[:-2] @ u[:-2]) - landed.sum() - broke.sum())
+        off = (left.e_n - d_n) / scale_n
+        lower, upper = (left.lower_n - g_n) / static_n - PADDING, (left.upper_n - g_n) / static_n + PADDING
+        broke = _log_between(lower, upper)
+        value = _log_density(off).sum() + np.log(left.slope_n_per_m / scale_n).sum() + broke.sum()
 
-    def left(self, z: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return e_j, |de_j/dx|, N/m, and the bounds of F_s,k - F_s."""
+        by_off = -(FREEDOM + 1.0) * off / (FREEDOM + off**2)
+        by_lower, by_upper = -np.exp(_log_density(lower) - broke), np.exp(_log_density(upper) - broke)
+        of_forces = Left(by_off / scale_n, 1.0 / left.slope_n_per_m, by_lower / static_n, by_upper / static_n)
+        by_g = -(of_forces.lower_n + of_forces.upper_n)
+        scaled = (coulomb_n / scale_n) ** 2
+        slope = np.concatenate(
+            [
+                [sum(of @ by for of, by in zip(of_forces, moved, strict=True)) for moved in self._moved(z, left)],
+                -BETWEEN * coulomb_n * self._by_recording(of_forces.e_n, self._landed_in),
+                BETWEEN * static_n * self._by_recording(by_g, self._broke_in),
+                [-(scaled * (by_off * off + 1.0)).sum() - of_forces.e_n @ d_n],
+                [-of_forces.lower_n @ left.lower_n - of_forces.upper_n @ left.upper_n],
+            ]
+        )
+        slope[:-2] -= u[:-2]
+        return float(0.5 * (u[:-2] @ u[:-2]) - value), -slope
+
+    def _moved(self, z: Vector, left: "Left") -> Iterator["Left"]:
+        """Yield the forces' slopes over each free coordinate, in steps of u; flat beyond a bound."""
+        for i in self._free:
+            there = z.copy()
+            there[i] += DIFFERENCE if z[i] + DIFFERENCE <= self.error.upper[i] else -DIFFERENCE
+            yield Left(
+                *(HELD / (there[i] - z[i]) * (each - here) for each, here in zip(self.left(there), left, strict=True))
+            )
+
+    def _by_recording(self, each: Vector, which: NDArray[np.intp]) -> Vector:
+        return np.asarray(np.bincount(which, weights=each, minlength=self._recordings), dtype=np.float64)
+
+    def left(self, z: Vector) -> "Left":
+        """Return what is left of the balances at z."""
         theta = self.error.theta(z)
         up_n, down_n = (self.landings.balance_n(theta, self._shifted(way * self._shift_m)) for way in (1, -1))
         slope_n_per_m = np.maximum(np.abs(up_n - down_n) / (2.0 * self._shift_m), TINY)
         bounds_n = [self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke)]
         e_n = self._way * self.landings.balance_n(theta, self._landed)
-        return e_n, slope_n_per_m, np.minimum(*bounds_n), np.maximum(*bounds_n)
+        return Left(e_n, slope_n_per_m, np.minimum(*bounds_n), np.maximum(*bounds_n))
 
     def _shifted(self, by_m: float) -> list[Loaded]:
         """Return the landings as if the stem had come to rest elsewhere."""
