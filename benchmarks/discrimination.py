@@ -1,6 +1,7 @@
 """Sealed valves whose diagnosis ended `one_of`: do experiments tell the rivals apart, and in how many moves?
 
-    python -m benchmarks.discrimination [--family clean dirty] [--cases 20] [--seeds 37157 ...] [--out FILE]
+    python -m benchmarks.discrimination [--family clean dirty] [--cases 20] [--seeds 37157 ...] [--how designed menu]
+                                        [--out FILE]
 
 The cases are those of the kept blind campaign (`benchmarks.blind`) whose diagnosis against the whole library ended in
 one set with more than one class, the hidden effect visible: the same seeds make the same valves, and the rivals are the
@@ -34,7 +35,7 @@ from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.select.discrimination import BUDGET, FEW_MOVES, Discrimination, Played, Player, discriminate
+from workbench.select.discrimination import BUDGET, FEW_MOVES, Designer, Discrimination, Played, Player, discriminate
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment
 from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, courses, designed
@@ -81,8 +82,11 @@ def player(made: Hidden, dirty: bool, seed: int) -> Player:
     return play
 
 
-def line(case: Line, workers: int) -> Line:
-    """Play a case by both; return what is kept of it."""
+HOW: dict[str, tuple[Designer, int]] = {"designed": (designed, BUDGET), "menu": (menu, MENU_BUDGET)}
+
+
+def line(case: Line, how: Sequence[str], workers: int) -> Line:
+    """Play a case by either or both; return what is kept of it."""
     began_s = time.perf_counter()
     library = {name: shipped_effect(name, "library") for name in shipped_effects()}
     dirty = case["setting"] == "dirty"
@@ -106,11 +110,11 @@ def line(case: Line, workers: int) -> Line:
             player(made, dirty, case["seed"]),
             bounds,
             library,
-            budget=budget,
-            design=design,
+            design=HOW[name][0],
+            budget=HOW[name][1],
             workers=workers,
         )
-        for name, design, budget in (("designed", designed, BUDGET), ("menu", menu, MENU_BUDGET))
+        for name in how
     }
     return {
         "seed": case["seed"],
@@ -155,11 +159,12 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
     for each in lines:
         yield f"{each['seed']} {each['setting']:<6}{each['hidden'][0]} of {'/'.join(each['rivals'])}: " + "; ".join(
             f"{how} {each[how]['outcome']} {'/'.join(each[how]['named'])} {each[how]['moves']} moves"
-            for how in ("designed", "menu")
+            for how in HOW
+            if how in each
         )
-    for how in ("designed", "menu") if lines else ():
-        yield from _figures(how, [each[how] for each in lines])
-    both = [each for each in lines if each["designed"]["right"] and each["menu"]["right"]]
+    for how in HOW:
+        yield from _figures(how, [each[how] for each in lines if how in each])
+    both = [each for each in lines if all(how in each and each[how]["right"] for how in HOW)]
     if both:
         shares = [each["designed"]["moves"] / each["menu"]["moves"] for each in both if each["menu"]["moves"]]
         yield f"moves, designed over menu, resolved by both: median {np.median(shares):.2f} of {len(shares)} cases"
@@ -167,6 +172,8 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
 
 def _figures(how: str, found: Sequence[Line]) -> Iterator[str]:
     count = len(found)
+    if not count:
+        return
     right, wrong = sum(each["right"] is True for each in found), sum(each["right"] is False for each in found)
     yield f"{how}: resolved rightly {right} of {count} ({right / count:.0%}), wrongly {wrong} ({wrong / count:.0%})"
     told = ", ".join(f"{name} {n}" for name, n in sorted(Counter(each["outcome"] for each in found).items()))
@@ -178,6 +185,7 @@ def main() -> None:
     parser.add_argument("--family", nargs="*", choices=("clean", "dirty"), default=["clean", "dirty"])
     parser.add_argument("--cases", type=int, default=20, help="at most so many (20)")
     parser.add_argument("--seeds", type=int, nargs="*", help="these cases alone")
+    parser.add_argument("--how", nargs="*", choices=HOW, default=list(HOW), help="experiments designed, or of the menu")
     parser.add_argument("--workers", type=int, default=1, help="threads (1)")
     parser.add_argument("--out", type=Path, help="where a line a case is kept; those there are not played again")
     arguments = parser.parse_args()
@@ -186,7 +194,7 @@ def main() -> None:
     for case in cases(arguments.family, arguments.seeds)[: arguments.cases]:
         if case["seed"] in there:
             continue
-        done = line(case, arguments.workers)
+        done = line(case, arguments.how, arguments.workers)
         lines.append(done)
         print(f"{done['seed']}: {done['seconds']:g} s", flush=True)
         if arguments.out is not None:

@@ -44,10 +44,6 @@ UNLIKE = 2.0
 """Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
 MISSED, SURELY, GAVE_WAY = 0.05, 2.0, 0.5
 """Of its way, and of the deviation of landings: by which a slide may miss its aim; of its way: beyond it was none."""
-PRECISELY = 3.0
-"""Of its own deviation, which is large where it crept to rest: a slide that misses by less may have slid."""
-NEAR = 0.02
-"""Of the stroke: so far from a landing the balance is known."""
 LEAST = 5.1e-3
 """Of the stroke: a slide shorter than this would not be seen for one."""
 TRIED = 2
@@ -105,16 +101,6 @@ class Balance:
             followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
             return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
         return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
-
-    def known_at(self, position_m: float, outcome: SlideOutcome) -> bool:
-        """Whether slides had landed near a position, m, before an outcome, as it did."""
-        near_m = NEAR * self.stroke_m
-        return any(
-            each.direction == outcome.direction
-            and each.time_s < outcome.time_s
-            and abs(each.position_m - position_m) < near_m
-            for each in self.landings
-        )
 
     @property
     def scatter_m(self) -> float:
@@ -218,8 +204,8 @@ def _learnt(
 ) -> SlideMemory:
     """Return the memory after a slide: its margin, and where the stem stands. A slide onto a stop says nothing.
 
-    A stem that breaks loose lands where it is to. One that does not, though others have landed there, did not: the
-    packing that holds it gave way, not as far, or farther.
+    A stem that breaks loose lands where it is to. One that goes not half as far did not: the packing that holds it gave
+    way. One that lands elsewhere, as behind a slow I/P, has slid, and its way says nothing of the margin.
     """
     s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
@@ -235,7 +221,7 @@ def _learnt(
     margin = memory.margins.own(s, turning=turning)
     if hit and anchor.direction:
         margin = margin.after_breaking(s * (to_m - anchor.position_m))
-    elif not slid or (not hit and missed_m > PRECISELY * outcome.std_m and balance.known_at(memory.aim_m, outcome)):
+    elif not slid:
         margin = margin.after_holding(way_m)
     margins = memory.margins.replaced(s, margin, turning=turning)
     return replace(memory, margins=margins, anchor=Anchor(to_m, s) if slid else anchor)

@@ -8,6 +8,8 @@ known; what is, are the longest way that held the stem and the shortest that bro
 
     held < m <= broke                 tried next: sqrt(held broke), until broke is within 10 % of held; then broke
 
+A way that holds though it has broken loose before is believed for the move: the next is longer by `RAISE`. When that
+has broken loose, `held` is what it was, so that a margin that luck has made too long comes back within a few moves.
 A margin of which little is known is taken for its next of kin.
 """
 
@@ -33,6 +35,8 @@ class Margin:
 
     held_m: float = 0.0
     broke_m: float = 0.0
+    held_before_m: float | None = None
+    """The former before a way held that had broken loose, None if none has: one such may be luck, or a slow I/P's."""
 
     @property
     def way_m(self) -> float:
@@ -52,15 +56,18 @@ class Margin:
         """Return the margin after a slide of a way, m, that broke loose."""
         if self.broke_m and way_m > SHORT * self.broke_m:
             return self
-        held_m = FADES * self.held_m if way_m > self.held_m else way_m / BESIDE
+        believed_m = self.held_m if self.held_before_m is None else self.held_before_m
+        held_m = FADES * believed_m if way_m > believed_m else way_m / BESIDE
         return Margin(held_m, min(self.broke_m, way_m) if self.broke_m else way_m)
 
     def after_holding(self, way_m: float) -> "Margin":
         """Return the margin after a slide meant to go a way, m, that did not break loose."""
         if way_m <= 0.0:
             return self
-        contradicted = 0.0 < self.broke_m <= BESIDE * way_m
-        return Margin(max(self.held_m, way_m), RAISE * way_m if contradicted else self.broke_m)
+        if 0.0 < self.broke_m <= BESIDE * way_m:
+            before_m = self.held_m if self.held_before_m is None else self.held_before_m
+            return Margin(max(self.held_m, way_m), RAISE * way_m, before_m)
+        return Margin(max(self.held_m, way_m), self.broke_m)
 
     def times(self, factor: float) -> "Margin":
         """Return it so much longer."""

@@ -135,6 +135,35 @@ def test_the_stronger_counts_unless_they_disagree(
     assert evidence(rival, best) == pytest.approx(-(by_run + expected))
 
 
+def steady(one: Fit, more: dict[int, float]) -> Weighed:
+    """Return a rival of 40 stretches of 12.5 each and more in some, whose best leaves the sensor's noise alone."""
+    stretches = np.full(40, 12.5)
+    for at, cost in more.items():
+        stretches[at] += cost
+    cost = float(stretches.sum())
+    return Weighed(replace(one, cost=cost, count=1000), np.zeros(40), 1.0, stretches=stretches, steady=True)
+
+
+def test_a_mistimed_slip_tells_as_much_as_an_accident_that_has_not_happened(fits: dict[str, Fit]) -> None:
+    one = fits["preload"]
+    assert log_odds(steady(one, {}), steady(one, {7: 900.0, 8: 400.0})) == pytest.approx(np.log(41.0))
+    assert log_odds(steady(one, {}), steady(one, {7: 900.0, 30: 400.0, 31: 2.0})) == pytest.approx(
+        np.log(41.0) + 1.856, 0.1
+    )
+
+
+def test_what_many_stretches_say_alike_is_added_up_where_nothing_but_noise_is_left(fits: dict[str, Fit]) -> None:
+    everywhere = steady(fits["preload"], dict.fromkeys(range(40), 0.25))
+    assert log_odds(steady(fits["preload"], {}), everywhere) == pytest.approx(10.0)
+    scattering = replace(steady(fits["preload"], {}), steady=False)
+    assert log_odds(scattering, everywhere) < 1.0
+
+
+def test_what_luck_has_won_it_may_have_lost(fits: dict[str, Fit]) -> None:
+    one = fits["preload"]
+    assert log_odds(steady(one, {3: 900.0}), steady(one, {7: 900.0})) == pytest.approx(0.0)
+
+
 def test_a_parameter_more_is_paid_for(fits: dict[str, Fit]) -> None:
     one = fits["preload"]
     more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})

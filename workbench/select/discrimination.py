@@ -214,7 +214,9 @@ def discriminate(
     while outcome is None:
         left = budget - used
         chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
-        if chosen is None or (chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING):
+        if chosen is None or (
+            chosen.separation < IMITATED and not race.slips_tell and race.promised_by(chosen, left) < NOTHING
+        ):
             outcome = "not_separable"
             break
         played = player(chosen)

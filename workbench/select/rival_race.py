@@ -2,12 +2,18 @@
 
     lambda_i = n/2 log(C_i / C) + (k_i - k)/2 log n     log odds of the best against rival i; C cost, k parameters
     n = N var(c) / (m var(mean of c in a block))        independent ones of N samples: c loss of the best, sample by
-                                                        sample, m samples in a block of 2 s
+                                                        sample, m samples in a stretch of 2 s
     odds of the best = 1 / sum exp(-lambda_i)           against all the others together
 
 So the noise is what the best itself scatters by: where break-away jitters, its errors come in stretches, each of which
 counts once. Besides, lambda_i is at most z_i^2 / 2 as long as the errors of the two, second by second, differ by less
 than z_i = 2 standard errors (`block_errors`), as they must for a diagnosis to tell them apart.
+
+Where the best leaves nothing but the sensor's noise in any of B stretches, luck has mistimed no slip of it, and every
+stretch tells what it tells; but a mistimed slip, which spoils two of them at most, no more than an accident that has
+not happened in B stretches:
+
+    lambda_i = sum of n/2 (C_i,b - C_b) / C, each within +-log(1 + B) / 2, + (k_i - k)/2 log n
 
 What slips say (`slip_evidence`) is weighed beside the run: where both speak for the same rival the stronger counts, for
 they come from the same samples; where they disagree the one takes from the other.
@@ -20,7 +26,7 @@ is named, and the best must explain the experiments as well as a model can.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import exp, inf, log
@@ -31,12 +37,13 @@ import numpy as np
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import Composition
+from sim.karnopp import Vector
 from workbench.data.held_out import joined
 from workbench.data.record import ready, require_few_samples, require_fittable
 from workbench.fit.descent import MIDDLING, descended, settled
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.fit.objective import FINAL, SimulationError
+from workbench.fit.objective import FINAL, SimulationError, softs
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -64,16 +71,25 @@ class Weighed:
     """A rival in all recordings so far: its fit, log rms of its error by blocks, what is independent, its slips."""
 
     fit: Fit
-    logs: np.ndarray[Any, np.dtype[np.float64]]
+    logs: Vector
     share: float
     slips: Slips | None = None
+    stretches: Vector = field(default_factory=lambda: np.empty(0))
+    """C_b, (stretches,)."""
+    steady: bool = False
+    """Whether it leaves no more than the sensor's noise in any of them."""
 
 
 def log_odds(best: Weighed, rival: Weighed) -> float:
     """Return lambda_run of the best against a rival: 0 where nothing speaks against it."""
     n = best.share * best.fit.count
+    price = 0.5 * (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0))
+    if best.steady:
+        told = 0.5 * n * (rival.stretches - best.stretches) / max(best.stretches.sum(), np.finfo(float).tiny)
+        most = 0.5 * log(1.0 + told.size)
+        return max(0.0, float(np.clip(told, -most, most).sum()) + price)
     ratio = log(max(rival.fit.cost, np.finfo(float).tiny) / max(best.fit.cost, np.finfo(float).tiny))
-    by_cost = 0.5 * (n * ratio + (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0)))
+    by_cost = 0.5 * n * ratio + price
     _, z = relative_error_reduction(rival.logs, best.logs)
     return max(0.0, by_cost if z >= SAME_STANDARD_ERRORS else min(by_cost, 0.5 * max(0.0, z) ** 2))
 
@@ -135,8 +151,13 @@ class RivalRace:
     @property
     def alive(self) -> list[Fit]:
         """Fits of the rivals that have not lost yet, at least two, likeliest first."""
-        ranked = sorted(self.relative.items(), key=lambda each: -each[1])
-        return [self.fits[name] for i, (name, odds) in enumerate(ranked) if i < 2 or odds > 1.0 / ODDS]
+        relative = self.relative
+        return [self.fits[name] for i, name in enumerate(self._ranked) if i < 2 or relative[name] > 1.0 / ODDS]
+
+    @property
+    def _ranked(self) -> list[str]:
+        """Likeliest first."""
+        return sorted(self.fits, key=lambda name: -self.relative[name])
 
     @property
     def odds(self) -> float:
@@ -167,6 +188,12 @@ class RivalRace:
         best = self._all[self.best]
         told = [max(0.0, slip_odds(best, each)) for name, each in self._all.items() if name != self.best]
         return min(told, default=0.0) / best.slips.count if best.slips else 0.0
+
+    @property
+    def slips_tell(self) -> bool:
+        """Whether slips say anything of the likeliest two."""
+        first, second = (self._all[name].slips for name in self._ranked[:2])
+        return first is not None and second is not None
 
     @property
     def explained(self) -> bool:
@@ -245,8 +272,20 @@ class RivalRace:
         negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
         parts = np.cumsum([0, *map(len, self._recordings)])
         logs = [block_logs(self.record.time_s[a:b], error_m[a:b], negligible_m) for a, b in pairwise(parts.tolist())]
-        share = _independent_share(error_m / self._sigma_m, self.record.period_s)
-        return Weighed(found, np.concatenate(logs), share, slips(found, self.record, parts[:-1].tolist()))
+        cost = softs(error_m / self._sigma_m, FINAL)
+        stretches = [part for a, b in pairwise(parts.tolist()) for part in _stretches(cost[a:b], self.record.period_s)]
+        return Weighed(
+            found,
+            np.concatenate(logs),
+            _independent_share(cost, self.record.period_s),
+            slips(found, self.record, parts[:-1].tolist()),
+            np.array([np.nansum(each) for each in stretches]),
+            steady=self.record.noise_m is not None
+            and all(self._is_noise(each) for each in _stretches(error_m, self.record.period_s)),
+        )
+
+    def _is_noise(self, error_m: Vector) -> bool:
+        return not np.isfinite(error_m).any() or float(np.nanmean(error_m**2)) <= (RARELY_OFF * self._sigma_m) ** 2
 
 
 def _typical_m(time_s: np.ndarray[Any, Any], error_m: np.ndarray[Any, Any]) -> float:
@@ -254,13 +293,19 @@ def _typical_m(time_s: np.ndarray[Any, Any], error_m: np.ndarray[Any, Any]) -> f
     return exp(float(np.median(block_logs(time_s, error_m, 0.0))))
 
 
-def _independent_share(residuals: np.ndarray[Any, Any], period_s: float) -> float:
-    """Return n / N of the residuals, in units of the noise."""
-    loss = np.sqrt(1.0 + (residuals[np.isfinite(residuals)] / FINAL) ** 2)
+def _stretches(each: Vector, period_s: float) -> list[Vector]:
+    """Return what belongs to each stretch of `STRETCH_S`; the last one may be longer."""
     size = max(1, round(STRETCH_S / period_s))
-    blocks = loss[: loss.size // size * size].reshape(-1, size)
+    return np.split(each, range(size, each.size // size * size, size)) if each.size >= size else [each]
+
+
+def _independent_share(cost: Vector, period_s: float) -> float:
+    """Return n / N of the losses, sample by sample."""
+    cost = cost[np.isfinite(cost)]
+    size = max(1, round(STRETCH_S / period_s))
+    blocks = cost[: cost.size // size * size].reshape(-1, size)
     spread = size * float(np.var(blocks.mean(axis=1)))
-    return min(1.0, float(np.var(loss)) / spread) if spread > 0.0 else 1.0
+    return min(1.0, float(np.var(cost)) / spread) if spread > 0.0 else 1.0
 
 
 def _criterion(found: Fit) -> float:

@@ -1,0 +1,37 @@
+"""The shortest slide that breaks loose, as slides teach it."""
+
+from positioner.control.slide_margins import CLOSE, RAISE, Margin
+
+KNOWN = Margin(held_m=2.1e-3, broke_m=2.4e-3)
+
+
+def settled(margin: Margin, true_m: float, moves: int) -> Margin:
+    """Return a margin after moves, each of as many slides as it takes to break loose."""
+    for _ in range(moves):
+        while margin.way_m < true_m:
+            margin = margin.after_holding(margin.way_m)
+        margin = margin.after_breaking(margin.way_m)
+    return margin
+
+
+def test_a_way_between_held_and_broke_is_tried_until_they_are_close() -> None:
+    found = settled(Margin(held_m=1e-3, broke_m=4e-3), 2.3e-3, 6)
+    assert 2.3e-3 <= found.way_m <= 2.3e-3 * CLOSE
+    assert found.held_m < 2.3e-3
+
+
+def test_a_way_that_held_by_luck_makes_the_margin_longer_for_the_move_only() -> None:
+    margin = KNOWN.after_holding(2.5e-3)
+    assert margin.way_m > 2.5e-3
+    assert margin.sure_m == RAISE * 2.5e-3
+    assert settled(margin, 2.3e-3, 5).way_m <= CLOSE * 2.4e-3
+
+
+def test_ways_that_hold_again_are_believed() -> None:
+    """Friction has grown by half."""
+    found = settled(KNOWN, 3.4e-3, 8)
+    assert 3.4e-3 <= found.way_m <= 3.4e-3 * CLOSE
+
+
+def test_what_is_far_longer_than_broke_loose_says_nothing() -> None:
+    assert KNOWN.after_breaking(10e-3) == KNOWN
