@@ -32,13 +32,22 @@ from sim.effect import shipped_effect, shipped_effects
 from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
-from workbench.data.record import Record, ready
-from workbench.fit.fit_result import Fit
+from workbench.data.record import ready
 from workbench.fit.fitting import fit
-from workbench.select.discrimination import BUDGET, FEW_MOVES, Designer, Discrimination, Played, Player, discriminate
+from workbench.select.discrimination import (
+    BUDGET,
+    FEW_MOVES,
+    Designer,
+    Discrimination,
+    Played,
+    Player,
+    by_run_or_slips,
+    discriminate,
+)
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment
-from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, courses, designed
+from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, courses
+from workbench.select.rival_race import RivalRace
 
 PERIOD_S = 0.01
 RATE_PA_PER_S = 400e3
@@ -49,19 +58,13 @@ WHOLE = 1000
 
 
 def menu(
-    fits: Sequence[Fit],
-    record: Record,
-    bounds: Bounds,
-    *,
-    seed: int,
-    most_moves: int,
-    workers: int | None,
+    race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
 ) -> DesignedExperiment | None:
     """Choose the whole input of the menu as a diagnosis does; there are no shorter ones."""
     if most_moves in (FEW_MOVES, MOST_MOVES):
         return None
-    chosen = experiment(fits, record, seed=seed, workers=workers)
-    course = next(each for each in courses(record, bounds, WHOLE) if each.name == chosen.name)
+    chosen = experiment(race.alive, race.record, seed=seed, workers=workers)
+    course = next(each for each in courses(race.record, bounds, WHOLE) if each.name == chosen.name)
     return DesignedExperiment(course.within(bounds), np.inf)
 
 
@@ -82,7 +85,7 @@ def player(made: Hidden, dirty: bool, seed: int) -> Player:
     return play
 
 
-HOW: dict[str, tuple[Designer, int]] = {"designed": (designed, BUDGET), "menu": (menu, MENU_BUDGET)}
+HOW: dict[str, tuple[Designer, int]] = {"designed": (by_run_or_slips, BUDGET), "menu": (menu, MENU_BUDGET)}
 
 
 def line(case: Line, how: Sequence[str], workers: int) -> Line:

@@ -17,7 +17,6 @@ from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.discrimination import Played, discriminate
@@ -122,7 +121,7 @@ class Design:
         self.asked: list[int] = []
 
     def __call__(
-        self, fits: Sequence[Fit], record: Record, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+        self, race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
     ) -> DesignedExperiment | None:
         self.asked.append(most_moves)
         return DesignedExperiment(self.course if most_moves <= MOST_MOVES else self.otherwise, self.separation)

@@ -1,4 +1,4 @@
-"""What slips say of rivals on a valve whose friction scatters, and when they say nothing."""
+"""What slips say of rivals on a valve whose friction scatters, when they say nothing, and what more would say."""
 
 from dataclasses import replace
 
@@ -16,12 +16,14 @@ from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
+from workbench.select.experiment_design import Bounds
 from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
-from workbench.select.slip_evidence import Slips, _Forces, _log_between, _log_density, slips
+from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_n, slips
+from workbench.select.slip_promise import promised_by_slips
 
 BARE = drawn_valve(np.random.default_rng(11))
 PRELOADED = with_effect(BARE, "preload", force_n=60.0)
-RIVALS = ("preload", "spring_hardening", "sensor_offset")
+RIVALS = ("preload", "spring_hardening", "sensor_offset", "asymmetric_friction")
 ROWS = 3000
 
 
@@ -79,15 +81,22 @@ def test_larger_forces_all_alike_say_nothing(fits: dict[str, Fit], told: dict[st
     assert found.log_likelihood == pytest.approx(told["preload"].log_likelihood, abs=1.0)
 
 
-def test_a_rival_that_does_not_land_where_its_balance_says_is_not_told(fits: dict[str, Fit], record: Record) -> None:
+def test_landings_of_a_rival_that_does_not_land_where_its_balance_says_tell_less(
+    fits: dict[str, Fit], told: dict[str, Slips], record: Record
+) -> None:
     """Friction that rises from some speed down stops a slide before the balance at rest."""
     one = fits["preload"]
     rising = with_effect(
         ValveFile(valve=one.valve.valve), "stribeck", excess_n=120.0, velocity_m_per_s=0.01, exponent=2.0
     )
     own = {name: each for name, each in one.parameters.items() if "." not in name}
-    assert slips(replace(one, valve=rising, parameters=own), record, [0, ROWS]) is None
-    assert slips(replace(one, valve=ValveFile(valve=one.valve.valve), parameters=own), record, [0, ROWS]) is not None
+    needed = needed_n(replace(one, valve=rising, parameters=own), record, [0, ROWS])
+    assert needed > 3.0 * needed_n(one, record, [0, ROWS])
+    less = {name: slips(fits[name], record, [0, ROWS], needed) for name in ("preload", "spring_hardening")}
+    assert less["preload"] is not None
+    assert less["spring_hardening"] is not None
+    apart = told["preload"].log_likelihood - told["spring_hardening"].log_likelihood
+    assert less["preload"].log_likelihood - less["spring_hardening"].log_likelihood < 0.7 * apart
 
 
 def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recording]) -> None:
@@ -96,7 +105,7 @@ def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recordin
 
 
 def test_the_slope_is_that_of_the_loss(fits: dict[str, Fit], record: Record) -> None:
-    forces = _Forces(fits["preload"], record, [0, ROWS])
+    forces = SlipForces(fits["preload"], record, [0, ROWS])
     u = forces.first() + 0.05 * np.random.default_rng(0).standard_normal(forces.first().size)
     apart = [
         (forces.loss_and_slope(u + step)[0] - forces.loss_and_slope(u - step)[0]) / 2e-4
@@ -168,3 +177,36 @@ def test_a_parameter_more_is_paid_for(fits: dict[str, Fit]) -> None:
     one = fits["preload"]
     more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})
     assert slip_odds(weighed(one, 500.0, 0.0, 7.0), weighed(more, 500.0, 0.0, 7.0)) == pytest.approx(0.5 * np.log(100))
+
+
+def promised(
+    fits: dict[str, Fit], told: dict[str, Slips], names: tuple[str, ...], record: Record, window_m: float = 0.2
+) -> float:
+    low_pa, high_pa = float(record.command_pa.min()), float(record.command_pa.max())
+    bounds = Bounds(low_pa, high_pa, 400e3, 26.0, -0.1 * window_m, window_m)
+    found = promised_by_slips([(fits[name], told[name]) for name in names], record, [0, ROWS], bounds, 8, 0)
+    return 0.0 if found is None else found[1]
+
+
+def test_of_twins_nothing_is_promised(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:
+    assert promised(fits, told, ("preload", "preload"), record) < 1e-9
+
+
+def test_a_bent_balance_promises_more_than_a_break_away(
+    fits: dict[str, Fit], told: dict[str, Slips], record: Record
+) -> None:
+    """Preload and asymmetric friction land alike, and differ by a share of F_s - F_c where they break loose."""
+    apart = promised(fits, told, ("preload", "asymmetric_friction"), record)
+    assert apart > 0.02
+    assert promised(fits, told, ("preload", "spring_hardening"), record) > 2.0 * apart
+
+
+def test_of_three_the_least_distinct_two_count(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:
+    apart = promised(fits, told, ("preload", "asymmetric_friction"), record)
+    assert promised(fits, told, ("preload", "spring_hardening", "asymmetric_friction"), record) <= apart
+
+
+def test_no_course_inside_the_bounds_is_no_promise(
+    fits: dict[str, Fit], told: dict[str, Slips], record: Record
+) -> None:
+    assert promised(fits, told, ("preload", "spring_hardening"), record, window_m=1e-9) == 0.0

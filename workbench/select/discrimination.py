@@ -22,7 +22,6 @@ from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
 from sim.effect import Effect
-from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import parameters_json
@@ -59,10 +58,19 @@ class Designer(Protocol):
     """Chooses the next experiment."""
 
     def __call__(
-        self, fits: Sequence[Fit], record: Record, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+        self, race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
     ) -> DesignedExperiment | None:
         """Return it; None if none is allowed."""
         ...
+
+
+def by_run_or_slips(
+    race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+) -> DesignedExperiment | None:
+    """Return the experiment that its run or its slips recommend, whichever promises more a move."""
+    by_run = designed(race.alive, race.record, bounds, seed=seed, most_moves=most_moves, workers=workers)
+    both = [each for each in (by_run, race.slip_experiment(bounds, most_moves, seed)) if each]
+    return max(both, key=lambda each: race.promised_by(each, most_moves), default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +191,7 @@ def discriminate(
     library: Mapping[str, Effect],
     *,
     budget: int = BUDGET,
-    design: Designer = designed,
+    design: Designer = by_run_or_slips,
     seed: int = 0,
     workers: int | None = None,
     on_round: Callable[[Round], None] | None = None,
@@ -214,9 +222,7 @@ def discriminate(
     while outcome is None:
         left = budget - used
         chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
-        if chosen is None or (
-            chosen.separation < IMITATED and not race.slips_tell and race.promised_by(chosen, left) < NOTHING
-        ):
+        if chosen is None or (chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING):
             outcome = "not_separable"
             break
         played = player(chosen)
@@ -244,7 +250,7 @@ def _chosen(
     """
     best = None
     for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):
-        chosen = design(race.alive, race.record, bounds, seed=seed, most_moves=most, workers=workers)
+        chosen = design(race, bounds, seed=seed, most_moves=most, workers=workers)
         if chosen is None:
             continue
         if race.promised(chosen) >= SURE * log(ODDS):

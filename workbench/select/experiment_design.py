@@ -146,6 +146,8 @@ class DesignedExperiment(Brief):
 
     course: Course
     separation: float
+    by_slips: float = 0.0
+    """By how much its slips promise to raise the log odds of the least distinct pair; 0: nobody has asked."""
 
     def experiment(self, period_s: float) -> Experiment:
         """Return it as an input sampled at a period, s."""
@@ -293,7 +295,7 @@ class Rivalry:
         for draw in draws:
             logs = np.full((len(self._compositions),) * 2, np.inf)
             for i in range(len(self._compositions)):
-                answer = self._answer(i, course, draw)
+                answer = self.answer(i, course, draw)
                 if answer is None:
                     return -np.inf
                 costs = [cost(answer, j) for j in range(len(self._compositions))]
@@ -301,11 +303,19 @@ class Rivalry:
             told.append(0.5 * (logs + logs.T))
         return float(np.min(np.mean(told, axis=0)))
 
-    def _answer(self, i: int, course: Course, draw: int) -> Record | None:
+    def answer(self, i: int, course: Course, draw: int, noise: float = 1.0) -> Record | None:
+        """Return how valve i answers a course; None where the stem leaves its window.
+
+        Args:
+            i: of the fits.
+            course: what is played to it.
+            draw: of the noise of sensor and pressure.
+            noise: of the pressure, over what makes the valve repeat itself no better than the recordings show.
+        """
         composition, period_s = self._compositions[i], self._record.period_s
         generator = np.random.default_rng([self._seed, draw])
         time_s, command_pa = course.sampled(period_s)
-        noise_pa = self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
+        noise_pa = noise * self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
         periods_s = np.diff(time_s)
         response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, periods_s, step_s=FINE_STEP_S)
         # The first hold brings the valve from rest to where the course begins: a free run starts after it.

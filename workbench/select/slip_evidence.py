@@ -12,13 +12,13 @@ by S_c and S_s, N, from slip to slip, and half as much, by d_r and g_r, from rec
 density of 4 degrees of freedom, T its distribution function: a slip may be told wrongly. A rival is weighed by the most
 that its parameters, scatters and offsets make of l. A slip mistimed by luck spoils seconds of a free run, and no force.
 
-Parameters are held loosely to the fit, so that what slips do not tell stays. Of a rival whose own simulation does not
-land where its static balance says slips tell nothing.
+Parameters are held loosely to the fit, so that what slips do not tell stays. A rival whose own simulation does not land
+where its static balance says needs S_c to be so large that it does; rivals are compared at the most that any needs.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import lgamma, log, pi
+from math import lgamma, log, nan, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -57,30 +57,48 @@ TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True, slots=True)
 class Slips:
-    """What slips say of a rival: their log likelihood, and of how many landings and break-aways it is."""
+    """What slips say of a rival: their log likelihood, of how many landings and break-aways, and their scatters, N."""
 
     log_likelihood: float
     count: int
+    coulomb_n: float = nan
+    """S_c."""
+    static_n: float = nan
+    """S_s."""
 
 
-def slips(fit: Fit, record: Record, first_rows: Sequence[int]) -> Slips | None:
-    """Return what slips say of a fitted valve; None where there are too few, or its balance does not tell them.
+def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_n: float = LEAST_N) -> Slips | None:
+    """Return what slips say of a fitted valve; None where there are too few.
 
     Args:
         fit: the rival.
         record: of all recordings.
         first_rows: of each recording in the record.
+        least_n: scatter of landings, N, of rivals that are to be compared: the most of what they need (`needed_n`).
     """
-    forces = _Forces(fit, record, first_rows)
+    forces = SlipForces(fit, record, first_rows)
     if forces.landings.count < FEWEST:
         return None
-    found = minimize(forces.loss_and_slope, forces.first(), jac=True, method="L-BFGS-B", bounds=forces.bounds)
-    own = replace(record, position_m=forces.error.run.position_m(forces.error.composition.theta))
-    lands = _Forces(fit, own, first_rows)
-    off = np.abs(lands.left(lands.fitted).e_n) / np.hypot(np.exp(found.x[-2]), lands.own_n)
-    if off.size < FEWEST or np.quantile(off, MOSTLY) > TOLD:
-        return None
-    return Slips(-float(found.fun), forces.count)
+    scatter = (log(min(max(least_n, LEAST_N), MOST_N)), log(MOST_N)), (log(LEAST_N), log(MOST_N))
+    begin = forces.first()
+    begin[-2] = max(begin[-2], scatter[0][0])
+    bounds = [*[(None, None)] * (begin.size - 2), *scatter]
+    found = minimize(forces.loss_and_slope, begin, jac=True, method="L-BFGS-B", bounds=bounds)
+    return Slips(-float(found.fun), forces.count, *np.exp(found.x[-2:]).tolist())
+
+
+def needed_n(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
+    """Return the scatter, N, within which most slides of a rival's own simulation land where its balance says.
+
+    A stem that creeps, or whose friction rises as it slows down, ends elsewhere: so much its landings do not tell.
+    """
+    run = SlipForces(fit, record, first_rows).error
+    own = replace(record, position_m=run.run.position_m(run.composition.theta))
+    lands = SlipForces(fit, own, first_rows)
+    if lands.landings.count < FEWEST:
+        return 0.0
+    off_n = lands.left(lands.fitted).e_n / TOLD
+    return float(np.sqrt(max(0.0, np.quantile(off_n**2 - lands.own_n**2, MOSTLY))))
 
 
 class Left(NamedTuple):
@@ -92,7 +110,7 @@ class Left(NamedTuple):
     upper_n: Vector
 
 
-class _Forces:
+class SlipForces:
     """The forces of a rival's slips, and their loss over u: coordinates, offsets and log scatters.
 
     u = ((z - z_fit) / HELD of what is free, d_r / (S_c / 2), g_r / (S_s / 2), log S_c, log S_s)
@@ -115,12 +133,6 @@ class _Forces:
         self._free = [i for i, each in enumerate(parameters) if each.index != VISCOUS]
         self._recordings = len(first_rows)
         self.count = len(self._landed) + len(self._broke)
-
-    @property
-    def bounds(self) -> list[tuple[float | None, float | None]]:
-        """Of u."""
-        scatter = (log(LEAST_N), log(MOST_N))
-        return [*[(None, None)] * (len(self._free) + 2 * self._recordings), scatter, scatter]
 
     def first(self) -> Vector:
         """Return u to begin with: the fit."""
@@ -155,7 +167,7 @@ class _Forces:
         scaled = (coulomb_n / scale_n) ** 2
         slope = np.concatenate(
             [
-                [sum(of @ by for of, by in zip(of_forces, moved, strict=True)) for moved in self._moved(z, left)],
+                [sum(of @ by for of, by in zip(of_forces, moved, strict=True)) for moved in self.moved(z, left)],
                 -BETWEEN * coulomb_n * self._by_recording(of_forces.e_n, self._landed_in),
                 BETWEEN * static_n * self._by_recording(by_g, self._broke_in),
                 [-(scaled * (by_off * off + 1.0)).sum() - of_forces.e_n @ d_n],
@@ -165,7 +177,7 @@ class _Forces:
         slope[:-2] -= u[:-2]
         return float(0.5 * (u[:-2] @ u[:-2]) - value), -slope
 
-    def _moved(self, z: Vector, left: "Left") -> Iterator["Left"]:
+    def moved(self, z: Vector, left: "Left") -> Iterator["Left"]:
         """Yield the forces' slopes over each free coordinate, in steps of u; flat beyond a bound."""
         for i in self._free:
             there = z.copy()

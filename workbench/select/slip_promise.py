@@ -1,0 +1,105 @@
+"""What the slips of an experiment promise to tell of rivals: courses of the menu by the forces of their slips.
+
+A rival A answers a course, undisturbed. Where its slides land and break loose its balances are held against those of
+another, B:
+
+    r = ((e_j,B - e_j,A)/S_j, (f_k,B - f_k,A)/T_k)       f_k middle of the interval of F_s,k - F_s, see `slip_evidence`
+    S_j^2 = S_c^2 + sigma_j^2,  T_k^2 = S_s^2 + w_k^2/12   w_k width of the interval: a large step tells little of F_s
+    l = (nu + 1)/(nu + 3) min over u of |r + J u|^2/2 + u' H u/2              H = 1 + J' J over the recordings so far
+
+u are B's parameters, held as the recordings know them, and an offset of either friction in the new recording; nu is the
+freedom of t. By l the log odds of A against B are to rise. A course promises the least of all pairs.
+
+On a valve that scatters a slow ramp of many slips tells more than a large step: each leg is one move.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.karnopp import Vector
+from workbench.data.record import Record
+from workbench.fit.fit_result import Fit
+from workbench.fit.landings import FEWEST
+from workbench.fit.threads import on_threads
+from workbench.select.experiment_design import SEARCHED, Bounds, Course, Rivalry, courses
+from workbench.select.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
+
+Matrix = NDArray[np.float64]
+
+
+def promised_by_slips(
+    rivals: Sequence[tuple[Fit, Slips]], record: Record, first_rows: Sequence[int], bounds: Bounds, most: int, seed: int
+) -> tuple[Course, float] | None:
+    """Return the course of so many moves at most whose slips promise most a move, and by how much the log odds rise.
+
+    Args:
+        rivals: two or more, and what slips have said of each.
+        record: of all recordings so far.
+        first_rows: of each recording in the record.
+        bounds: to stay inside.
+        most: moves.
+        seed: of the noise under which the rivals answer.
+    """
+    fits = [fit for fit, _ in rivals]
+    rivalry = Rivalry(fits, record, bounds, seed)
+    known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
+    inside = [course.within(bounds) for course in courses(record, bounds, most)]
+
+    def promised(course: Course) -> float:
+        told = np.inf
+        for i in range(len(fits)):
+            answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
+            if answer is None:
+                return 0.0
+            told = min(told, *(each.told_by(answer, known[i]) for j, each in enumerate(known) if j != i))
+        return told
+
+    rated = list(on_threads(promised, inside, None))
+    best = max(range(len(inside)), key=lambda i: rated[i] / max(1, inside[i].moves), default=None)
+    return None if best is None or not rated[best] > 0.0 else (inside[best], rated[best])
+
+
+class _Known:
+    """A rival, and what the slips so far say of its parameters."""
+
+    def __init__(self, fit: Fit, told: Slips, record: Record, first_rows: Sequence[int]) -> None:
+        self._fit = fit
+        self._told = told
+        forces = SlipForces(fit, record, first_rows)
+        here = forces.left(forces.fitted)
+        J = self._slopes(forces, here) / self._scatter_n(forces, here)[:, None]
+        self._information = np.eye(J.shape[1]) + J.T @ J
+
+    def told_by(self, answer: Record, answered: "_Known") -> float:
+        """Return l against this valve, of the one that answered; 0 where there are too few slips."""
+        forces, others = (SlipForces(each._fit, answer, [0]) for each in (self, answered))
+        if forces.landings.count < FEWEST:
+            return 0.0
+        here = forces.left(forces.fitted)
+        scatter_n = self._scatter_n(forces, here)
+        r = (_middles(here) - _middles(others.left(others.fitted))) / scatter_n
+        landings = np.arange(r.size) < forces.own_n.size
+        J = self._slopes(forces, here) / scatter_n[:, None]
+        J = np.column_stack([J, -BETWEEN * landings, -BETWEEN * ~landings])
+        H = np.eye(J.shape[1])
+        H[:-2, :-2] = self._information
+        u = -np.linalg.solve(J.T @ J + H, J.T @ r)
+        left = r + J @ u
+        return float(0.5 * (FREEDOM + 1.0) / (FREEDOM + 3.0) * (left @ left + u @ H @ u))
+
+    def _slopes(self, forces: SlipForces, here: Left) -> Matrix:
+        """Return what the forces change by with the coordinates, N, (slips, coordinates)."""
+        return np.column_stack([_middles(each) for each in forces.moved(forces.fitted, here)])
+
+    def _scatter_n(self, forces: SlipForces, here: Left) -> Vector:
+        """Return S_j and T_k, N, (slips,)."""
+        widths_n = here.upper_n - here.lower_n
+        landed = np.hypot(self._told.coulomb_n, forces.own_n)
+        return np.concatenate([landed, np.hypot(self._told.static_n, widths_n / 12.0**0.5)])
+
+
+def _middles(left: Left) -> Vector:
+    """Return e_j and f_k, N, (slips,)."""
+    return np.concatenate([left.e_n, 0.5 * (left.lower_n + left.upper_n)])
