@@ -249,12 +249,13 @@ def main() -> None:
     parser.add_argument("--family", nargs="*", choices=SEEDS, default=list(SEEDS), help="families to run (all)")
     parser.add_argument("--cases", type=int, help="run at most so many now (all)")
     parser.add_argument("--out", type=Path, default=FOLDER, help="where a line a case is kept")
+    parser.add_argument("--workers", type=int, help="processes (one a core)")
     parser.add_argument("--table", action="store_true", help="run nothing, print the tables")
     arguments = parser.parse_args()
     file = arguments.out / KEPT
     lines = kept(file)
     todo = [] if arguments.table else missing(arguments.family, lines)[: arguments.cases]
-    for each in run(file, line, todo, None):
+    for each in run(file, line, todo, arguments.workers):
         lines.append(each)
         print(_told(each), flush=True)
     print(*report(lines), sep="\n")

@@ -83,6 +83,7 @@ def test_a_command_that_cannot_do_its_work_ends_the_run(command: str, tmp_path: 
     ("source_name", "page_name"),
     [
         ("source.md", "tutorial.md"),
+        ("slow_source.md", "slow-data.md"),
         ("recordings_source.md", "recordings.md"),
         ("valve_file_source.md", "valve-file.md"),
     ],

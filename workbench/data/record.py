@@ -20,7 +20,7 @@ from config.noise import quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
-from workbench.data.motion import rests_first, slips
+from workbench.data.motion import AT_ONCE, rests_first, slips
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 
 GAP = 10.0
@@ -155,22 +155,25 @@ def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
     """Let the segments that begin in motion begin at rest."""
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
-        rest = rests_first(position_m, record.scale_m, _held_at_first(record, first, end))
+        held = _held_at_first(record, first, end)
+        measured = record.pressure_pa is not None or record.load_n is not None
+        rest = rests_first(position_m, record.scale_m, 0 if measured else held)
+        if rest and rest < held - AT_ONCE <= LATEST_REST * (end - first):
+            # What drives it may still have been on its way when it came to rest: the longer ago, the less is left.
+            rest = held - AT_ONCE
         if rest is None or rest > LATEST_REST * (end - first) or end - first - rest < SHORTEST:
             yield first, end
             continue
         if rest:
             notes.append(
                 f"the stem is in motion at sample {first + 1}, or about to move: simulated and judged from sample "
-                f"{first + rest + 1} on, where it first rests"
+                f"{first + rest + 1} on, where it rests"
             )
         yield first + rest, end
 
 
 def _held_at_first(record: Record, first: int, end: int) -> int:
-    """Return for how many samples a segment's command stays what it was; 0 where what drives the stem is measured."""
-    if record.pressure_pa is not None or record.load_n is not None:
-        return 0
+    """Return for how many samples a segment's command stays what it was."""
     changed = np.flatnonzero(record.command_pa[first:end] != record.command_pa[first])
     return int(changed[0]) if changed.size else end - first
 

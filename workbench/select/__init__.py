@@ -16,6 +16,7 @@ Its files:
     discrimination                                rivals told apart by one experiment after another
     rival_race                                    the rivals weighed against each other in all recordings so far
     slip_evidence                                 what slips say of a rival: forces, whatever came between
+    slip_promise                                  what the slips of an experiment promise to say
     residual_structure                            the meter of what is unexplained
     extension, extension_json                     adds what was found; the same as JSON
     extension_journal                             what was added when, and why
