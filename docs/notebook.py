@@ -8,8 +8,8 @@ The source is Markdown. Everything happens in one folder that goes away afterwar
     ```sh             commands, one a line or continued by a backslash; one that ends in & goes on until the page ends
     ```python         code; all blocks share their names, and a figure saved as *.png follows the block that saved it
 
-Output follows its block, with an exit status of 1 (what was asked about does not hold); anything worse ends the run.
-Nothing else of the source is changed.
+Output but for progress follows its block, with an exit status of 1 (what was asked about does not hold); anything worse
+ends the run. Nothing else of the source is changed.
 """
 
 import io
@@ -25,6 +25,8 @@ from pathlib import Path
 from typing import Any
 
 BLOCK = re.compile(r"^```(?P<kind>toml|sh|python)(?: (?P<name>\S+))?\n(?P<text>.*?)^```\n", re.MULTILINE | re.DOTALL)
+PROGRESS = re.compile(r"^.*: \d+%, \d+ s so far\n", re.MULTILINE)
+"""What a command says while it works, which is another line each time."""
 HOLDS_NOT = 1
 END_WITHIN_S = 20.0
 
@@ -58,7 +60,8 @@ class Notebook:
         )
         if done.returncode > HOLDS_NOT:
             raise SystemExit(f"`{command}` ends with {done.returncode}:\n{done.stdout}")
-        return done.stdout + (f"[exit status {done.returncode}]\n" if done.returncode else "")
+        printed = PROGRESS.sub("", done.stdout)
+        return printed + (f"[exit status {done.returncode}]\n" if done.returncode else "")
 
     def _code(self, text: str) -> str:
         printed = io.StringIO()
