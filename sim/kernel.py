@@ -8,7 +8,7 @@ another name, so that an old kernel is never taken for a new one; what is compil
 Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a processor, so that
 numba is started, and LLVM translates, only where a kernel is new.
 
-Of several processes that need a kernel at once, one compiles and the others wait: the file is locked meanwhile.
+Of several processes that need a kernel at once, one compiles and the others wait: a file beside it is locked meanwhile.
 """
 
 import atexit
@@ -198,9 +198,10 @@ def _make_private(folder: Path) -> None:
 def _locked(path: Path) -> Iterator[None]:
     """Keep other processes from compiling the file meanwhile.
 
-    Where the file system has no locks each compiles for itself.
+    Where the file system has no locks each compiles for itself. The text itself is no lock: of two processes that both
+    find it missing the second puts another file in its place.
     """
-    with path.open() as file:
+    with path.with_suffix(".lock").open("a") as file:
         with suppress(OSError):
             fcntl.flock(file, fcntl.LOCK_EX)
         yield
