@@ -52,12 +52,16 @@ class Margin:
         """The way that has broken loose, m; where none has, the way to give."""
         return self.broke_m or self.way_m
 
+    @property
+    def _believed_m(self) -> float:
+        """The longest way that held and had not broken loose before, m."""
+        return self.held_m if self.held_before_m is None else self.held_before_m
+
     def after_breaking(self, way_m: float) -> "Margin":
         """Return the margin after a slide of a way, m, that broke loose."""
         if self.broke_m and way_m > SHORT * self.broke_m:
             return self
-        believed_m = self.held_m if self.held_before_m is None else self.held_before_m
-        held_m = FADES * believed_m if way_m > believed_m else way_m / BESIDE
+        held_m = FADES * self._believed_m if way_m > self._believed_m else way_m / BESIDE
         return Margin(held_m, min(self.broke_m, way_m) if self.broke_m else way_m)
 
     def after_holding(self, way_m: float) -> "Margin":
@@ -65,8 +69,7 @@ class Margin:
         if way_m <= 0.0:
             return self
         if 0.0 < self.broke_m <= BESIDE * way_m:
-            before_m = self.held_m if self.held_before_m is None else self.held_before_m
-            return Margin(max(self.held_m, way_m), RAISE * way_m, before_m)
+            return Margin(max(self.held_m, way_m), RAISE * way_m, self._believed_m)
         return Margin(max(self.held_m, way_m), self.broke_m)
 
     def times(self, factor: float) -> "Margin":

@@ -21,6 +21,7 @@ Every course stays inside its bounds: pressures, rate, length; and every rival s
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -279,7 +280,11 @@ class Rivalry:
         self._compositions = [Composition.from_file(each.valve) for each in fits]
         self._names = [tuple(each.parameters) for each in fits]
         self._sigma_m = max(record.floor_or_scale_m, min(each.rms_m for each in fits))
-        self._information = [self._known(i) for i in range(len(fits))]
+
+    @cached_property
+    def _information(self) -> list[NDArray[np.float64]]:
+        """H of each rival."""
+        return [self._known(i) for i in range(len(self._compositions))]
 
     def score(self, course: Course) -> float:
         """Return the separation after one step, by its logarithm; minus infinity where the stem leaves its window."""

@@ -201,7 +201,7 @@ class RivalRace:
         told = [(each.fit, each.slips) for each in left if each.slips]
         if len(told) < len(left):
             return None
-        chosen = promised_by_slips(told, self.record, self._first_rows, bounds, most_moves, seed)
+        chosen = promised_by_slips(told, self.record, self._first_rows, bounds, most_moves, seed, self._workers)
         return None if chosen is None else DesignedExperiment(chosen[0], 1.0, by_slips=chosen[1])
 
     @property

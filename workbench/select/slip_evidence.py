@@ -92,8 +92,8 @@ def needed_n(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
 
     A stem that creeps, or whose friction rises as it slows down, ends elsewhere: so much its landings do not tell.
     """
-    run = SlipForces(fit, record, first_rows).error
-    own = replace(record, position_m=run.run.position_m(run.composition.theta))
+    composition = Composition.from_file(fit.valve)
+    own = replace(record, position_m=FreeRun(composition, record).position_m(composition.theta))
     lands = SlipForces(fit, own, first_rows)
     if lands.landings.count < FEWEST:
         return 0.0

@@ -30,7 +30,13 @@ Matrix = NDArray[np.float64]
 
 
 def promised_by_slips(
-    rivals: Sequence[tuple[Fit, Slips]], record: Record, first_rows: Sequence[int], bounds: Bounds, most: int, seed: int
+    rivals: Sequence[tuple[Fit, Slips]],
+    record: Record,
+    first_rows: Sequence[int],
+    bounds: Bounds,
+    most: int,
+    seed: int,
+    workers: int | None = None,
 ) -> tuple[Course, float] | None:
     """Return the course of so many moves at most whose slips promise most a move, and by how much the log odds rise.
 
@@ -40,7 +46,8 @@ def promised_by_slips(
         first_rows: of each recording in the record.
         bounds: to stay inside.
         most: moves.
-        seed: of the noise under which the rivals answer.
+        seed: of the sensor's noise under which the rivals answer.
+        workers: threads, by default one a core.
     """
     fits = [fit for fit, _ in rivals]
     rivalry = Rivalry(fits, record, bounds, seed)
@@ -53,10 +60,15 @@ def promised_by_slips(
             answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
             if answer is None:
                 return 0.0
-            told = min(told, *(each.told_by(answer, known[i]) for j, each in enumerate(known) if j != i))
+            forces = [SlipForces(fit, answer, [0]) for fit in fits]
+            if forces[i].landings.count < FEWEST:
+                return 0.0
+            left = [each.left(each.fitted) for each in forces]
+            others = (j for j in range(len(fits)) if j != i)
+            told = min(told, *(known[j].told_by(forces[j], left[j], left[i]) for j in others))
         return told
 
-    rated = list(on_threads(promised, inside, None))
+    rated = list(on_threads(promised, inside, workers))
     best = max(range(len(inside)), key=lambda i: rated[i] / max(1, inside[i].moves), default=None)
     return None if best is None or not rated[best] > 0.0 else (inside[best], rated[best])
 
@@ -65,21 +77,16 @@ class _Known:
     """A rival, and what the slips so far say of its parameters."""
 
     def __init__(self, fit: Fit, told: Slips, record: Record, first_rows: Sequence[int]) -> None:
-        self._fit = fit
         self._told = told
         forces = SlipForces(fit, record, first_rows)
         here = forces.left(forces.fitted)
         J = self._slopes(forces, here) / self._scatter_n(forces, here)[:, None]
         self._information = np.eye(J.shape[1]) + J.T @ J
 
-    def told_by(self, answer: Record, answered: "_Known") -> float:
-        """Return l against this valve, of the one that answered; 0 where there are too few slips."""
-        forces, others = (SlipForces(each._fit, answer, [0]) for each in (self, answered))
-        if forces.landings.count < FEWEST:
-            return 0.0
-        here = forces.left(forces.fitted)
+    def told_by(self, forces: SlipForces, here: Left, answered: Left) -> float:
+        """Return l against this valve, of the one that answered, from the forces of both in the answer."""
         scatter_n = self._scatter_n(forces, here)
-        r = (_middles(here) - _middles(others.left(others.fitted))) / scatter_n
+        r = (_middles(here) - _middles(answered)) / scatter_n
         landings = np.arange(r.size) < forces.own_n.size
         J = self._slopes(forces, here) / scatter_n[:, None]
         J = np.column_stack([J, -BETWEEN * landings, -BETWEEN * ~landings])
