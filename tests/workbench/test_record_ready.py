@@ -11,6 +11,7 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
 from workbench.data.noise_floor import noise_std_m, repeatability_m
+from workbench.data.motion import AT_ONCE
 from workbench.data.record import ready, require_units
 
 
@@ -167,7 +168,7 @@ def test_a_motion_that_no_command_of_the_record_began_is_not_judged() -> None:
     recording = begun_before()
     record = ready(recording)
     ((first, _),) = record.segments
-    assert 20 < first < 250  # before the command changes, when the motion is long over
+    assert first == 250 - AT_ONCE, "just before the command changes: the lag has had the longest time to settle"
     assert f"judged from sample {first + 1} on, where it rests" in record.notes[-1]
     later = {name: column[first:] for name, column in recording.columns.items()}
     assert ready(Recording(later)).segments == ((0, 1000 - first),), "what begins at rest is judged from there"
