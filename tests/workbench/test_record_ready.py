@@ -10,8 +10,8 @@ from config.valve_file import EffectTable
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
-from workbench.data.noise_floor import noise_std_m, repeatability_m
 from workbench.data.motion import AT_ONCE
+from workbench.data.noise_floor import noise_std_m, repeatability_m
 from workbench.data.record import ready, require_units
 
 
