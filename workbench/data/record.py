@@ -70,6 +70,8 @@ class Record(Brief):
     repeatability_m: float | None
     """How well the valve repeats itself, None where the command does not."""
     by_setpoint: bool = False
+    commanded_from: tuple[int, ...] = ()
+    """For each segment the row from which its command is known: what lies between was left out, being in motion."""
 
     @property
     def floor_m(self) -> float | None:
@@ -148,11 +150,13 @@ def ready(recording: Recording) -> Record:
         repeated_m,
         recording.by_setpoint,
     )
-    return replace(record, segments=tuple(_from_rest(record, notes)), notes=tuple(notes))
+    at_rest = tuple(_from_rest(record, notes))
+    begun = tuple(first for first, _ in segments)
+    return replace(record, segments=at_rest, notes=tuple(notes), commanded_from=begun)
 
 
 def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
-    """Let the segments that begin in motion begin at rest."""
+    """Let the segments that begin in motion begin at rest, each where it was in their order."""
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
         held = _held_at_first(record, first, end)

@@ -8,6 +8,9 @@ rate, begins with the pressure nearest to the first command of those that balanc
     at rest      |A p - k_s x| <= F_s
     in motion    A p = k_s x + F_v v + F_c sign v
 
+Of a recording that begins in motion, and is judged from a rest on, the commands before are known: the pressure path
+begins with the recording and follows them, with the stem held where it comes to rest.
+
 Behind a positioner no command is a pressure: it begins at rest, with what the record tells of it (`initial_state`).
 
 Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
@@ -20,7 +23,7 @@ samples, that of a period is the one at its end, the measured positions say whic
 a slide ended in are judged.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
@@ -49,6 +52,7 @@ from workbench.model.initial_state import (
     initial_state,
     landed_pa,
 )
+from workbench.model.lead import Lead, lead_of
 from workbench.model.sampling import Motion, Sampling, landings, sampling
 
 
@@ -96,6 +100,8 @@ class Segment(NamedTuple):
     begin: InitialState
     before: BeforeStart | None
     """Behind a positioner: what is known of it from before."""
+    lead: Lead | None
+    """Where a pressure path that remembers was commanded before."""
     drive_pa: Vector
     """Held from each of its samples to the next, Pa."""
     load_n: Vector | None
@@ -134,14 +140,16 @@ class FreeRun:
         drive_pa = _measured(record, self.by) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
+        leads = [lead_of(record, self._composition, drive_pa, segment) for segment in range(len(record.segments))]
         if self.by.slow:
             self._glide = self._composition.quasi_static.glide
-            self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure)
+            self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure, leads)
             return
         longest_s = accuracy.steps * self._composition.step_s
         by_setpoint = self._composition.by_setpoint
         self._segments = [
-            _segment(record, drive_pa, first, end, longest_s, by_setpoint=by_setpoint) for first, end in record.segments
+            _segment(record, drive_pa, rows, longest_s, lead, by_setpoint=by_setpoint)
+            for rows, lead in zip(record.segments, leads, strict=True)
         ]
 
     @property
@@ -206,6 +214,8 @@ class FreeRun:
         for each in self._slow:
             drive_pa = each.drive_pa if each.load_n is None else each.drive_pa + each.load_n / vector[AREA]
             state = self._begin(vector, each.begin, float(self.record.time_s[each.rows[0]]), float(drive_pa[0]))
+            if each.lead:
+                self._remember(vector, state, each.lead, each.step_s)
             path = np.empty((PATH_ROWS, each.rows.size))
             self._glide(vector, state, drive_pa, each.periods_s, each.told, each.step_s, path)
             yield each, path
@@ -226,7 +236,10 @@ class FreeRun:
         drive_pa = segment.drive_pa if segment.load_n is None else segment.drive_pa + segment.load_n / theta[AREA]
         time_s = float(self.record.time_s[segment.first])
         if segment.before is None:
-            return drive_pa, self._begin(theta, segment.begin, time_s, float(drive_pa[0]))
+            state = self._begin(theta, segment.begin, time_s, float(drive_pa[0]))
+            if segment.lead:
+                self._remember(theta, state, segment.lead, segment.step_s)
+            return drive_pa, state
         stem_m = segment.begin.position_m
         state = self._begin(theta, segment.begin, time_s, landed_pa(theta, stem_m, segment.before.came))
         if segment.before.leaves:
@@ -234,6 +247,41 @@ class FreeRun:
             begin_pa = broke_loose_pa(theta, stem_m, segment.before.leaves, risen_pa)
             state = self._begin(theta, segment.begin, time_s, begin_pa)
         return drive_pa, state
+
+    def _remember(self, theta: Vector, state: Vector, lead: Lead, step_s: float) -> None:
+        """Let the pressure path of a state at rest remember what was commanded before; the stem held."""
+        led, _ = self._led(theta, lead, self._led_from_pa(theta, lead, step_s), lead.drive_pa.size, step_s)
+        for memory in lead.memories:
+            state[memory] = led[memory]
+        write(state, read(state)._replace(p=read(led).p))
+
+    def _led_from_pa(self, theta: Vector, lead: Lead, step_s: float) -> float:
+        """Return the pressure, Pa, that a lead begins with: where the stem is seen to leave, what broke it loose then.
+
+        A path without a dead band reaches then what is a straight line in what it begins with: two show it.
+        """
+        begin = lead.begin
+        nearest_pa = equilibrium_pa(theta, begin.position_m, begin.velocity_m_per_s, float(lead.drive_pa[0]))
+        if not lead.before.leaves or begin.velocity_m_per_s:
+            return nearest_pa
+        middle_pa = landed_pa(theta, begin.position_m, 0)
+        reached_pa = [self._led(theta, lead, each, lead.before.rests, step_s)[1] for each in (middle_pa, nearest_pa)]
+        if reached_pa[1] == reached_pa[0]:
+            return nearest_pa
+        loose_pa = broke_loose_pa(theta, begin.position_m, lead.before.leaves, 0.0)
+        share = (loose_pa - reached_pa[0]) / (reached_pa[1] - reached_pa[0])
+        return equilibrium_pa(theta, begin.position_m, 0.0, middle_pa + share * (nearest_pa - middle_pa))
+
+    def _led(self, theta: Vector, lead: Lead, begin_pa: float, periods: int, step_s: float) -> tuple[Vector, float]:
+        """Return the state after so many periods of a lead, the stem held, and the pressure amid the last one, Pa."""
+        state = at_rest(self._composition, theta, lead.time_s, lead.begin.position_m, begin_pa)
+        drive_pa, periods_s = lead.drive_pa[:periods], lead.periods_s[:periods]
+        path = np.empty((PATH_ROWS, periods + 1))
+        if self.by.slow:
+            self._glide(held(theta), state, drive_pa, periods_s, np.full(periods, FREE), step_s, path)
+        else:
+            self._composition.kernel.respond(held(theta), state, drive_pa, periods_s, step_s, self._tolerance, path)
+        return state, float(np.mean(path[PRESSURE, -2:]))
 
     def _risen_pa(self, theta: Vector, state: Vector, segment: Segment, rests: int) -> float:
         """Return by how much the positioner raises the pressure until the middle of a period, the stem held, Pa."""
@@ -275,6 +323,7 @@ class SlowSegment(NamedTuple):
     at: npt.NDArray[np.int64]
     """and where they stand among those that are simulated."""
     begin: InitialState
+    lead: Lead | None
     drive_pa: Vector
     """Of each period from one of the rows to the next, Pa."""
     load_n: Vector | None
@@ -287,7 +336,12 @@ class SlowSegment(NamedTuple):
 
 
 def _slow_segments(
-    record: Record, composition: Composition, drive_pa: Column, by: Sampling, from_pressure: bool
+    record: Record,
+    composition: Composition,
+    drive_pa: Column,
+    by: Sampling,
+    from_pressure: bool,
+    leads: Sequence[Lead | None],
 ) -> list[SlowSegment]:
     at_end = from_pressure or not by.held
     remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
@@ -296,7 +350,7 @@ def _slow_segments(
     if by.motion is Motion.LANDINGS:
         told, judged = _told(record, composition)
     found = []
-    for first, end in record.segments:
+    for (first, end), lead in zip(record.segments, leads, strict=True):
         keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
         if by.held:
             keep |= eventful(record, drive_pa, first, end)
@@ -309,7 +363,7 @@ def _slow_segments(
         periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
         begin = initial_state(record, first, end, moving=False)
         found.append(
-            SlowSegment(rows, rows[counted], counted, begin, held_pa, load_n, periods_s, told[rows[1:]], step_s)
+            SlowSegment(rows, rows[counted], counted, begin, lead, held_pa, load_n, periods_s, told[rows[1:]], step_s)
         )
     return found
 
@@ -323,14 +377,17 @@ def _told(record: Record, composition: Composition) -> tuple[Column, Mask]:
     return told, judged
 
 
-def _segment(record: Record, drive_pa: Column, first: int, end: int, longest_s: float, *, by_setpoint: bool) -> Segment:
+def _segment(
+    record: Record, drive_pa: Column, rows: tuple[int, int], longest_s: float, lead: Lead | None, *, by_setpoint: bool
+) -> Segment:
+    first, end = rows
     held_pa = checked_commands(drive_pa[first : end - 1])
     load_n = None if record.load_n is None else checked_commands(record.load_n[first : end - 1])
     periods_s = checked_periods(np.diff(record.time_s[first:end]), held_pa)
     step_s = checked_step(min(float(periods_s.max()), longest_s))
     begin = initial_state(record, first, end, moving=not by_setpoint)
     before = before_start(record, first, end, begin.position_m) if by_setpoint else None
-    return Segment(first, end, begin, before, held_pa, load_n, periods_s, step_s)
+    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, step_s)
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:

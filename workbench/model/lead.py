@@ -1,0 +1,59 @@
+"""What was commanded before a segment of a record, and is remembered by the pressure path.
+
+A record that begins in motion is judged from a rest on (`workbench.data.record`). Five time constants after a step a
+lag still holds 0.7 % of it: taken for settled, it shifts all forces that are fitted by that much.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from config.recording import Column
+from sim.composition import Composition
+from sim.karnopp import MEMORY, Vector
+from sim.open_loop import checked_commands, checked_periods
+from workbench.data.record import Record
+from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
+
+
+class Lead(NamedTuple):
+    """The commands between where a record begins and where a segment of it does."""
+
+    begin: InitialState
+    """Of the stem as the record begins,"""
+    time_s: float
+    """when that is, s,"""
+    before: BeforeStart
+    """and which way it is seen to leave its place first."""
+    drive_pa: Vector
+    """Held from each of its samples to the next, Pa."""
+    periods_s: Vector
+    memories: tuple[slice, ...]
+    """Where the pressure path's memories stand in the state."""
+
+
+def lead_of(record: Record, composition: Composition, drive_pa: Column, segment: int) -> Lead | None:
+    """Return what leads to a segment, by its place among them; None where nothing does, or no effect remembers it.
+
+    A positioner follows the stem: what it makes of a set point while the stem moved is not known by holding it.
+    """
+    first = record.segments[segment][0]
+    begun = record.commanded_from[segment]
+    memories = tuple(_path_memories(composition))
+    if begun == first or not memories or composition.by_setpoint:
+        return None
+    held_pa = checked_commands(drive_pa[begun:first])
+    periods_s = checked_periods(np.diff(record.time_s[begun : first + 1]), held_pa)
+    begin = initial_state(record, begun, record.segments[segment][1])
+    before = before_start(record, begun, first, begin.position_m)
+    return Lead(begin, float(record.time_s[begun]), before, held_pa, periods_s, memories)
+
+
+def _path_memories(composition: Composition) -> Iterator[slice]:
+    """Yield where the memories of the pressure path's effects stand in the state."""
+    at = MEMORY
+    for effect in composition.effects:
+        if effect.memory and "pressure" in effect.functions:
+            yield slice(at, at + effect.memory)
+        at += effect.memory
