@@ -12,7 +12,7 @@ from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
 from workbench.model.lead import lead_of
 
-LAGGING = with_effect(SEED, "ip_lag", time_constant_s=0.5)
+LAGGING = with_effect(SEED, "ip_lag", time_constant_s=0.35)
 LIMITED = with_effect(SEED, "rate_limit", filling_pa_per_s=2e4, venting_pa_per_s=2e4)
 LATE = with_effect(SEED, "dead_time", dead_time_s=0.4)
 
