@@ -108,7 +108,7 @@ class FormSearch:
 
         Whether searches agree does not matter here: a form is believed for what it leaves, wherever it was found.
         """
-        train, what = self.split.train.recording, f"fitting {len(turn)} forms"
+        train, what = self.split.train.record, f"fitting {len(turn)} forms"
 
         def begun(each: Proposal) -> BegunFit | str:
             try:
@@ -160,7 +160,7 @@ class FormSearch:
         (path,) = write_forms([curve], Path(added.name).parent)
         effects = {**here.effects, path: find_effect(path, "forms")}
         ground = replace(before.fit, seeds=(Composition.from_file(fit.valve).theta[: before.fit.seeds[0].size],))
-        begun = begun_fit(self.split.train.recording, self.valve, (path,), ground, landed=False, points=[heights])
+        begun = begun_fit(self.split.train.record, self.valve, (path,), ground, landed=False, points=[heights])
         models[path] = evaluated(begun.carried().settled(2).judged(profile=False), self.split)
         return self._judged(_Tried(here.step, {**here.forms, path: curve}, effects), models)
 
@@ -183,7 +183,7 @@ class FormSearch:
             declared = tried.effects[name].parameters.values()
             point = tuple(v for v, each in zip(theta[bare.size :].tolist(), declared, strict=True) if not each.given)
             ground = replace(base.fit, seeds=(bare, *base.fit.seeds[-2:]))
-            begun = begun_fit(self.split.train.recording, self.valve, (name,), ground, points=[point])
+            begun = begun_fit(self.split.train.record, self.valve, (name,), ground, points=[point])
             found = begun.landed().carried().settled(2).judged(profile=False)
             return evaluated(found, self.split) if found.cost < here.cost else fitted[name]
 

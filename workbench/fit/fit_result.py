@@ -77,12 +77,18 @@ class Fit(Result):
 
     def predict(self, recording: Recording) -> Column:
         """Return the indicated position of a free run, m; NaN in rows that are not simulated."""
-        return self._run(ready(recording))
+        return self.indicated_m(ready(recording))
+
+    def indicated_m(self, record: Record) -> Column:
+        """Return the same of a recording made ready."""
+        composition = Composition.from_file(self.valve)
+        by = self.by.of(record, self.valve.valve)
+        return FreeRun(composition, record, from_pressure=self.from_pressure, by=by).position_m(composition.theta)
 
     def score(self, recording: Recording) -> float:
         """Return 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than the mean."""
         record = ready(recording)
-        return fit_percent(record, self._run(record)) / 100.0
+        return fit_percent(record, self.indicated_m(record)) / 100.0
 
     def blocks(self) -> list[Block]:
         """Say the error, whether the searches agree, and each parameter with its interval."""
@@ -101,11 +107,6 @@ class Fit(Result):
     def plot(self) -> "Figure":
         """Draw the parameters' 95 % intervals in per cent of their values."""
         return draw_parameters(self.parameters)
-
-    def _run(self, record: Record) -> Column:
-        composition = Composition.from_file(self.valve)
-        by = self.by.of(record, self.valve.valve)
-        return FreeRun(composition, record, from_pressure=self.from_pressure, by=by).position_m(composition.theta)
 
 
 def fit_at(

@@ -112,7 +112,7 @@ def local_fit(recording: Recording, valve: ValveFile) -> Fit:
 
 @linear_algebra_alone()
 def begun_fit(
-    recording: Recording,
+    record: Record,
     valve: ValveFile,
     effects: Sequence[str],
     base: Fit,
@@ -120,16 +120,16 @@ def begun_fit(
     landed: bool = True,
     points: Sequence[tuple[float, ...]] = (),
 ) -> BegunFit:
-    """Fit a valve with effects added to a base fit, on one thread, as far as through the wide scale.
+    """Fit a valve with effects added to a base fit of the same record, on one thread, as far as through the wide scale.
 
     Searches that begin at landings are begun by `BegunFit.landed`. Without `landed` there are none: those of an earlier
     base fit were the same. With `points`, values of what is fitted of the effects, searches begin at these in place of
     where the effects declare it.
 
     Raises:
-        InputError: the recording holds too little, other units than SI, or an unknown effect.
+        InputError: an unknown effect, or one that the record cannot show.
     """
-    return _begun(_fittable(recording, valve), valve, effects, base, None, 1, None, landed=landed, points=points)
+    return _begun(record, valve, effects, base, None, 1, None, landed=landed, points=points)
 
 
 @linear_algebra_alone()

@@ -97,8 +97,8 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     """Return how far a fit is off on what it was fitted to and on what was held out."""
     negligible_m = NEGLIGIBLE * split.scale_m
     train, test = split.train, split.test
-    fitted_m = residual_m(train, fit.predict(train.recording))
-    held_out_m = residual_m(test, fit.predict(test.recording))
+    fitted_m = residual_m(train, fit.indicated_m(train.record))
+    held_out_m = residual_m(test, fit.indicated_m(test.record))
     rows = np.isfinite(held_out_m)
     fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m, _block_s(train))
     logs = block_logs(test.record.time_s, held_out_m, negligible_m, _block_s(test))

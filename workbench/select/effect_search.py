@@ -195,7 +195,7 @@ class EffectSearch:
         missing = [name for name in self._library if name not in before.effects]
         names = [name for name in missing if self._library[name].after not in missing]
         models, waiting = self._raced(number, self._begun(number, before, names))
-        left = {name: self._evaluated(each.left()) for name, each in waiting.items()}
+        left = dict(zip(waiting, on_threads(self._left, tuple(waiting.values()), self._workers), strict=True))
         before, models = self._with_base_again(number, before, models, models)
         step = self._judged_in_full(before, {**left, **models}, number)
         if waiting and not _best(step).explained:
@@ -299,7 +299,7 @@ class EffectSearch:
         self, number: int, before: EvaluatedModel, names: Sequence[str], *, landed: bool = True
     ) -> dict[str, BegunFit | str]:
         """Begin to refit the named effects, as far as through the wide scale."""
-        train, here = self._split.train.recording, before.fit
+        train, here = self._split.train.record, before.fit
         known = ValveFile(valve=self._drawn, effect=here.valve.effect)
 
         def begun(name: str) -> BegunFit | str:
@@ -364,6 +364,9 @@ class EffectSearch:
                 done = begin + (end - begin) * len(found) / len(by_name)
                 self._progress(f"step {number}: {what} {len(by_name)} effects", done)
         return found
+
+    def _left(self, waiting: BegunFit) -> EvaluatedModel:
+        return self._evaluated(waiting.left())
 
     def _evaluated(self, found: Fit) -> EvaluatedModel:
         return evaluated(found, self._split)

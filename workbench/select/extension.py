@@ -103,7 +103,7 @@ class Extension(Result):
             ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
             (f"with {', '.join(self.effects)}", self.extended, self.extended_errors, BETTER),
         ):
-            error_m = residual_m(part, found.predict(part.recording))
+            error_m = residual_m(part, found.indicated_m(part.record))
             label = f"{name}: {1e3 * errors.test_rmse_m:.3g} mm rms"
             line(axes, part.record.time_s - part.record.time_s[0], 1e3 * error_m, colour, label)
         axes.set_xlabel("time, s")
