@@ -75,12 +75,10 @@ class IdentificationTable(Schema):
         return self
 
 
+BY_SLIDES = ("slides", "moves")
+"""Laws that identify by a staircase of slides."""
 NARROWEST_WINDOW = 0.2
 """Of the stroke, for a staircase."""
-
-
-SLOWEST_SINE_S = 5e-3
-"""Period of the slowest loop in which a sine identifies."""
 
 
 class ExcitationTable(Schema):
@@ -91,7 +89,7 @@ class ExcitationTable(Schema):
     omega_rad_per_s: Positive = 1.0
     limit_s: Positive = 10.0
     kind: Literal["sine", "staircase"] | None = None
-    """A sine for a fast loop, a staircase of slides for any; where nobody says, the law and the period choose."""
+    """A sine for a fast loop, a staircase of slides for any; where nobody says, the law chooses."""
     travel_window: tuple[Fraction, Fraction] = (0.1, 0.9)
     """Where the staircase may take the stem, as shares of the stroke."""
     staircase_limit_s: Positive = 600.0
@@ -290,10 +288,9 @@ class DaemonFile(Schema):
     def by_slides(self) -> bool:
         """Whether S3 excites by a staircase of slides.
 
-        Where nobody says, the law of slides does, and in a loop too slow for a sine the law that chooses the move.
+        Where nobody says, laws that slide do: at any period, and whatever the valve has that the seed's model lacks.
         """
-        slow = self.control.law == "moves" and self.cycle.period_s > SLOWEST_SINE_S
-        asked = self.excitation.kind or ("staircase" if slow or self.control.law == "slides" else "sine")
+        asked = self.excitation.kind or ("staircase" if self.control.law in BY_SLIDES else "sine")
         return asked == "staircase"
 
 

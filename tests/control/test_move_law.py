@@ -149,3 +149,11 @@ def test_what_either_hand_has_learnt_is_kept() -> None:
     assert isinstance(law, MoveMemory)
     assert law.slides.margins.onward_up == margin
     assert (law.pulses.up, law.pulses.down) == pushes
+
+
+@pytest.mark.parametrize(("excitation", "stairs"), [({}, True), ({"kind": "sine"}, False)], ids=["by itself", "asked"])
+def test_it_identifies_by_a_staircase_in_a_fast_loop_too(excitation: dict[str, str], *, stairs: bool) -> None:
+    """A sine is refused behind a slow I/P, and knows the friction of one direction only."""
+    file, _ = settings_at(1e-3)
+    asked = file.model_dump(exclude_unset=True) | {"excitation": excitation}
+    assert (Settings.of(DaemonFile.model_validate(asked)).staircase is not None) is stairs
