@@ -113,6 +113,9 @@ def test_what_explains_a_part_is_named_though_something_is_left(parts: Split) ->
     found = diagnosed(parts, step(POOR, ip_lag=part), step(part, 2, backlash=part))
     assert (found.verdict, found.missing) == ("unexplained", ("ip_lag",))
     assert " ip_lag explains a part: the held-out error falls from 1 to 0.25 mm." in found.sentence
+    both = model_of("ip_lag", "backlash", cost=2.0 * AT_FLOOR, error_m=2.5 * FLOOR_M)
+    found = diagnosed(parts, step(POOR, ip_lag=part), step(part, 2, backlash=both), step(both, 3, stribeck=both))
+    assert " ip_lag and backlash explain a part: the held-out error falls from 1 to 0.125 mm." in found.sentence
 
 
 def test_a_residual_that_hangs_on_the_state_is_not_explained_by_reaching_the_floor(parts: Split) -> None:

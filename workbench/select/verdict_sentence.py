@@ -48,7 +48,9 @@ def verdict_sentence(
         return f"Missing: {names}, or another that does as well; {fell}{left}." + "".join(
             [*(rivals_sentence(each, library) for each in rivals), knife_edges_sentence(best.errors)]
         )
-    part = "lowers it" if verdict in ("unjudged", "unfinished") else "explains a part"
+    several = sum(step.added is not None for step in steps) > 1
+    lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
+    part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
     begun = f" {names} {part}: {fell}." if names else f" The held-out error is {after:.3g} mm."
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
