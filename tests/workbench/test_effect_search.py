@@ -328,3 +328,26 @@ def test_the_experiment_is_for_the_first_set_that_a_record_can_tell_apart(monkey
     assert search.experiment([one_class]) is None
     assert search.experiment([one_class, two]) is not None
     assert [sorted(each) for each in asked] == [["dead_time", "preload"]]
+
+
+@pytest.mark.parametrize(("beside", "rivals"), [(2.5, ["ip_lag"]), (1.0, ["ip_lag", "backlash"])], ids=["worse", "as good"])
+def test_a_rival_of_the_first_step_is_asked_again_beside_what_the_second_added(
+    searched: Callable[..., tuple[EffectStep, ...]], beside: float, rivals: list[str]
+) -> None:
+    """While stribeck is missing nothing tells a lag from play; beside it, the true one explains all."""
+    floors = {
+        frozenset[str](): 6.0,
+        frozenset({"ip_lag"}): 3.0,
+        frozenset({"backlash"}): 3.001,
+        frozenset({"stribeck"}): 5.9,
+        frozenset({"ip_lag", "backlash"}): 3.0,
+        frozenset({"ip_lag", "stribeck"}): 1.0,
+        frozenset({"backlash", "stribeck"}): beside,
+    }
+
+    def ends(there: Effects, added: Effects) -> float:
+        return floors.get(there | added, 1.0)
+
+    steps = searched(ends, "ip_lag", "backlash", "stribeck")
+    assert [step.added.name for step in steps if step.added] == ["ip_lag", "stribeck"]
+    assert sorted(each.name for each in steps[0].indistinguishable) == sorted(rivals)

@@ -8,7 +8,8 @@ would add leaves something to explain. Before they are judged, the valve without
 parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
 model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
 two steps leave something to explain, the first is tried with its runner-up added, too, and taken back if that leads
-farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out.
+farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
+several explain all, an earlier step's rivals are asked again beside what was added later.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +32,7 @@ from workbench.fit.objective import SimulationError
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
-from workbench.select.block_errors import block_errors
+from workbench.select.block_errors import block_errors, indistinguishable
 from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
 from workbench.select.effect_candidates import (
     EffectStep,
@@ -41,7 +42,7 @@ from workbench.select.effect_candidates import (
     runner_up,
     with_added,
 )
-from workbench.select.equivalence import bare_imitation, classes
+from workbench.select.equivalence import algebraic_class, bare_imitation, classes
 from workbench.select.experiment import Experiment, experiment
 from workbench.select.forward_selection import MOST_ADDED, without_missing
 
@@ -115,8 +116,8 @@ class EffectSearch:
 
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""
-        steps = self._forward([], base)
-        return tuple(self._without_stand_in(steps))
+        steps = self._without_stand_in(self._forward([], base))
+        return tuple(self._asked_beside(each, steps[i:]) for i, each in enumerate(steps, start=1))
 
     def so_far(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Return the steps made so far, and the one being made as far as it has come; for a search broken off."""
@@ -174,6 +175,31 @@ class EffectSearch:
         if leads_farther(_best(turned), _best(following)):
             return with_added(step, other, self._library), turned
         return step, following
+
+    def _asked_beside(self, step: EffectStep, later: Sequence[EffectStep]) -> EffectStep:
+        """Return a step with those of its rivals that do as well beside what later steps have added, too.
+
+        While an effect is missing its error is in most blocks, and hides what acts in few.
+        """
+        added = step.added
+        if added is None or all(each.added is None for each in later) or not _best(later[-1]).explained:
+            return step
+        last = _best(later[-1])
+        own = algebraic_class(added.name, self._library)
+        asked = [each.name for each in step.indistinguishable if each.name not in own]
+        if not asked:
+            return step
+        valve = last.fit.valve
+        others = tuple(each for each in valve.effect if each.name != added.name)
+        beside = self._refitted(added.step, self.base(ValveFile(valve=valve.valve, effect=others)), asked)
+        as_good = {
+            member
+            for name, each in beside.items()
+            if isinstance(each, EvaluatedModel) and indistinguishable(last.errors.all_logs, each.errors.all_logs)
+            for member in algebraic_class(name, self._library)
+        }
+        rivals = tuple(each for each in step.indistinguishable if each.name in own | as_good)
+        return replace(step, indistinguishable=rivals)
 
     def with_intervals(self, model: EvaluatedModel) -> EvaluatedModel:
         """Return a model with the profile intervals of its parameters."""
