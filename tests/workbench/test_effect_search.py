@@ -330,7 +330,9 @@ def test_the_experiment_is_for_the_first_set_that_a_record_can_tell_apart(monkey
     assert [sorted(each) for each in asked] == [["dead_time", "preload"]]
 
 
-@pytest.mark.parametrize(("beside", "rivals"), [(2.5, ["ip_lag"]), (1.0, ["ip_lag", "backlash"])], ids=["worse", "as good"])
+@pytest.mark.parametrize(
+    ("beside", "rivals"), [(2.5, ["ip_lag"]), (1.0, ["ip_lag", "backlash"])], ids=["worse", "as good"]
+)
 def test_a_rival_of_the_first_step_is_asked_again_beside_what_the_second_added(
     searched: Callable[..., tuple[EffectStep, ...]], beside: float, rivals: list[str]
 ) -> None:
