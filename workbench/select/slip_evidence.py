@@ -93,7 +93,9 @@ def needed_n(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
     A stem that creeps, or whose friction rises as it slows down, ends elsewhere: so much its landings do not tell.
     """
     composition = Composition.from_file(fit.valve)
-    own = replace(record, position_m=FreeRun(composition, record).position_m(composition.theta))
+    simulated_m = FreeRun(composition, record).position_m(composition.theta)
+    # What leads to where a recording is judged from is not simulated: the stem was there.
+    own = replace(record, position_m=np.where(np.isfinite(simulated_m), simulated_m, record.position_m))
     lands = SlipForces(fit, own, first_rows)
     if lands.landings.count < FEWEST:
         return 0.0
