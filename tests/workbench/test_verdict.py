@@ -101,6 +101,24 @@ def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:
     )
 
 
+def test_a_parameter_that_is_off_beside_what_is_missing_is_said(parts: Split) -> None:
+    half = model_of("sensor_lag", cost=5.0 * AT_FLOOR, error_m=5.0 * FLOOR_M)
+    named_otherwise = model_of("sensor_lag", "sensor_gain")
+    found = diagnosed(parts, step(POOR, sensor_lag=half), step(half, 2, sensor_gain=named_otherwise))
+    assert (found.verdict, found.missing) == ("missing", ("sensor_lag",))
+    assert found.sentence == (
+        "Missing: sensor_lag; the held-out error falls from 1 to 0.25 mm. But a parameter that was kept is off: with "
+        "sensor_gain, the bare valve by another name, the held-out error falls from 0.25 to 0.05 mm. Fit again with "
+        "the mass free."
+    )
+
+
+def test_the_bare_valve_by_another_name_that_leaves_something_explains_nothing(parts: Split) -> None:
+    part = model_of("sensor_gain", cost=5.0 * AT_FLOOR, error_m=5.0 * FLOOR_M)
+    found = diagnosed(parts, step(POOR, sensor_gain=part))
+    assert (found.verdict, found.missing) == ("unexplained", ())
+
+
 def test_what_the_library_lacks_is_left_unexplained(parts: Split) -> None:
     found = diagnosed(parts, step(POOR, ip_lag=POOR))
     assert (found.verdict, found.missing) == ("unexplained", ())

@@ -181,10 +181,9 @@ class EffectSearch:
 
         While an effect is missing its error is in most blocks, and hides what acts in few.
         """
-        added = step.added
-        if added is None or all(each.added is None for each in later) or not _best(later[-1]).explained:
+        added, last = step.added, _best(later[-1] if later else step)
+        if added is None or all(each.added is None for each in later) or not last.explained:
             return step
-        last = _best(later[-1])
         own = algebraic_class(added.name, self._library)
         asked = [each.name for each in step.indistinguishable if each.name not in own]
         if not asked:

@@ -2,6 +2,7 @@
 
 adequate      nothing is missing: no effect is accepted, and the valve explains the record without
 missing       these effects, and with them all is explained
+              Of both, where only the bare valve by another name explains the rest: a parameter that was kept is off
 one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
 unexplained   something is missing that the library does not have; what lowered the error so far is still named.
               Or the valve scatters so much that a tenth of the motion is left, which no model could explain
@@ -13,7 +14,7 @@ untrusted     the searches disagree, and the best of them explains nothing
 from collections.abc import Sequence
 from typing import Literal
 
-from workbench.select.effect_candidates import EffectStep, EvaluatedModel
+from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 
 Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "unfinished", "untrusted"]
 
@@ -29,6 +30,8 @@ def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: flo
     """
     if floor_m is None:
         return "unjudged"
+    equivalent = by_another_name(steps)
+    best = equivalent.model if equivalent and equivalent.model and equivalent.model.explained else best
     if best.explained and not best.errors.follows(motion_std_m):
         return "unexplained"
     added = [step for step in steps if step.added]
@@ -37,3 +40,11 @@ def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: flo
     if best.explained:
         return "one_of" if any(len(step.indistinguishable) > 1 for step in added) else "missing"
     return "unexplained" if best.fit.trusted else "untrusted"
+
+
+def by_another_name(steps: Sequence[EffectStep]) -> EffectCandidate | None:
+    """Return what does better than all that was found, but that it is the bare valve by another name; None if nothing.
+
+    A parameter that was kept is off then, not an effect missing.
+    """
+    return None if steps[-1].added else steps[-1].bare_equivalent

@@ -8,7 +8,7 @@ from workbench.data.noise_floor import UNKNOWN
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
-from workbench.select.verdict import Verdict
+from workbench.select.verdict import Verdict, by_another_name
 
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
@@ -25,16 +25,15 @@ def verdict_sentence(
 ) -> str:
     """Return the verdict in one or a few sentences; lengths in mm."""
     names = " and ".join(step.added.name for step in steps if step.added)
-    before, after = 1e3 * steps[0].before.errors.test_rmse_m, 1e3 * best.errors.test_rmse_m
+    after = 1e3 * best.errors.test_rmse_m
     fell = reduction_sentence(steps[0].before.errors, best.errors)
     repeat = "" if parts.repeats else REPEAT
-    equivalent = steps[0].bare_equivalent
-    if verdict == "adequate" and equivalent and equivalent.model:
-        after = 1e3 * equivalent.model.errors.test_rmse_m
-        return (
-            f"No effect is missing, but a parameter that was kept is off: with {equivalent.name}, the bare valve by "
-            f"another name, the held-out error falls from {before:.3g} to {after:.3g} mm. Fit again with the mass free."
-        )
+    or_another = ", or another that does as well" if verdict == "one_of" else ""
+    apart = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
+    off = _kept_off(by_another_name(steps), best)
+    if off and verdict in ("adequate", "missing", "one_of"):
+        begun = f"Missing: {names}{or_another}; {fell}. But" if names else "No effect is missing, but"
+        return f"{begun} {off}{apart}"
     if verdict == "adequate":
         said = _adequate(best.errors, parts)
         return said + knife_edges_sentence(best.errors) + _suspicion(steps[0].suspected) + _scatter(parts)
@@ -43,11 +42,8 @@ def verdict_sentence(
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts)}."
         return said + knife_edges_sentence(best.errors) + suspicion
     if verdict == "one_of":
-        rivals = (tuple(each.name for each in step.indistinguishable) for step in steps)
         left = f", and {_left(best.errors, parts)}" if _floors_left(best.errors, parts) > NOISE_KNOWN_TO else ""
-        return f"Missing: {names}, or another that does as well; {fell}{left}." + "".join(
-            [*(rivals_sentence(each, library) for each in rivals), knife_edges_sentence(best.errors)]
-        )
+        return f"Missing: {names}{or_another}; {fell}{left}.{apart}{knife_edges_sentence(best.errors)}"
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
@@ -55,6 +51,17 @@ def verdict_sentence(
     if verdict == "unexplained":
         return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
     return _unproved(verdict, steps, library) + begun
+
+
+def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
+    """Say that a parameter is off which no fit has moved; empty where nothing does better by another name."""
+    if equivalent is None or equivalent.model is None:
+        return ""
+    fell = reduction_sentence(best.errors, equivalent.model.errors)
+    return (
+        f"a parameter that was kept is off: with {equivalent.name}, the bare valve by another name, {fell}. "
+        f"Fit again with the mass free.{knife_edges_sentence(equivalent.model.errors)}"
+    )
 
 
 def _adequate(errors: BlockErrors, parts: Split) -> str:
