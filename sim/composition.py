@@ -89,8 +89,23 @@ class Composition:
 
     def rest(self, theta: Vector, state: Vector, time_s: float, position_m: float, command_pa: float) -> None:
         """Set a state at rest, by whichever kernel is there."""
-        ready = self._compiled.get("quasi-static") or self.kernel
-        ready.rest(theta, state, time_s, position_m, command_pa)
+        self._either.rest(theta, state, time_s, position_m, command_pa)
+
+    def balance_n(self, theta: Vector, landings: Vector, arriving_m_per_s: float, speed_m_per_s: float) -> Vector:
+        """Return F_e, F_c and F_s, N, (landings, 3), of a stem that has slid to each of the landings, (landings, 7).
+
+        Their columns and the speeds are those of `sim.karnopp.balance`.
+        """
+        forces_n = np.empty((len(landings), 3))
+        state = np.zeros(self.state_size)
+        self._either.balance(theta, state, landings, arriving_m_per_s, speed_m_per_s, forces_n)
+        return forces_n
+
+    @property
+    def _either(self) -> Kernel | QuasiStaticKernel:
+        """Whichever kernel is there."""
+        found: Kernel | QuasiStaticKernel = self._compiled.get("quasi-static") or self.kernel
+        return found
 
     def _kernel(self, name: str, compiled: Callable[[Sequence[Effect]], T]) -> T:
         if name not in self._compiled:

@@ -38,36 +38,42 @@ WRITABLE_BY_OTHERS = 0o022
 KARNOPP_IMPORT = re.compile(r"^from sim\.karnopp import \([^)]*\)\n", re.MULTILINE)
 """What stands in one text with `karnopp.py` need not be imported from it."""
 BITCODE = ".bc"
-REST = (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER)
+AT_REST: Mapping[str, tuple[int, ...]] = {
+    "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
+    "balance": (VECTOR, VECTOR, MATRIX, NUMBER, NUMBER, MATRIX),
+}
+"""Entries with and without inertia."""
 ENTRIES: Mapping[str, tuple[int, ...]] = {
-    "rest": REST,
+    **AT_REST,
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
 }
 SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
-    "rest": REST,
+    **AT_REST,
     "glide": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """`rest` and `respond` of `karnopp.py`, compiled with the effects in their places."""
+    """`rest`, `balance` and `respond` of `karnopp.py`, compiled with the effects in their places."""
 
     digest: str
     bitcode: bytes = field(repr=False)
     """LLVM's, of the functions as `sim.machine_code` calls them."""
     state_size: int
     rest: Entry[Vector, Vector, float, float, float]
+    balance: Entry[Vector, Vector, Vector, float, float, Vector]
     respond: Entry[Vector, Vector, Vector, Vector, float, float, Vector]
 
 
 @dataclass(frozen=True, slots=True)
 class QuasiStaticKernel:
-    """`rest` of `karnopp.py` and `glide` of `quasi_static.py`, compiled with the effects in their places."""
+    """`rest` and `balance` of `karnopp.py`, `glide` of `quasi_static.py`, compiled with the effects in their places."""
 
     digest: str
     state_size: int
     rest: Entry[Vector, Vector, float, float, float]
+    balance: Entry[Vector, Vector, Vector, float, float, Vector]
     glide: Entry[Vector, Vector, Vector, Vector, Vector, float, Vector]
 
 

@@ -8,7 +8,7 @@ well. Other threads go on while one runs. No operations are fused: the numbers a
 import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
-from ctypes import CFUNCTYPE, byref, c_double, c_int32, c_ssize_t, c_void_p, cast
+from ctypes import CFUNCTYPE, addressof, byref, c_double, c_int32, c_ssize_t, c_void_p, cast
 from functools import cache
 from itertools import count
 from threading import Lock
@@ -75,7 +75,15 @@ class Entry(Generic[*Arguments]):
             return (value,)
         if value.dtype != FLOAT64 or value.ndim != kind or not value.flags.c_contiguous:
             raise TypeError(f"{self._name} takes contiguous float64, not {value.dtype} of shape {value.shape}")
-        return (value.ctypes.data, *value.shape)
+        return (_begin(value), *value.shape)
+
+
+def _begin(array: Any) -> int:
+    """Return where an array begins; numpy's own way takes five times as long, and a search asks for it often."""
+    try:
+        return addressof(c_double.from_buffer(array))
+    except (TypeError, ValueError):  # it may not be written to, or is empty
+        return int(array.ctypes.data)
 
 
 def processor() -> str:

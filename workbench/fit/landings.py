@@ -20,15 +20,15 @@ contradict it least. Viscous friction and all that belongs to motion stays as it
 An indicated position is taken back through the sensor's effects, which see a slide from the rest before.
 """
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from config.recording import Column
 from sim.composition import AREA, COULOMB, SPRING, STATIC, STRIBECK, VISCOUS
-from sim.interpreted import interpreted
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.objective import SimulationError
@@ -47,9 +47,6 @@ MOSTLY = 0.9
 SLOW = 3.0
 """Stribeck velocities at which a slide ends: below, friction rises and holds the stem."""
 FORCE_N = 0.5
-LONG_S = 100.0
-"""A slide so slow that every sensor shows the position itself."""
-STEP_S = 0.01
 ROUNDS = 6
 DIFFERENCE = 1e-4
 HELD = 0.5
@@ -87,13 +84,35 @@ class Rest(NamedTuple):
     """Direction in which it leaves, 0 if it does not."""
 
 
-class Loaded(NamedTuple):
-    """A rest at one of its samples, under a pressure, Pa, and the direction of (impending) motion."""
+SHOWN, DIRECTION = 2, 6
+"""Columns of a landing as `sim.karnopp.balance` takes it: position, m; direction of (impending) motion."""
 
-    rest: Rest
-    row: int
-    pressure_pa: float
-    direction: int
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """Rests, each at one of its samples, under a pressure and about to move, or come, in a direction."""
+
+    rows: NDArray[np.int64]
+    """Of those samples in the record, (places,)."""
+    leaves_to: Vector
+    """Direction in which each rest is left, 0 if it is not, (places,)."""
+    landings: Vector
+    """As `sim.karnopp.balance` takes them, (places, 7)."""
+
+    @property
+    def directions(self) -> Vector:
+        """Of (impending) motion, (places,)."""
+        return np.asarray(self.landings[:, DIRECTION])
+
+    def those(self, which: NDArray[np.bool_]) -> "Loaded":
+        """Return some of them."""
+        return Loaded(self.rows[which], self.leaves_to[which], np.ascontiguousarray(self.landings[which]))
+
+    def shifted(self, by_m: Vector) -> "Loaded":
+        """Return them as if each stem had come to rest so much farther open, m, (places,)."""
+        landings = self.landings.copy()
+        landings[:, SHOWN] += by_m
+        return replace(self, landings=landings)
 
 
 def rests(record: Record) -> tuple[Rest, ...]:
@@ -174,12 +193,7 @@ class Landings:
         self._record = error.run.record
         self._rests = chosen
         self._landed = tuple(each for each in self._rests if each.direction)
-        effects = error.composition.effects
-        self._laws = interpreted(effects)
-        self._state = np.zeros(error.composition.state_size)
-        self._senses = any("sensor" in each.functions for each in effects)
-        self._remembers = any(each.memory and "friction" in each.functions for each in effects)
-        self.behind_path = any("pressure" in each.functions for each in effects)
+        self.behind_path = any("pressure" in each.functions for each in error.composition.effects)
 
     @property
     def count(self) -> int:
@@ -237,14 +251,14 @@ class Landings:
             z, left = reached, after
         return z, left
 
-    def landed(self, theta: Vector, pressure_pa: Column) -> tuple[list[Loaded], Vector]:
+    def landed(self, theta: Vector, pressure_pa: Column) -> tuple[Loaded, Vector]:
         """Return each landing, under the pressure in which it came to rest, and sigma_j, N, (landings,)."""
         # From the last motion to when the rest has settled.
         ranges = [_range(pressure_pa[each.moved : each.first + SETTLING]) for each in self._landed]
-        landed = [
-            Loaded(each, each.first, pressures[each.direction > 0], each.direction)
+        landed = self._loaded(
+            (each, each.first, pressures[each.direction > 0], each.direction)
             for each, pressures in zip(self._landed, ranges, strict=True)
-        ]
+        )
         return landed, self._scale_n(theta, np.array(ranges).reshape(-1, 2))
 
     def _steps(self, z: Vector, free: Sequence[int]) -> Vector:
@@ -257,12 +271,11 @@ class Landings:
             steps.append(self._error.theta(there)[index] - theta[index])
         return np.array(steps)
 
-    def balance_n(self, theta: Vector, landed: Sequence[Loaded]) -> Vector:
+    def balance_n(self, theta: Vector, landed: Loaded) -> Vector:
         """Return A p - k_s x + F - s F_c of the landings, N."""
         slow = SLOW * float(theta[STRIBECK])
         forces = self._forces_n(theta, landed, slow)
-        way = np.array([each.direction for each in landed])
-        return np.asarray(forces[:, 0] - way * (forces[:, 1] + theta[VISCOUS] * slow))
+        return np.asarray(forces[:, 0] - landed.directions * (forces[:, 1] + theta[VISCOUS] * slow))
 
     def _scale_n(self, theta: Vector, ranges_pa: Vector) -> Vector:
         """Return sigma_j, N, from the lowest and highest pressures of the landings, (landings, 2)."""
@@ -285,67 +298,45 @@ class Landings:
         contradicted = (below / (1.0 + below)).sum(axis=1) + (above / (1.0 + above)).sum(axis=1)
         return float(middles[np.argmin(contradicted)])
 
-    def holding(self, pressure_pa: Column) -> list[Loaded]:
+    def holding(self, pressure_pa: Column) -> Loaded:
         """Return each rest under the highest and the lowest pressure that it bore."""
-        return [
-            Loaded(each, each.end - 1, pressure, way)
+        return self._loaded(
+            (each, each.end - 1, pressure, way)
             for each in self._rests
             for way, pressure in zip((-1, 1), _range(pressure_pa[each.first : each.end]), strict=True)
-        ]
+        )
 
-    def breaking(self, pressure_pa: Column) -> list[Loaded]:
+    def breaking(self, pressure_pa: Column) -> Loaded:
         """Return each rest that was left, under the pressure that it did not bear."""
-        return [
-            Loaded(each, each.leaves, _range(pressure_pa[each.end - 1 : each.leaves + 1])[way > 0], way)
+        return self._loaded(
+            (each, each.leaves, _range(pressure_pa[each.end - 1 : each.leaves + 1])[way > 0], way)
             for each in self._rests
             if (way := each.leaves_to)
-        ]
+        )
 
-    def static_at_n(self, theta: Vector, at: Sequence[Loaded]) -> Vector:
+    def _loaded(self, at: Iterable[tuple[Rest, int, float, int]]) -> Loaded:
+        """Return rests, each at a row of the record, under a pressure, Pa, in a direction."""
+        time_s, at = self._record.time_s, list(at)
+        landings = [
+            (time_s[rest.first], time_s[row], rest.position_m, rest.from_m, pressure_pa, rest.direction or 1, way)
+            for rest, row, pressure_pa, way in at
+        ]
+        rows = np.array([row for _, row, _, _ in at], np.int64)
+        leaves_to = np.array([rest.leaves_to for rest, _, _, _ in at], np.float64)
+        return Loaded(rows, leaves_to, np.array(landings, np.float64).reshape(-1, 7))
+
+    def static_at_n(self, theta: Vector, at: Loaded) -> Vector:
         """Return the static friction of the bare valve with which each would be on the verge of breaking away, N."""
         more = theta.copy()
         more[STATIC] *= 1.01
         forces, changed = self._forces_n(theta, at), self._forces_n(more, at)
         slope = (changed[:, 2] - forces[:, 2]) / (more[STATIC] - theta[STATIC])
-        way = np.array([each.direction for each in at])
         slope = np.where(slope > 0.0, slope, 1.0)
-        return np.asarray(theta[STATIC] + (way * forces[:, 0] - forces[:, 2]) / slope)
+        return np.asarray(theta[STATIC] + (at.directions * forces[:, 0] - forces[:, 2]) / slope)
 
-    def _forces_n(self, theta: Vector, at: Sequence[Loaded], speed: float = 0.0) -> Vector:
+    def _forces_n(self, theta: Vector, at: Loaded, speed: float = 0.0) -> Vector:
         """Return (places, 3): A p - k_s x + F, F_c, F_s, N, of a stem at rest or at a speed, m/s, in its direction."""
-        laws = self._laws
-        values = theta.tolist()
-        valve, q = laws.karnopp(values), laws.parameters(values)
-        z = laws.memories(self._state)
-        forces = np.empty((len(at), 3))
-        for i, (rest, row, pressure_pa, direction) in enumerate(at):
-            time_s = float(self._record.time_s[row])
-            x = self._stem_m(q, rest, time_s, pressure_pa) if self._senses else rest.position_m
-            if self._remembers:
-                z = self._landed_memory(q, rest, x, pressure_pa, SLOW * values[STRIBECK])
-            stem = laws.Stem(time_s, x, speed * direction, pressure_pa)
-            levels = laws.friction(valve.F_c, valve.F_s, float(direction), stem, q, z)
-            forces[i] = laws.external_force(valve, stem, q, z), *levels
-        return forces
-
-    def _landed_memory(self, q: object, rest: Rest, x: float, pressure_pa: float, speed: float) -> object:
-        """Return the memories of friction after a slide that ended at x."""
-        z = self._laws.memories(self._state.copy())
-        time_s = float(self._record.time_s[rest.first])
-        self._laws.start_stem(0.0, self._laws.Stem(time_s - STEP_S, rest.from_m, 0.0, pressure_pa), q, z)
-        landing = self._laws.Stem(time_s, x, speed * (rest.direction or 1), pressure_pa)
-        self._laws.remember(rest.from_m, STEP_S, landing, q, z)
-        return z
-
-    def _stem_m(self, q: object, rest: Rest, time_s: float, pressure_pa: float) -> float:
-        """Return where the stem stands when the sensor indicates the rest after a slide."""
-        x, slide_m = rest.position_m, rest.position_m - rest.from_m
-        for _ in range(3):
-            z = self._laws.memories(self._state.copy())
-            self._laws.start_stem(0.0, self._laws.Stem(time_s - LONG_S, x - slide_m, 0.0, pressure_pa), q, z)
-            stem = self._laws.Stem(time_s, x, 0.0, pressure_pa)
-            x += rest.position_m - float(self._laws.sensor(x - slide_m, LONG_S, stem, q, z))
-        return x
+        return self._error.composition.balance_n(theta, at.landings, SLOW * float(theta[STRIBECK]), speed)
 
 
 def _range(pressure_pa: Column) -> tuple[float, float]:

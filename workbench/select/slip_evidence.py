@@ -30,7 +30,7 @@ from sim.composition import STATIC, VISCOUS, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import DIFFERENCE, FEWEST, Landings, Loaded, rests
+from workbench.fit.landings import DIFFERENCE, FEWEST, Landings, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -128,13 +128,19 @@ class SlipForces:
         pressure_pa = self.error.run.run(theta).pressure_pa
         self._landed, self.own_n = self.landings.landed(theta, pressure_pa)
         self._broke = self.landings.breaking(pressure_pa)
-        self._bore = [each for each in self.landings.holding(pressure_pa) if each.direction == each.rest.leaves_to]
-        self._way = np.array([each.direction for each in self._landed])
+        bore = self.landings.holding(pressure_pa)
+        self._bore = bore.those(bore.directions == bore.leaves_to)
+        self._way = self._landed.directions
         self._shift_m = SHIFT * composition.valve.stroke_m
-        self._landed_in, self._broke_in = (_recordings(each, first_rows) for each in (self._landed, self._broke))
+        self._shifted = [self._landed.shifted(np.full(self._way.size, way * self._shift_m)) for way in (1.0, -1.0)]
+        """The landings as if the stem had come to rest elsewhere."""
+        self._landed_in, self._broke_in = (
+            np.searchsorted(first_rows, each.rows, side="right") - 1 for each in (self._landed, self._broke)
+        )
+        """In which recording each lies."""
         self._free = [i for i, each in enumerate(parameters) if each.index != VISCOUS]
         self._recordings = len(first_rows)
-        self.count = len(self._landed) + len(self._broke)
+        self.count = self._landed.rows.size + self._broke.rows.size
 
     def first(self) -> Vector:
         """Return u to begin with: the fit."""
@@ -194,20 +200,11 @@ class SlipForces:
     def left(self, z: Vector) -> "Left":
         """Return what is left of the balances at z."""
         theta = self.error.theta(z)
-        up_n, down_n = (self.landings.balance_n(theta, self._shifted(way * self._shift_m)) for way in (1, -1))
+        up_n, down_n = (self.landings.balance_n(theta, each) for each in self._shifted)
         slope_n_per_m = np.maximum(np.abs(up_n - down_n) / (2.0 * self._shift_m), TINY)
         bounds_n = [self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke)]
         e_n = self._way * self.landings.balance_n(theta, self._landed)
         return Left(e_n, slope_n_per_m, np.minimum(*bounds_n), np.maximum(*bounds_n))
-
-    def _shifted(self, by_m: float) -> list[Loaded]:
-        """Return the landings as if the stem had come to rest elsewhere."""
-        return [each._replace(rest=each.rest._replace(position_m=each.rest.position_m + by_m)) for each in self._landed]
-
-
-def _recordings(at: Sequence[Loaded], first_rows: Sequence[int]) -> NDArray[np.intp]:
-    """Return in which recording each lies."""
-    return np.searchsorted(first_rows, [each.row for each in at], side="right") - 1
 
 
 def _log_density(off: Vector) -> Vector:
