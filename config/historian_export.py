@@ -93,7 +93,7 @@ def read_export(
     columns = {"time_s": time_s - time_s[0] if stamped else time_s} | {
         name: column[rows] for name, column in values.items()
     }
-    return Recording(
+    return Recording.of(
         {name: columns[name] for name in sorted(columns, key=_contract_order)}, metadata | export.notes | said
     )
 
@@ -366,7 +366,7 @@ def _in_si(raw: Column, source: Source, unit: str, stroke_m: float | None, range
     turned = plain != unit
     if ending == "_m" and (plain in SHARES or turned) and stroke_m is None:
         raise InputError("--stroke-m", f"is needed to read {source.name} in {unit}; give what 100 % is, in metres")
-    if plain in SHARES:
+    if plain in SHARES and plain not in UNITS[ending]:  # mA are a share of 4 to 20, but of a drive a current
         factor, offset = SHARES[plain]
         share = factor * raw + offset
         share = 1.0 - share if turned else share

@@ -6,6 +6,10 @@ force on the stem, positive in the opening direction), `reference_m`, `state` an
 command is the one in force from its time to the next row's. Lines that begin with `#` at the top carry metadata,
 `# key: value`. A last line torn by a crash is left out and told as `torn`. A byte order mark before it all is no part
 of it. A file named `.parquet` holds the same columns; one named `.gz` is such a CSV, compressed.
+
+A drive's recording has the names and units of its kind (`config.drive`): `command_nm, position_rad`. Where it says a
+velocity and no position, that is the velocity's integral, from zero. In the program the columns have a valve's names,
+and `Recording.kind` says whose they are.
 """
 
 import csv
@@ -23,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Self, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from config.drive import COLUMNS, KINDS, VALVE, Kind, kind_of_columns
 from config.errors import InputError
 from config.plain_file import MOST_COLUMNS, require_moderate
 from config.results.block import Block, Table
@@ -34,6 +39,15 @@ if TYPE_CHECKING:
 REQUIRED = ("time_s", "command_pa", "position_m")
 BEHIND_POSITIONER = ("time_s", "reference_m", "position_m")
 """The same where a set point takes the command's place."""
+OF_DRIVES = tuple(
+    ("time_s", kind.own("command_pa"), kind.own(moved))
+    for kind in KINDS.values()
+    if kind is not VALVE
+    for moved in ("position_m", "velocity_m_per_s")
+)
+"""The same of drives."""
+KIND, INTEGRATED = "drive", "position"
+"""Keys of what is said of a drive's: its kind; where its position comes from."""
 CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
 
@@ -51,6 +65,30 @@ class Recording(Result):
 
     columns: Mapping[str, Column]
     metadata: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, columns: Mapping[str, Column], metadata: Mapping[str, str]) -> Self:
+        """Return a recording of columns that may have a drive's names; they get a valve's, and its kind is said."""
+        kind = kind_of_columns(columns)
+        if kind is VALVE:
+            return cls(columns, {key: each for key, each in metadata.items() if key != KIND})
+        names = {kind.own(name): name for name in COLUMNS}
+        named = {names.get(name, name): column for name, column in columns.items()}
+        said = {**metadata, KIND: kind.name}
+        if "position_m" not in named:
+            named["position_m"] = _integrated(named["time_s"], named["velocity_m_per_s"])
+            said[INTEGRATED] = f"integrated from {kind.own('velocity_m_per_s')}, from zero"
+        return cls(named, said)
+
+    @property
+    def kind(self) -> Kind:
+        """Whose it is: its names and units."""
+        return KINDS.get(self.metadata.get(KIND, ""), VALVE)
+
+    @property
+    def own_columns(self) -> dict[str, Column]:
+        """The columns by the names of its kind's files."""
+        return {self.kind.own(name) if name in COLUMNS else name: column for name, column in self.columns.items()}
 
     @property
     def time_s(self) -> Column:
@@ -85,8 +123,10 @@ class Recording(Result):
         Raises:
             InputError: names file, column or line, value and what is allowed.
         """
-        columns, metadata = _read(Path(path), REQUIRED, CLOCK_STEPS_TOLERATED, or_required=BEHIND_POSITIONER)
-        return cls(columns, metadata)
+        columns, metadata = _read(
+            Path(path), REQUIRED, CLOCK_STEPS_TOLERATED, or_required=(BEHIND_POSITIONER, *OF_DRIVES)
+        )
+        return cls.of(columns, metadata)
 
     def write(self, path: Path | str) -> None:
         """Write as CSV, or as Parquet if the file is named so; numbers keep every bit.
@@ -100,7 +140,7 @@ class Recording(Result):
         """Say how long it is, what its columns span, and what was said about it."""
         rows = [
             (name, *(f"{end:.6g}" for end in _span(column)), str(int((~np.isfinite(column)).sum())))
-            for name, column in self.columns.items()
+            for name, column in self.own_columns.items()
         ]
         said = [f"{key}: {value}" for key, value in self.metadata.items()]
         return [self._length(), Table(("column", "least", "greatest", "missing"), rows), *said]
@@ -122,15 +162,17 @@ class Recording(Result):
 
         figure, (above, below) = panels((3.0, 1.6))
         time_s = self.time_s - self.time_s[0]
+        length, command, (travel, moved_by) = self.kind.length, self.kind.command, self.kind.words
         if "reference_m" in self.columns:
-            line(above, time_s, 1e3 * self.columns["reference_m"], MODEL, "reference", drawstyle="steps-post")
-        line(above, time_s, 1e3 * self.position_m, MEASURED, "position")
+            reference = length.factor * self.columns["reference_m"]
+            line(above, time_s, reference, MODEL, "reference", drawstyle="steps-post")
+        line(above, time_s, length.factor * self.position_m, MEASURED, travel)
         if "command_pa" in self.columns:
-            line(below, time_s, 1e-3 * self.command_pa, QUIET, "command", drawstyle="steps-post")
+            line(below, time_s, command.factor * self.command_pa, QUIET, "command", drawstyle="steps-post")
         if "pressure_pa" in self.columns:
-            line(below, time_s, 1e-3 * self.columns["pressure_pa"], MODEL, "pressure")
-        above.set_ylabel("position, mm")
-        below.set_ylabel("pressure, kPa")
+            line(below, time_s, command.factor * self.columns["pressure_pa"], MODEL, moved_by)
+        above.set_ylabel(f"{travel}, {length.unit}")
+        below.set_ylabel(f"{moved_by}, {command.unit}")
         below.set_xlabel("time, s")
         legend(above)
         legend(below)
@@ -138,6 +180,18 @@ class Recording(Result):
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+
+def _integrated(time_s: Column, velocity_m_per_s: Column) -> Column:
+    """Return the integral of a velocity, m, by trapezia, from zero; a value that is missing counts as the one before.
+
+    What its sensor is off by drifts.
+    """
+    known = np.isfinite(velocity_m_per_s)
+    last = np.maximum.accumulate(np.where(known, np.arange(known.size), 0))
+    held = np.where(np.isfinite(velocity_m_per_s[last]), velocity_m_per_s[last], 0.0)
+    steps_m = 0.5 * (held[1:] + held[:-1]) * np.diff(time_s)
+    return np.concatenate([[0.0], np.cumsum(steps_m)])
 
 
 def _span(column: Column) -> tuple[float, float]:
@@ -158,7 +212,7 @@ def write_recording(path: Path, recording: Recording) -> None:
             return
         with path.open("w", newline="", encoding="utf-8") as file:
             file.writelines(f"# {key}: {value}\n" for key, value in recording.metadata.items())
-            file.write(",".join(recording.columns) + "\n")
+            file.write(",".join(recording.own_columns) + "\n")
             for row in zip(*(column.tolist() for column in recording.columns.values()), strict=True):
                 file.write(",".join(map(repr, row)) + "\n")
     except OSError as error:
@@ -186,7 +240,7 @@ def read_table(path: Path, required: tuple[str, ...]) -> tuple[dict[str, Column]
 
 
 def _read(
-    path: Path, required: tuple[str, ...], clock_steps: float, *, or_required: tuple[str, ...] = ()
+    path: Path, required: tuple[str, ...], clock_steps: float, *, or_required: tuple[tuple[str, ...], ...] = ()
 ) -> tuple[dict[str, Column], dict[str, str]]:
     try:
         if path.suffix == ".parquet":
@@ -228,9 +282,11 @@ def _moderate(path: Path, packed: TextIO) -> Iterator[str]:
         yield line
 
 
-def _require(path: Path, required: tuple[str, ...], names: list[str], where: str, or_required: tuple[str, ...]) -> None:
+def _require(
+    path: Path, required: tuple[str, ...], names: list[str], where: str, or_required: tuple[tuple[str, ...], ...]
+) -> None:
     missing = [name for name in required if name not in names]
-    if missing and not (or_required and set(or_required) <= set(names)):
+    if missing and not any(set(each) <= set(names) for each in or_required):
         named = ", ".join(names)
         named = named if len(named) <= LONGEST_NAMED else f"{named[:LONGEST_NAMED]}.."
         hint = f"; of another program's export, `positioner import {path}` says how to read it"
@@ -243,7 +299,7 @@ def _require(path: Path, required: tuple[str, ...], names: list[str], where: str
 
 
 def _table(
-    path: Path, lines: Iterator[str], required: tuple[str, ...], or_required: tuple[str, ...]
+    path: Path, lines: Iterator[str], required: tuple[str, ...], or_required: tuple[tuple[str, ...], ...]
 ) -> tuple[dict[str, Column], dict[str, str], int]:
     """Return columns, metadata and the number of the header's line."""
     metadata: dict[str, str] = {}
@@ -325,7 +381,7 @@ def _require_increasing_time(path: Path, time_s: Column, header_line: int, toler
 
 def _write_parquet(path: Path, recording: Recording) -> None:
     arrow, parquet = _pyarrow(path)
-    table = arrow.table({name: arrow.array(column) for name, column in recording.columns.items()})
+    table = arrow.table({name: arrow.array(column) for name, column in recording.own_columns.items()})
     parquet.write_table(table.replace_schema_metadata(dict(recording.metadata)), path)
 
 

@@ -3,16 +3,20 @@
     m x'' = A u - k_s x - F_v x' - (F_c + (F_s - F_c) exp(-(x'/v_s)^2)) sign(x')      while it moves
     at rest it stays until |A u - k_s x| > F_s
 
-The same file drives the simulated slave, the offline simulation and the workbench.
+The same file drives the simulated slave, the offline simulation and the workbench. In place of `[valve]` there may be a
+table `[drive]`, with the names and units of its kind (`config.drive`).
 """
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from config.drive import KINDS, VALVE, Kind, KindName
 from config.errors import InputError
-from config.loading import SHIPPED, NonNegative, Positive, Schema, load
+from config.loading import SHIPPED, NonNegative, Positive, Schema, read_toml, validated
 
 
 class ValveParameters(Schema):
@@ -29,11 +33,18 @@ class ValveParameters(Schema):
     stribeck_velocity_m_per_s: Positive
     deadzone_ratio: Positive
     stroke_m: Positive
+    kind: KindName = "valve"
+
+    @property
+    def own(self) -> Kind:
+        """Its names and units."""
+        return KINDS[self.kind]
 
     @model_validator(mode="after")
     def _static_friction_is_at_least_coulomb_friction(self) -> Self:
         if self.static_n < self.coulomb_n:
-            raise ValueError(f"static_n must be at least coulomb_n ({self.coulomb_n:g} N), it is {self.static_n:g} N")
+            coulomb, static = (self.own.force.said(each, "g") for each in (self.coulomb_n, self.static_n))
+            raise ValueError(f"static_n must be at least coulomb_n ({coulomb}), it is {static}")
         return self
 
     @property
@@ -78,8 +89,51 @@ def load_valve(path: Path | str) -> ValveFile:
         InputError: names file, key, value and what is allowed.
     """
     path = Path(path)
-    file = load(ValveFile, path)
+    tables = read_toml(path)
+    file = _drive(tables, str(path)) if "drive" in tables else validated(ValveFile, tables, str(path), path.parent)
     return file.model_copy(update={"effect": tuple(each.seen_from(path.parent) for each in file.effect)})
+
+
+WITHOUT_DRIVE: Mapping[str, float] = {"diaphragm_area_m2": 1.0, "spring_n_per_m": 0.0, "deadzone_ratio": 0.01}
+"""What a drive's table need not say: its command is the force, no spring, a narrow band."""
+
+
+def _drive(tables: Mapping[str, Any], source: str) -> ValveFile:
+    """Return the valve file of a drive's, `[drive]` in the place of `[valve]`.
+
+    Raises:
+        InputError: an unknown kind or key, a value missing or out of its range; by the drive's own names.
+    """
+    table = tables["drive"]
+    kinds = [name for name in KINDS if name != VALVE.name]
+    if not isinstance(table, dict) or table.get("kind") not in kinds:
+        got = repr(table.get("kind")) if isinstance(table, dict) else repr(table)
+        raise InputError(source, f"drive.kind: must be {', '.join(kinds[:-1])} or {kinds[-1]}, got {got}")
+    kind = KINDS[table["kind"]]
+    names = {kind.own(name): name for name in ValveParameters.model_fields if name != "diaphragm_area_m2" or kind.area}
+    for key in table:
+        if key not in names:
+            raise InputError(source, f"drive.{key}: unknown key; allowed here: {', '.join(names)}")
+    if kind.area and kind.area not in table:
+        raise InputError(source, f"drive.{kind.area}: is required and missing")
+    said = {**WITHOUT_DRIVE, **{names[key]: value for key, value in table.items()}}
+    rest = {key: value for key, value in tables.items() if key != "drive"}
+    if isinstance(rest.get("effect"), list):
+        rest["effect"] = [_of_valve(kind, each, source) for each in rest["effect"]]
+    try:
+        return validated(ValveFile, {"valve": said, **rest}, source)
+    except InputError as error:
+        raise InputError(source, re.sub(r"^valve\b", "drive", kind.text(error.problem))) from None
+
+
+def _of_valve(kind: Kind, table: Any, source: str) -> Any:
+    """Return a drive's effect table with a valve's names."""
+    if not isinstance(table, dict):
+        return table
+    for key in table:
+        if (own := kind.own(kind.of_valve(key))) != key:
+            raise InputError(source, f"effect.{key}: a drive of kind {kind.name} has {own}")
+    return {kind.of_valve(key): value for key, value in table.items()}
 
 
 def valve(name: Path | str) -> ValveFile:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from config.drive import VALVE
 from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile
 
@@ -26,9 +27,13 @@ def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) 
 
 
 def valve_toml(file: ValveFile) -> str:
-    """Return the text of a valve file; numbers keep every bit."""
-    tables = [("[valve]", file.valve.model_dump())]
+    """Return the text of a valve file, or of a drive's; numbers keep every bit."""
+    kind, parameters = file.valve.own, file.valve.model_dump(exclude={"kind"})
+    if not kind.area:
+        del parameters["diaphragm_area_m2"]
+    tables = [("[valve]", parameters) if kind is VALVE else ("[drive]", {"kind": kind.name, **parameters})]
     tables += [("[[effect]]", {"name": each.name, **each.parameters}) for each in file.effect]
+    tables = [(head, {kind.own(key): value for key, value in table.items()}) for head, table in tables]
     return "\n".join(f"{head}\n{_lines(table)}" for head, table in tables)
 
 

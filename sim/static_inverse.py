@@ -47,6 +47,8 @@ def extended_valve(file: ValveFile, source: str) -> ExtendedValve:
         InputError: an effect that is unknown or declares no inverse, a parameter unknown, missing or out of its range,
             a table that does not rise with the position.
     """
+    if file.valve.kind != "valve":
+        raise InputError(source, "is of a drive, which the daemon does not command")
     effects = [find_effect(each.name, source) for each in file.effect]
     for each in effects:
         if not each.in_balance and each.inverse is None:

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from config.errors import InputError
-from config.exports.export_units import SHARES, allowed_units, ending_of
-from config.recording import BEHIND_POSITIONER, REQUIRED
+from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of
+from config.recording import BEHIND_POSITIONER, OF_DRIVES, REQUIRED
 
 RANGE_PA = (0.2e5, 1.0e5)
 """The pressures of 0 % and 100 %: the field's usual 0.2 to 1 bar, unless another range is given."""
@@ -54,7 +54,8 @@ def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
     """
     sources = tuple(_source(word) for word in words)
     names = [each.name for each in sources]
-    required = REQUIRED if "command_pa" in names or "reference_m" not in names else BEHIND_POSITIONER
+    possible = (REQUIRED, BEHIND_POSITIONER, *OF_DRIVES)
+    required = next((each for each in possible if set(each) <= set(names)), None) or _nearest(names)
     for name in (*required, *names):
         if name not in names:
             raise InputError("--column", f"{name} is not given: add --column {name}=THEIRS:UNIT")
@@ -63,13 +64,20 @@ def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
     return sources
 
 
+def _nearest(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns of which one is missing: a set point's where one is given, else those of its kind."""
+    if "reference_m" in names and "command_pa" not in names:
+        return BEHIND_POSITIONER
+    return next((each for each in OF_DRIVES if {*each[1:]} & {*names} - {*REQUIRED}), REQUIRED)
+
+
 def _source(word: str) -> Source:
-    match = re.fullmatch(r"(\w+?(_s|_pa|_m|_n))=(.+?)(?::([^:]*))?", word)
+    match = re.fullmatch(rf"(\w+?({'|'.join(UNITS)}))=(.+?)(?::([^:]*))?", word)
     if match is None:
-        raise InputError(
-            "--column", f"{word!r}: must be OURS=THEIRS:UNIT, OURS ending in _s, _pa, _m or _n (position_m=PV:%)"
-        )
-    name, ending, theirs, unit = match.groups()
+        endings = ", ".join(UNITS)
+        raise InputError("--column", f"{word!r}: must be OURS=THEIRS:UNIT, OURS ending in {endings} (position_m=PV:%)")
+    name, theirs, unit = match[1], match[3], match[4]
+    ending = ending_of(name)
     allowed = allowed_units(ending)
     plain = (unit or "").removeprefix("-")
     turned = unit is not None and unit != plain

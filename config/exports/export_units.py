@@ -9,6 +9,7 @@ counts from the other end, as of a valve that air closes: `-%`, `-mm`.
 
 import re
 from collections.abc import Mapping
+from math import pi
 
 UNITS: Mapping[str, Mapping[str, float]] = {
     "_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0, "iso": 1.0},
@@ -27,6 +28,11 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     },
     "_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "_n": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+    "_nm": {"Nm": 1.0, "mNm": 1e-3, "kNm": 1e3},
+    "_a": {"A": 1.0, "mA": 1e-3},
+    "_rad": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "rev": 2.0 * pi},
+    "_m_per_s": {"m/s": 1.0, "mm/s": 1e-3},
+    "_rad_per_s": {"rad/s": 1.0, "deg/s": pi / 180.0, "rpm": pi / 30.0},
 }
 """By the ending of our name: their unit in ours."""
 ATMOSPHERE_PA = 101_325.0
@@ -34,7 +40,7 @@ ABSOLUTE = frozenset({"bara", "kPaa", "psia"})
 """Pressures from a vacuum up; ours are from the atmosphere up."""
 SHARES: Mapping[str, tuple[float, float]] = {"%": (0.01, 0.0), "p.u.": (1.0, 0.0), "mA": (1 / 16, -0.25)}
 """Share = factor raw + offset."""
-SI = {"_s": "s", "_pa": "Pa", "_m": "m", "_n": "N"}
+SI = {ending: next(unit for unit, factor in units.items() if factor == 1.0) for ending, units in UNITS.items()}
 _ALIASES = {
     "sec secs second seconds sek sekunde sekunden": "s",
     "msec millisec milliseconds millisekunden": "ms",
@@ -56,6 +62,11 @@ _ALIASES = {
     "µm μm micron": "um",
     'inch inches "': "in",
     "newton": "N",
+    "n*m n·m newtonmeter": "Nm",
+    "ampere amp amps": "A",
+    "degree degrees grad ° deg.": "deg",
+    "turn turns revolutions umdrehungen": "rev",
+    "1/min min-1 u/min": "rpm",
     "percent pct prozent %open %offen %travel %oftravel %stroke %ofstroke %hub %span %ofspan %fs": "%",
     "pu p.u": "p.u.",
     "milliampere ma(dc)": "mA",
@@ -99,7 +110,5 @@ def unit_in_header(name: str) -> tuple[str, str | None]:
 
 
 def ending_of(name: str) -> str:
-    """Return the ending of a column's name that says its unit: _s, _pa, _m or _n."""
-    match = re.search(r"_(s|pa|m|n)$", name)
-    assert match is not None
-    return match[0]
+    """Return the ending of a column's name that says its unit: _s, _pa, _m, _rad_per_s, ..."""
+    return max((each for each in UNITS if name.endswith(each)), key=len)

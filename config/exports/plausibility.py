@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from config.drive import SI
 from config.recording import Column, Recording
 
 LONGEST_STROKE_M = 1.5
@@ -36,12 +37,14 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
         recording: as read.
         stroke_m: of its valve, if that is known.
     """
-    position_m, command_pa = recording.position_m, recording.columns.get("command_pa")
-    said = [*_of_size(position_m, stroke_m), *_of_rows(recording)]
+    position_m, command_pa, kind = recording.position_m, recording.columns.get("command_pa"), recording.kind
+    of_valve = kind.name == "valve"
+    said = [*(_of_size(position_m, stroke_m) if of_valve else ()), *_of_rows(recording)]
     whole = np.isfinite(position_m)
     if whole.any() and np.ptp(position_m[whole]) == 0.0:
-        said.append(f"the position is {position_m[whole][0]:g} m throughout: a stem that never moves says nothing")
-    elif whole.any() and command_pa is not None:
+        where = f"{position_m[whole][0]:g} {SI[kind.lengths]}"
+        said.append(f"the position is {where} throughout: a stem that never moves says nothing")
+    elif whole.any() and command_pa is not None and of_valve:
         said += [*_of_pressure(command_pa), *_of_action(position_m, command_pa), *_of_sampling(recording)]
     return said
 

@@ -146,7 +146,9 @@ def run_scenario(file: ValveFile, noise: Noise, period_s: float) -> ScenarioRun:
     stroke_m = parameters.stroke_m
     slave = _slave(noise, period_s, stroke_m)
     valve = Valve.from_file(file)
-    plant = NoisyTransmitter(Device(valve, slave, parameters.model_dump(exclude={"name"})), valve, noise, stroke_m)
+    plant = NoisyTransmitter(
+        Device(valve, slave, parameters.model_dump(exclude={"name", "kind"})), valve, noise, stroke_m
+    )
     first, *then = _phases(stroke_m)
     cycle = virtual_cycle(_daemon(period_s, stroke_m), plant, first[1])
 

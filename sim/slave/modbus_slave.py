@@ -68,8 +68,10 @@ def device_of(file: SlaveFile, valve_file: Path) -> Device:
         InputError: a fault in the valve file, or the changes contradict each other.
     """
     described = load_valve(valve_file)
+    if described.valve.kind != "valve":
+        raise InputError(str(valve_file), "is of a drive: the simulated device obeys pressures, and moves a valve")
     if any(find_effect(each.name, str(valve_file)).by_setpoint for each in described.effect):
         raise InputError(str(valve_file), "has a positioner: the simulated device obeys pressures, not set points")
     valve = Valve.from_file(described, step_s=min(VALVE_STEP_S, file.clock.period_s), source=str(valve_file))
     valve.rest_at(file.initial.position_m, file.initial.pressure_pa)
-    return Device(valve, file, described.valve.model_dump(exclude={"name"}))
+    return Device(valve, file, described.valve.model_dump(exclude={"name", "kind"}))

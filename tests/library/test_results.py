@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import positioner as pos
+from config.drive import VALVE
 from config.results.block import Table, as_html, as_text
 from config.results.result import Result
 from positioner.cli.main import main
@@ -182,7 +183,7 @@ def test_a_parameter_that_means_nothing_is_said_to() -> None:
         "at_end": Fitted(0.0, 0.1, 0.0, 1.2, at_bound=True, physical=True),
         "beyond": Fitted(0.0, 0.1, 0.0, 1.2, at_bound=True, physical=False),
     }
-    assert [row[-1] for row in parameter_table(parameters).rows] == [
+    assert [row[-1] for row in parameter_table(parameters, VALVE).rows] == [
         "",
         "not determined by this recording",
         "at the end of its range",

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.drive import VALVE
 from config.errors import InputError
 from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
@@ -101,9 +102,12 @@ def test_two_are_indistinguishable_that_differ_by_a_narrowly_mistimed_slip_and_n
 
 def test_a_fall_is_never_said_of_an_error_that_rises() -> None:
     before = replace(errors_of(np.zeros(60)), test_rmse_m=1.31e-4, test_block_m=9e-5)
-    assert reduction_sentence(before, errors_of(np.zeros(60))) == "the held-out error falls from 0.131 to 0.1 mm"
+    assert (
+        reduction_sentence(before, errors_of(np.zeros(60)), VALVE.length)
+        == "the held-out error falls from 0.131 to 0.1 mm"
+    )
     missed = replace(before, test_rmse_m=4.39e-4, test_block_m=5e-5)
-    assert reduction_sentence(before, missed) == (
+    assert reduction_sentence(before, missed, VALVE.length) == (
         "the held-out error of a typical second falls from 0.09 to 0.05 mm, "
         "though a narrowly mistimed slip moves the rms from 0.131 to 0.439 mm"
     )

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from config.drive import VALVE
 from workbench.compare.comparison_sentences import Findings, judged, sentences, shortened, slip_sentences
 from workbench.compare.slip_matching import MatchedSlip, SlipEvents
 from workbench.data.motion import Slip
@@ -23,6 +24,7 @@ FOUND = Findings(
     measured_slips=SLIPS,
     depends_on_input=False,
     close=False,
+    length=VALVE.length,
 )
 
 
@@ -73,7 +75,7 @@ def test_where_most_of_the_error_is_the_worst_run_of_samples_is_shown_first() ->
 
 def test_each_slip_is_told() -> None:
     events = SlipEvents((MatchedSlip(3.304, -1, True, -0.02, 6.6e-3),), (1.0,), (2.0,))
-    assert slip_sentences(events) == {
+    assert slip_sentences(events, VALVE.length) == {
         "missed": ("at 1.00 s the stem slips, and the model does not",),
         "spurious": ("at 2.00 s the model slips, and the stem does not",),
         "matched": ("slip at 3.30 s, closing, after a reversal: the model comes 0.02 s early and ends 6.6 mm too far",),

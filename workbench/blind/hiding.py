@@ -79,7 +79,7 @@ def hide(
         "seed": seed,
         "dirty": dirty,
         "effects": [{"name": each.name, **each.parameters} for each in truth.effect],
-        "valve": valve.model_dump(),
+        "valve": valve.model_dump(exclude={"kind"}),
         "floor_m": {"fit": fit[1], "test": test[1]},
         "visible": {each.name: _visible(trials, truth, each, fit[1]) for each in truth.effect},
     }

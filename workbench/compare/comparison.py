@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from config.drive import KINDS, Kind, KindName, Scale
 from config.recording import Column, Recording
 from config.results.block import Block, Table
 from config.results.result import Result
@@ -32,6 +33,7 @@ from workbench.compare.residuals import (
 )
 from workbench.compare.slip_matching import SlipEvents, matched
 from workbench.data.motion import Slip, slips, velocity_m_per_s
+from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready, require_units
 from workbench.model.free_run import FreeRun, Run
 
@@ -105,6 +107,13 @@ class Comparison(Result):
     spectrum: Spectrum
     friction: FrictionBalance
     by_setpoint: bool = False
+    kind: KindName = "valve"
+    """Whose it is: in which names and units it is read."""
+
+    @property
+    def own(self) -> Kind:
+        """Its names and units."""
+        return KINDS[self.kind]
 
     @property
     def valid_samples(self) -> int:
@@ -118,12 +127,13 @@ class Comparison(Result):
 
     def blocks(self) -> list[Block]:
         """Say where the model fails, the gravest first, and by how much in each phase."""
+        length = self.own.length
         return [
-            f"{self._judgement}: fit {self.fit_percent:.2f} %, error {_mm(self.rms_m)} rms, {_mm(self.robust_m)} "
-            f"robust, noise {'unknown' if self.noise_m is None else _mm(self.noise_m)}"
-            + ("" if self.repeatability_m is None else f", repeatability {_mm(self.repeatability_m)}"),
+            f"{self._judgement}: fit {self.fit_percent:.2f} %, error {length.said(self.rms_m, '.4g')} rms, "
+            f"{length.said(self.robust_m, '.4g')} robust, noise {told(self.noise_m, length)}"
+            + ("" if self.repeatability_m is None else f", repeatability {length.said(self.repeatability_m, '.4g')}"),
             *(f"  {sentence}" for sentence in self.sentences),
-            _phase_table(self.phases),
+            _phase_table(self.phases, length),
             *self._slips_and_residual(),
             *(f"recording: {note}" for note in shortened(self.notes)),
         ]
@@ -142,9 +152,10 @@ class Comparison(Result):
             f"99 % band; with the command: {self.input_correlation.outside} of {len(self.input_correlation.lag)}",
         ]
         if side is not None:
+            pressure, unit = self.own.words[1], self.own.command_unit
             lines.append(
-                f"measured pressure: the model's is off by {side.pressure_rms_pa:.4g} Pa rms; run from the measured "
-                f"one, the error is {_mm(side.stem_rms_m)} rms"
+                f"measured {pressure}: the model's is off by {side.pressure_rms_pa:.4g} {unit} rms; run from the "
+                f"measured one, the error is {self.own.length.said(side.stem_rms_m, '.4g')} rms"
             )
         return lines
 
@@ -165,11 +176,13 @@ class Comparison(Result):
 
         figure, (above, below) = panels((3.2, 1.6))
         time_s = self.time_s - self.time_s[0]
-        line(above, time_s, 1e3 * self.measured_m, MEASURED, "measured")
-        line(above, time_s, 1e3 * self.simulated_m, MODEL, f"model, error {_mm(self.rms_m)} rms")
-        line(below, time_s, 1e3 * self.residual_m, MODEL)
-        above.set_ylabel("position, mm")
-        below.set_ylabel("error, mm")
+        length = self.own.length
+        line(above, time_s, length.factor * self.measured_m, MEASURED, "measured")
+        label = f"model, error {length.said(self.rms_m, '.4g')} rms"
+        line(above, time_s, length.factor * self.simulated_m, MODEL, label)
+        line(below, time_s, length.factor * self.residual_m, MODEL)
+        above.set_ylabel(f"{self.own.words[0]}, {length.unit}")
+        below.set_ylabel(f"error, {length.unit}")
         below.set_xlabel("time, s")
         legend(above)
         return figure
@@ -216,6 +229,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
         events=events,
         measured_slips=tuple(slip for each in segments for slip in each.measured),
         depends_on_input=bool(np.max(np.abs(with_input.value)) > CLEAR * with_input.band),
+        length=valve.valve.own.length,
         close=record.floor_m is not None
         and error_m <= max(ADEQUATE * record.floor_m, NUMERICAL * valve.valve.stroke_m),
     )
@@ -254,22 +268,22 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
             _all([each.measured_forces for each in segments]), _all([each.model_forces for each in segments])
         ),
         by_setpoint=record.by_setpoint,
+        kind=valve.valve.kind,
     )
 
 
-def _phase_table(found: Sequence[Phase]) -> Table:
-    return Table(
-        ("phase", "samples", "rms mm", "mean mm", "share"),
-        [
-            (each.name, f"{each.count}", f"{1e3 * each.rms_m:.4f}", f"{1e3 * each.mean_m:.4f}", f"{each.share:.0%}")
-            for each in found
-            if each.count
-        ],
-    )
-
-
-def _mm(value_m: float) -> str:
-    return f"{1e3 * value_m:.4g} mm"
+def _phase_table(found: Sequence[Phase], length: Scale) -> Table:
+    rows = [
+        (
+            each.name,
+            f"{each.count}",
+            *(length.number(value, ".4f") for value in (each.rms_m, each.mean_m)),
+            f"{each.share:.0%}",
+        )
+        for each in found
+        if each.count
+    ]
+    return Table(("phase", "samples", f"rms {length.unit}", f"mean {length.unit}", "share"), rows)
 
 
 def as_json(value: Any) -> Any:

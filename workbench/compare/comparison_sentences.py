@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from config.drive import Scale
 from config.recording import Column
 from workbench.compare.measures import BLOCK_S
 from workbench.compare.phases import PHASES
@@ -64,8 +65,14 @@ class Findings:
     events: SlipEvents
     measured_slips: tuple[Slip, ...]
     depends_on_input: bool
+    length: Scale
+    """As positions and errors are read."""
     close: bool
     """The error is at most 1.5 times the floor."""
+
+    def mm(self, value_m: float) -> str:
+        """Say a length, in mm of what slides."""
+        return self.length.said(value_m, ".2g")
 
     @property
     def matters_m(self) -> float:
@@ -92,7 +99,7 @@ def judged(found: Findings) -> tuple[Sentence, ...]:
         way = "opens" if found.measured_slips[0].direction > 0 else "closes"
         said.append(Sentence(f"the stem only {way} in this recording: the other direction is not judged"))
     if found.adequate:
-        errors = f"error {_mm(found.rms_m)}, floor {_mm(found.matters_m)}"
+        errors = f"error {found.mm(found.rms_m)}, floor {found.mm(found.matters_m)}"
         return (*said, Sentence(f"the model holds: {errors}, no structure left"))
     graded = [*_along_motion(found), *_late(found), *_offset(found), *_trends(found)]
     said += [each for _, each in sorted(graded, key=lambda each: -each[0])]
@@ -104,19 +111,19 @@ def sentences(found: Findings) -> tuple[str, ...]:
     return tuple(each.text for each in judged(found))
 
 
-def slip_sentences(events: SlipEvents) -> Mapping[str, tuple[str, ...]]:
+def slip_sentences(events: SlipEvents, length: Scale) -> Mapping[str, tuple[str, ...]]:
     """Say of each slip what the model makes of it: missed, spurious and matched ones, in their order."""
     return {
         "missed": tuple(f"at {each:.2f} s the stem slips, and the model does not" for each in events.missed_s),
         "spurious": tuple(f"at {each:.2f} s the model slips, and the stem does not" for each in events.spurious_s),
-        "matched": tuple(map(_slip, events.matched)),
+        "matched": tuple(_slip(each, length) for each in events.matched),
     }
 
 
-def _slip(each: MatchedSlip) -> str:
+def _slip(each: MatchedSlip, length: Scale) -> str:
     way = f"{'opening' if each.direction > 0 else 'closing'}, {'after a reversal' if each.reversal else 'going on'}"
     late = f"{_seconds(abs(each.late_s))} {'late' if each.late_s > 0.0 else 'early'}" if each.late_s else "on time"
-    far = f"{_mm(abs(each.farther_m))} too {'far' if each.farther_m > 0.0 else 'short'}"
+    far = f"{length.said(abs(each.farther_m), '.2g')} too {'far' if each.farther_m > 0.0 else 'short'}"
     return f"slip at {each.time_s:.2f} s, {way}: the model comes {late} and ends {far}"
 
 
@@ -132,7 +139,7 @@ def _along_motion(found: Findings) -> Iterator[Graded]:
     for when, reversal in (("after every reversal", True), ("where it goes on in one direction", False)):
         pairs = [each for each in found.events.matched if each.reversal == reversal]
         yield from _by_direction(
-            pairs, [each.farther_m for each in pairs], found.matters_m, when, ("too far", "too short"), _mm
+            pairs, [each.farther_m for each in pairs], found.matters_m, when, ("too far", "too short"), found.mm
         )
 
 
@@ -187,14 +194,14 @@ def _by_direction(
 def _offset(found: Findings) -> Iterator[Graded]:
     mean, error = _block_mean(found, np.ones(found.time_s.size, np.bool_))
     if _certain(mean, error, found.matters_m) and abs(mean) > 0.5 * found.rms_m:
-        text = f"it stands {_mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
+        text = f"it stands {found.mm(abs(mean))} too {'high' if mean > 0 else 'low'} throughout"
         yield abs(mean), Sentence(text)
 
 
 def _trends(found: Findings) -> Iterator[Graded]:
     """Errors that grow over the stroke or with time."""
     for over, what, unit in (
-        (found.position_m, "over the stroke", _mm),
+        (found.position_m, "over the stroke", found.mm),
         (found.time_s, "with time", _seconds),
     ):
         if np.ptp(over) == 0.0:
@@ -211,7 +218,8 @@ def _trends(found: Findings) -> Iterator[Graded]:
         change = float(slope) * (high - low)
         if _certain(float(slope), spread, 0.0) and abs(change) > max(2.0 * found.matters_m, found.rms_m):
             at_low, at_high = slope * low + intercept, slope * high + intercept
-            text = f"its error changes {what}: {_signed(at_low)} at {unit(low)}, {_signed(at_high)} at {unit(high)}"
+            first, last = (found.length.said(each, "+.2g") for each in (at_low, at_high))
+            text = f"its error changes {what}: {first} at {unit(low)}, {last} at {unit(high)}"
             yield 0.5 * abs(change), Sentence(text, _runs(found, blocks, np.abs(y)))
 
 
@@ -233,7 +241,7 @@ def _share(found: Findings) -> Iterator[Sentence]:
         inside = found.phase == worst
         part = found.residual_m[inside]
         where = "near the stops" if PHASES[worst] == "near stops" else f"in phase {PHASES[worst]!r}"
-        text = f"{100 * share:.0f} % of the squared error is {where}, {_mm(float(np.sqrt(np.mean(part**2))))} rms"
+        text = f"{100 * share:.0f} % of the squared error is {where}, {found.mm(float(np.sqrt(np.mean(part**2))))} rms"
         run = np.cumsum(np.diff(inside, prepend=inside[0]))
         grade = np.bincount(run, np.where(inside, found.residual_m**2, 0.0)).astype(np.float64)
         yield Sentence(text, _runs(found, run, grade))
@@ -241,11 +249,11 @@ def _share(found: Findings) -> Iterator[Sentence]:
 
 def _rest(found: Findings, named: bool) -> Iterator[Sentence]:
     if found.floor_m is None:
-        yield Sentence(f"the error is {_mm(found.rms_m)} rms; {UNKNOWN}", _worst(found))
+        yield Sentence(f"the error is {found.mm(found.rms_m)} rms; {UNKNOWN}", _worst(found))
         return
     times = found.rms_m / found.floor_m if found.floor_m else np.inf
     if not found.close:
-        text = f"the error, {_mm(found.rms_m)} rms, is {times:.1f} times the floor of {_mm(found.floor_m)}"
+        text = f"the error, {found.mm(found.rms_m)} rms, is {times:.1f} times the floor of {found.mm(found.floor_m)}"
         yield Sentence(text, _worst(found))
     if found.depends_on_input and not named:
         yield Sentence("what is left depends on the command")
@@ -298,14 +306,6 @@ def _certain(mean: float, error: float, matters: float) -> bool:
 
 def _count(slips: int, kind: str = "") -> str:
     return f"{slips} {kind}slip{'s' if slips > 1 else ''}"
-
-
-def _mm(value_m: float) -> str:
-    return f"{1e3 * value_m:.2g} mm"
-
-
-def _signed(value_m: float) -> str:
-    return f"{1e3 * value_m:+.2g} mm"
 
 
 def _seconds(value_s: float) -> str:

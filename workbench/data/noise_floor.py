@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from config.drive import Scale
 from config.errors import InputError
 from config.noise import position_noise_m
 from config.recording import Column, Recording
@@ -27,9 +28,9 @@ UNKNOWN = (
 )
 
 
-def told_mm(value_m: float | None) -> str:
-    """Say a noise or a floor in mm."""
-    return "unknown" if value_m is None else f"{1e3 * value_m:.4g} mm"
+def told(value_m: float | None, length: Scale) -> str:
+    """Say a noise or a floor, in the unit in which lengths are read."""
+    return "unknown" if value_m is None else length.said(value_m, ".4g")
 
 
 def with_noise(recording: Recording, noise_m: float | None) -> Recording:

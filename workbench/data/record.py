@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from config.drive import KINDS, SI, KindName
 from config.errors import InputError
 from config.noise import quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
@@ -70,6 +71,8 @@ class Record(Brief):
     repeatability_m: float | None
     """How well the valve repeats itself, None where the command does not."""
     by_setpoint: bool = False
+    kind: KindName = "valve"
+    """Whose it is."""
     commanded_from: tuple[int, ...] = ()
     """For each segment the row from which its command is known: what lies between was left out, being in motion."""
 
@@ -123,17 +126,17 @@ def ready(recording: Recording) -> Record:
     repeated_m = repeatability_m(command_pa[longest], seen_m[longest]) if _is_even(time_s[longest]) else None
     quantum = quantum_m(position_m[valid])
     finest_m = FINEST * float(np.ptp(position_m[valid]))
-    noise_m = said_noise_m(recording)
+    noise_m, unit = said_noise_m(recording), SI[recording.kind.lengths]
     if noise_m is None:
         noise_m = not_repeating_m(noise_std_m(seen_m[longest], command_pa[longest]), repeated_m, quantum)
     if noise_m is not None and noise_m < finest_m:
         notes.append(
-            f"position_m hardly has noise: it is judged to {finest_m:.2g} m, as finely as a model is simulated; if "
-            "something holds small changes back, a dead band or a historian's compression, say how much, --noise-m M"
+            f"position_m hardly has noise: it is judged to {finest_m:.2g} {unit}, as finely as a model is simulated; "
+            "if something holds small changes back, a dead band or a historian's compression, say how much, --noise-m M"
         )
         noise_m = finest_m
     if quantum:
-        notes.append(f"position_m is rounded to {quantum:.3g} m")
+        notes.append(f"position_m is rounded to {quantum:.3g} {unit}")
     if noise_m is None and repeated_m is None:
         notes.append(UNKNOWN)
     _tell_sampling(time_s, segments, notes)
@@ -149,10 +152,11 @@ def ready(recording: Recording) -> Record:
         noise_m,
         repeated_m,
         recording.by_setpoint,
+        recording.kind.name,
     )
     at_rest = tuple(_from_rest(record, notes))
     begun = tuple(first for first, _ in segments)
-    return replace(record, segments=at_rest, notes=tuple(notes), commanded_from=begun)
+    return replace(record, segments=at_rest, notes=tuple(map(recording.kind.text, notes)), commanded_from=begun)
 
 
 def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:
@@ -215,6 +219,14 @@ def require_units(record: Record, valve: ValveParameters) -> None:
     """
     position_m = record.position_m[record.valid]
     reached = float(np.max(np.abs(position_m)))
+    if record.kind != valve.kind:
+        ours, theirs = (
+            f"{kind.own('command_pa')} and {kind.own('position_m')}" for kind in (KINDS[record.kind], valve.own)
+        )
+        raise InputError("recording", f"has {ours}, and the valve file is of a {valve.kind}, which has {theirs}")
+    if valve.kind != "valve":
+        _require_drives_units(reached, valve)
+        return
     if reached > 20.0 * valve.stroke_m:
         unit = "mm" if valve.stroke_m < 0.06 < reached < 1.5e3 * valve.stroke_m < 90 else "per cent (%) or mm"
         raise InputError(
@@ -231,6 +243,16 @@ def require_units(record: Record, valve: ValveParameters) -> None:
     if not record.by_setpoint:
         _require_command_unit(record, valve, position_m)
         _require_pressure_unit(record)
+
+
+def _require_drives_units(reached: float, valve: ValveParameters) -> None:
+    name, travel, unit = valve.own.own("position_m"), valve.own.own("stroke_m"), "deg" if valve.own.turns else "mm"
+    if reached > 20.0 * valve.stroke_m:
+        raise InputError(
+            "recording",
+            f"{name} reaches {reached:.4g} where {travel} is {valve.stroke_m:g}: it looks like {unit}; import it, "
+            f"--column {name}=NAME:{unit}",
+        )
 
 
 def _require_command_unit(record: Record, valve: ValveParameters, position_m: Column) -> None:

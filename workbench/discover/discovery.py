@@ -21,7 +21,7 @@ from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import find_effect, written_here
 from workbench.data.held_out import Split, split
-from workbench.data.noise_floor import told_mm
+from workbench.data.noise_floor import told
 from workbench.discover.added_force import Landing, landings
 from workbench.discover.form_file import write_forms
 from workbench.discover.form_search import FormSearch
@@ -29,7 +29,7 @@ from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.model.sampling import sampling
-from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table
+from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
 from workbench.select.verdict_sentence import knife_edges_sentence
@@ -57,18 +57,19 @@ class Discovery(Result):
     @property
     def sentence(self) -> str:
         """What was found, in one sentence."""
-        floor = told_mm(self.split.floor_m)
+        length = self.base.fit.kind.length
+        floor = told(self.split.floor_m, length)
         match self.outcome:
             case "explained":
                 said = "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
-                excepted = knife_edges_sentence(self.base.errors)
+                excepted = knife_edges_sentence(self.base.errors, length)
                 return f"{said}.{excepted}" if excepted else said
             case "unjudged":
                 return "the noise is unknown, and with it whether anything is missing: say it, --noise-m M"
             case "none":
                 return f"no form explains the recordings: {self._best_so_far()}, floor {floor}"
         best = self.found[0]
-        error = f"{1e3 * best.model.errors.test_rmse_m:.4g} mm rms held out, floor {floor}"
+        error = f"{length.said(best.model.errors.test_rmse_m, '.4g')} rms held out, floor {floor}"
         rivals = f"; {len(self.found) - 1} more do as well" if len(self.found) > 1 else ""
         return f"a form, not a cause: {best.form.words}; {error}{rivals}"
 
@@ -76,31 +77,31 @@ class Discovery(Result):
         fitted = [each for each in self.candidates if each.model]
         if not fitted or not fitted[0].model:
             return "none could be fitted"
-        errors = fitted[0].model.errors
-        return f"the best, {fitted[0].name}, leaves {1e3 * errors.test_rmse_m:.4g} mm rms held out"
+        left = self.base.fit.kind.length.said(fitted[0].model.errors.test_rmse_m, ".4g")
+        return f"the best, {fitted[0].name}, leaves {left} rms held out"
 
     def blocks(self) -> list[Block]:
         """Say what was found, its equation and parameters, and what was tried."""
-        errors = self.base.errors
+        errors, kind = self.base.errors, self.base.fit.kind
         title = (
-            f"without: error {1e3 * errors.train_rmse_m:.4f} mm rms fitted, {1e3 * errors.test_rmse_m:.4f} held out, "
-            f"floor {told_mm(self.split.floor_m)}"
+            f"without: error {kind.length.said(errors.train_rmse_m, '.4g')} rms fitted, "
+            f"{kind.length.number(errors.test_rmse_m, '.4g')} held out, floor {told(self.split.floor_m, kind.length)}"
         )
         said: list[Block] = [self.sentence]
         for each in self.found[:1]:
             said += ["\n".join(f"    {line}" for line in each.form.equations)]
             said.append(f"shown {each.shown}; beyond, nothing is known of it")
-            said.append(parameter_table(each.model.fit.parameters))
+            said.append(parameter_table(each.model.fit.parameters, kind))
         said += [f"does as well: {each.form.words}: {each.form.equations[1]}" for each in self.found[1:]]
         if self.candidates:
-            said.append(candidate_table([each.tried for each in self.candidates], MILLIMETRES, title))
+            said.append(candidate_table([each.tried for each in self.candidates], lengths(kind), title))
         if self.untried:
             said.append(f"not fitted in full, behind or not needed: {', '.join(self.untried)}")
         return said
 
     def frame_columns(self) -> dict[str, list[object]]:
         """Return a row a form: errors, m, evidence, accepted or why not."""
-        return candidate_columns([each.tried for each in self.candidates], MILLIMETRES)
+        return candidate_columns([each.tried for each in self.candidates], lengths(self.base.fit.kind))
 
     def plot(self) -> "Figure":
         """Draw what the best form adds over its variable, and what the landings miss where it is a force at rest."""

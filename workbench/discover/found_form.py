@@ -39,13 +39,13 @@ class FoundForm(Brief):
 
     def text(self, source: str) -> str:
         """Return it as an effect's file; `source` says what it was found in."""
-        errors = self.model.errors
+        errors, length = self.model.errors, self.model.fit.kind.length
         values = ", ".join(f"{key} = {value:.6g}" for key, value in self.values.items())
         remarks = (
             "",
             f"Found by `positioner discover` in {source}: {values}. Beside it the valve leaves "
-            f"{1e3 * errors.train_rmse_m:.4g} mm rms of what was fitted and {1e3 * errors.test_rmse_m:.4g} mm of what "
-            "was held out.",
+            f"{length.said(errors.train_rmse_m, '.4g')} rms of what was fitted and "
+            f"{length.said(errors.test_rmse_m, '.4g')} of what was held out.",
             f"The recordings show it {self.shown}; beyond, nothing is known of it.",
         )
         return form_text(self.form, self.values, remarks)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from config.drive import Kind
 from config.recording import Column, Recording
 from config.results.block import Block
 from config.results.result import Result
@@ -14,7 +15,7 @@ from sim.composition import STATIC, Composition
 from sim.karnopp import Vector
 from workbench.compare.comparison_sentences import shortened
 from workbench.compare.measures import fit_percent
-from workbench.data.noise_floor import told_mm
+from workbench.data.noise_floor import told
 from workbench.data.record import Record, ready
 from workbench.fit.fitted_parameter import Fitted, draw_parameters, parameter_columns, parameter_table
 from workbench.fit.objective import SimulationError
@@ -79,6 +80,11 @@ class Fit(Result):
         """Return the indicated position of a free run, m; NaN in rows that are not simulated."""
         return self.indicated_m(ready(recording))
 
+    @property
+    def kind(self) -> Kind:
+        """Whose it is: its names and units."""
+        return self.valve.valve.own
+
     def indicated_m(self, record: Record) -> Column:
         """Return the same of a recording made ready."""
         composition = Composition.from_file(self.valve)
@@ -94,8 +100,9 @@ class Fit(Result):
         """Say the error, whether the searches agree, and each parameter with its interval."""
         agreement = "searches agree" if self.trusted else "search came to this alone, or to nothing better: not trusted"
         return [
-            f"error {1e3 * self.rms_m:.4g} mm rms, floor {told_mm(self.floor_m)}; {self.agreement} {agreement}",
-            parameter_table(self.parameters),
+            f"error {self.kind.length.said(self.rms_m, '.4g')} rms, floor {told(self.floor_m, self.kind.length)}; "
+            f"{self.agreement} {agreement}",
+            parameter_table(self.parameters, self.kind),
             *([self.by.sentence] if self.by.slow else []),
             *(f"recording: {note}" for note in shortened(self.notes)),
         ]
@@ -106,7 +113,7 @@ class Fit(Result):
 
     def plot(self) -> "Figure":
         """Draw the parameters' 95 % intervals in per cent of their values."""
-        return draw_parameters(self.parameters)
+        return draw_parameters(self.parameters, self.kind)
 
 
 def fit_at(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from config.drive import Kind
 from config.results.block import Table
 
 if TYPE_CHECKING:
@@ -34,10 +35,10 @@ class Fitted:
         return "at the end of its range" if self.at_bound else ""
 
 
-def parameter_table(parameters: Mapping[str, Fitted], title: str = "") -> Table:
+def parameter_table(parameters: Mapping[str, Fitted], kind: Kind, title: str = "") -> Table:
     """Return the parameters with their intervals; units are in the names."""
     rows = [
-        (name, f"{each.value:.6g}", f"{each.std:.2g}", f"{each.lower:.6g}", f"{each.upper:.6g}", each.remark)
+        (kind.text(name), f"{each.value:.6g}", f"{each.std:.2g}", f"{each.lower:.6g}", f"{each.upper:.6g}", each.remark)
         for name, each in parameters.items()
     ]
     return Table(("parameter", "value", "std", "95 % from", "to", ""), rows, title)
@@ -51,13 +52,13 @@ def parameter_columns(parameters: Mapping[str, Fitted]) -> dict[str, list[object
     return columns
 
 
-def draw_parameters(parameters: Mapping[str, Fitted]) -> "Figure":
+def draw_parameters(parameters: Mapping[str, Fitted], kind: Kind) -> "Figure":
     """Draw the 95 % intervals in per cent of the values."""
     from config.results.drawing import BETTER, FAINT, Interval, intervals
 
     shown = [
         Interval(
-            f"{name} = {each.value:.4g}",
+            f"{kind.text(name)} = {each.value:.4g}",
             100.0,
             100.0 * (1.0 + (each.lower - each.value) / abs(each.value)),
             100.0 * (1.0 + (each.upper - each.value) / abs(each.value)),

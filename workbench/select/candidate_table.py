@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from config.drive import VALVE, Kind, Scale
 from config.results.block import Table
 from workbench.select.effect_acceptance import Gain
 
@@ -13,15 +14,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ErrorUnit:
-    """How errors are told: factor from SI, the unit told, and the ending of a column's name."""
+    """What errors are of: how they are read, the ending of a column's name, and the names of parameters."""
 
-    factor: float
-    unit: str
+    scale: Scale
     ending: str
+    kind: Kind
 
 
-MILLIMETRES = ErrorUnit(1e3, "mm", "_m")
-NEWTONS = ErrorUnit(1.0, "N", "_n")
+def lengths(kind: Kind) -> ErrorUnit:
+    """Return what errors of a simulated position are of."""
+    return ErrorUnit(kind.length, f"_{kind.lengths}", kind)
+
+
+NEWTONS = ErrorUnit(VALVE.force, "_n", VALVE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +44,20 @@ class Tried:
 
 def candidate_table(tried: Sequence[Tried], unit: ErrorUnit, title: str) -> Table:
     """Return a step's candidates in their order."""
-    headings = ("effect", f"fitted {unit.unit}", f"held out {unit.unit}", f"typical {unit.unit}", "evidence", "gain")
+    headings = (
+        "effect",
+        f"fitted {unit.scale.unit}",
+        f"held out {unit.scale.unit}",
+        f"typical {unit.scale.unit}",
+        "evidence",
+        "gain",
+    )
     rows = [
         (
             each.name,
             *(_error(value, unit) for value in (each.train, each.test, each.typical)),
             *(("-", "-", "-") if each.gain is None else _gain(each.gain)),
-            each.rejection_reason or "accepted",
+            unit.kind.text(each.rejection_reason) or "accepted",
         )
         for each in tried
     ]
@@ -53,7 +65,7 @@ def candidate_table(tried: Sequence[Tried], unit: ErrorUnit, title: str) -> Tabl
 
 
 def _error(value: float | None, unit: ErrorUnit) -> str:
-    return "-" if value is None else f"{unit.factor * value:.4g}"
+    return "-" if value is None else f"{unit.scale.factor * value:.4g}"
 
 
 def _gain(found: Gain) -> tuple[str, str, str]:
@@ -82,8 +94,8 @@ def draw_race(
     """Draw the held-out errors of one step's candidates, against the model before and the floor, SI units."""
     from config.results.drawing import race
 
-    errors = {each.name: unit.factor * each.test for each in tried if each.test is not None}
-    marks = {"nothing added": unit.factor * before}
+    errors = {each.name: unit.scale.factor * each.test for each in tried if each.test is not None}
+    marks = {"nothing added": unit.scale.factor * before}
     if floor:
-        marks["floor"] = unit.factor * floor
-    return race(errors, chosen, marks, f"held-out error with this effect added, {unit.unit} rms")
+        marks["floor"] = unit.scale.factor * floor
+    return race(errors, chosen, marks, f"held-out error with this effect added, {unit.scale.unit} rms")

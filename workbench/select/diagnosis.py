@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from os import cpu_count
 from typing import TYPE_CHECKING
 
+from config.drive import Kind
 from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
@@ -16,12 +17,12 @@ from config.valve_file import ValveFile
 from sim.effect import find_effect, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
-from workbench.data.noise_floor import UNKNOWN, told_mm
+from workbench.data.noise_floor import UNKNOWN, told
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
-from workbench.select.candidate_table import MILLIMETRES, candidate_columns, candidate_table, draw_race
+from workbench.select.candidate_table import candidate_columns, candidate_table, draw_race, lengths
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable, unseen_without_spring
@@ -51,6 +52,11 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Effects that were not tried, and why a recording sampled like this one cannot show them."""
     positioner: PositionerOrPacking | None = None
     """Of a recording of set point and travel: what holds the stem."""
+
+    @property
+    def kind(self) -> Kind:
+        """Whose it is: its names and units."""
+        return self.best.fit.kind
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -97,13 +103,14 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         if self.positioner:
             said.append(self.positioner.sentence)
+        length = self.kind.length
         for number, step in enumerate(self.steps, start=1):
             errors = step.before.errors
             title = (
-                f"step {number}: error {1e3 * errors.train_rmse_m:.4f} mm rms fitted, {1e3 * errors.test_rmse_m:.4f} "
-                f"held out, floor {told_mm(self.split.floor_m)}"
+                f"step {number}: error {length.said(errors.train_rmse_m, '.4g')} rms fitted, "
+                f"{length.number(errors.test_rmse_m, '.4g')} held out, floor {told(self.split.floor_m, length)}"
             )
-            said.append(candidate_table([each.tried for each in step.candidates], MILLIMETRES, title))
+            said.append(candidate_table([each.tried for each in step.candidates], lengths(self.kind), title))
         if self.experiment:
             said.append(
                 f"experiment: {self.experiment.name}; after a refit the rivals differ by "
@@ -113,14 +120,14 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
 
     def frame_columns(self) -> dict[str, list[object]]:
         """Return a row a candidate of each step: errors, m, evidence, accepted or why not."""
-        return candidate_columns([each.tried for each in self.candidates], MILLIMETRES)
+        return candidate_columns([each.tried for each in self.candidates], lengths(self.kind))
 
     def plot(self) -> "Figure":
         """Draw the held-out error with each effect in the first step; those added and their rivals in colour."""
         step = self.steps[0]
         chosen = {*self.missing, *(each.name for each in step.indistinguishable)}
         tried = [each.tried for each in step.candidates]
-        return draw_race(tried, chosen, step.before.errors.test_rmse_m, self.split.floor_m, MILLIMETRES)
+        return draw_race(tried, chosen, step.before.errors.test_rmse_m, self.split.floor_m, lengths(self.kind))
 
 
 def _by_reason(unseen: Mapping[str, str]) -> dict[str, list[str]]:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from config.drive import Scale
 from config.recording import Column
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import BASE, Composition
@@ -53,13 +54,15 @@ class Undetectable:
     name: str
     like: tuple[str, ...]
     most_m: float
+    length: Scale
+    """As it is read."""
     shown_by: str
 
     @property
     def sentence(self) -> str:
         """Say so."""
         return (
-            f"{self.name} of up to {1e3 * self.most_m:.2g} mm or more would not show: with other values of "
+            f"{self.name} of up to {self.length.said(self.most_m, '.2g')} or more would not show: with other values of "
             f"{' and '.join(self.like)} the recordings look the same; {self.shown_by} would tell"
         )
 
@@ -79,7 +82,15 @@ def undetectable(split: Split, valve: ValveFile) -> tuple[Undetectable, ...]:
             break
         most_m = width_m
     like = ("coulomb_n", "static_n")
-    return (Undetectable(BACKLASH, like, most_m, "slow restarts in the same direction after a hold"),) if most_m else ()
+    return (
+        (
+            Undetectable(
+                BACKLASH, like, most_m, valve.valve.own.length, "slow restarts in the same direction after a hold"
+            ),
+        )
+        if most_m
+        else ()
+    )
 
 
 def with_backlash(file: ValveFile, width_m: float) -> ValveFile:

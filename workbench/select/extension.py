@@ -71,17 +71,19 @@ class Extension(Result):
     def blocks(self) -> list[Block]:
         """Say whether the effects help, the errors on the way, and the parameters of the new valve."""
         before_m, after_m = self.refitted_errors.test_rmse_m, self.extended_errors.test_rmse_m
+        length = self.extended.kind.length
         falls = "falls from" if self.falls else "does not fall as it must: from"
         rows = [
-            (what, f"{1e3 * train_m:.4f}", f"{1e3 * test_m:.4f}") for what, (train_m, test_m) in self.stages.items()
+            (what, length.number(train_m, ".4g"), length.number(test_m, ".4g"))
+            for what, (train_m, test_m) in self.stages.items()
         ]
-        floor = "unknown" if self.split.floor_m is None else f"{1e3 * self.split.floor_m:.4f}"
+        floor = "unknown" if self.split.floor_m is None else length.number(self.split.floor_m, ".4g")
         rows.append(("floor: what no model undercuts", floor, floor))
         return [
-            f"with {', '.join(self.effects)} the held-out error {falls} {1e3 * before_m:.4g} to {1e3 * after_m:.4g} mm "
-            "rms",
-            Table(("error, mm rms", "fitted", "held out"), rows),
-            parameter_table(self.extended.parameters),
+            f"with {', '.join(self.effects)} the held-out error {falls} {length.number(before_m, '.4g')} to "
+            f"{length.said(after_m, '.4g')} rms",
+            Table((f"error, {length.unit} rms", "fitted", "held out"), rows),
+            parameter_table(self.extended.parameters, self.extended.kind),
             *([self.extended.by.sentence] if self.extended.by.slow else []),
         ]
 
@@ -97,17 +99,17 @@ class Extension(Result):
         """Draw the error on what was held out, refitted without the effects and with them, over time."""
         from config.results.drawing import BETTER, MODEL, legend, line, panels
 
-        part = self.split.test
+        part, length = self.split.test, self.extended.kind.length
         figure, (axes,) = panels((4.0,))
         for name, found, errors, colour in (
             ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
             (f"with {', '.join(self.effects)}", self.extended, self.extended_errors, BETTER),
         ):
             error_m = residual_m(part, found.indicated_m(part.record))
-            label = f"{name}: {1e3 * errors.test_rmse_m:.3g} mm rms"
-            line(axes, part.record.time_s - part.record.time_s[0], 1e3 * error_m, colour, label)
+            label = f"{name}: {length.said(errors.test_rmse_m)} rms"
+            line(axes, part.record.time_s - part.record.time_s[0], length.factor * error_m, colour, label)
         axes.set_xlabel("time, s")
-        axes.set_ylabel("error on held-out data, mm")
+        axes.set_ylabel(f"error on held-out data, {length.unit}")
         legend(axes)
         return figure
 

@@ -6,6 +6,7 @@ It lies beside the valve file as NAME.journal.json; extending the file again goe
 from pathlib import Path
 from typing import Self
 
+from config.drive import Scale
 from config.errors import InputError
 from config.loading import Schema, validated
 from config.writing import write_valve
@@ -30,11 +31,12 @@ class ExtensionStep(Schema):
     @classmethod
     def of(cls, extension: Extension) -> Self:
         """Return the step that an extension is."""
+        length = extension.extended.kind.length
         found, before, after = extension.gain, extension.refitted_errors, extension.extended_errors
         return cls(
             effects=extension.effects,
             why=f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
-            f"{1e3 * before.test_block_m:.4g} to {1e3 * after.test_block_m:.4g} mm, "
+            f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
             f"over all seconds by {found.standard_errors:.3g} standard errors",
             given_train_rmse_m=extension.given_train_rmse_m,
             given_test_rmse_m=extension.given_test_rmse_m,
@@ -75,12 +77,12 @@ class Journal(Schema):
         """Write the journal of a valve file."""
         journal_path(valve).write_text(self.model_dump_json(indent=2) + "\n", encoding="utf-8")
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """One line a step."""
+    def remarks(self, length: Scale) -> tuple[str, ...]:
+        """Return one line a step, lengths as they are read."""
         return tuple(
-            f"step {i}: {', '.join(each.effects)} added; held-out error {1e3 * each.refitted_test_rmse_m:.4g} to "
-            f"{1e3 * each.extended_test_rmse_m:.4g} mm rms; {each.why}"
+            f"step {i}: {', '.join(each.effects)} added; held-out error "
+            f"{length.number(each.refitted_test_rmse_m, '.4g')} to {length.said(each.extended_test_rmse_m, '.4g')} "
+            f"rms; {each.why}"
             for i, each in enumerate(self.steps, start=1)
         )
 
@@ -97,7 +99,7 @@ def write_extended(extension: Extension, given: Path, out: Path) -> Journal:
         InputError: what lies beside the given file is not a journal.
     """
     journal = Journal.beside(given).followed_by(extension)
-    write_valve(out, extension.valve, journal.remarks)
+    write_valve(out, extension.valve, journal.remarks(extension.extended.kind.length))
     journal.write_beside(out)
     return journal
 

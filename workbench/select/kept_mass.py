@@ -6,6 +6,7 @@ effect explains. Asked where a diagnosis leaves something; what it finds is said
 
 from dataclasses import dataclass
 
+from config.drive import Scale
 from config.results.result import Brief
 from workbench.fit.fitting import fit
 from workbench.model.sampling import Motion
@@ -28,14 +29,16 @@ class KeptMass(Brief):
     kept_rmse_m: float
     """Held out, with the mass as the valve file says."""
     fitted_rmse_m: float
+    length: Scale
+    """As it is read."""
 
     @property
     def sentence(self) -> str:
         """What to do about it, in one sentence."""
         return (
             f"the mass is kept at {self.kept_kg:.3g} kg; were it {self.fitted_kg:.3g}, the held-out error would be "
-            f"{1e3 * self.fitted_rmse_m:.3g} in place of {1e3 * self.kept_rmse_m:.3g} mm: weigh plate, stem and plug, "
-            "or put this mass_kg into the valve file, and diagnose again"
+            f"{self.length.number(self.fitted_rmse_m)} in place of {self.length.said(self.kept_rmse_m)}: weigh "
+            "plate, stem and plug, or put this mass_kg into the valve file, and diagnose again"
         )
 
 
@@ -65,4 +68,4 @@ def kept_mass(diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None
     if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.at_floor):
         return None
     fitted_kg = model.fit.valve.valve.mass_kg
-    return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m)
+    return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m, before.kind.length)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from config.drive import Scale
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
@@ -23,10 +24,16 @@ def verdict_line(verdict: Verdict, sentence: str) -> str:
 def verdict_sentence(
     verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
 ) -> str:
-    """Return the verdict in one or a few sentences; lengths in mm."""
+    """Return the verdict in one or a few sentences, in the names and units of what was diagnosed."""
+    return best.fit.kind.text(_said(verdict, best, steps, library, parts))
+
+
+def _said(
+    verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
+) -> str:
+    length = best.fit.kind.length
     names = " and ".join(step.added.name for step in steps if step.added)
-    after = 1e3 * best.errors.test_rmse_m
-    fell = reduction_sentence(steps[0].before.errors, best.errors)
+    fell = reduction_sentence(steps[0].before.errors, best.errors, length)
     repeat = "" if parts.repeats else REPEAT
     or_another = ", or another that does as well" if verdict == "one_of" else ""
     apart = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
@@ -35,21 +42,23 @@ def verdict_sentence(
         begun = f"Missing: {names}{or_another}; {fell}. But" if names else "No effect is missing, but"
         return f"{begun} {off}{apart}"
     if verdict == "adequate":
-        said = _adequate(best.errors, parts)
-        return said + knife_edges_sentence(best.errors) + _suspicion(steps[0].suspected) + _scatter(parts)
+        said = _adequate(best.errors, parts, length)
+        return (
+            said + knife_edges_sentence(best.errors, length) + _suspicion(steps[0].suspected) + _scatter(parts, length)
+        )
     if verdict == "missing":
         suspicion = _suspicion(steps[-1].suspected) if steps[-1].added is None else ""
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts)}."
-        return said + knife_edges_sentence(best.errors) + suspicion
+        return said + knife_edges_sentence(best.errors, length) + suspicion
     if verdict == "one_of":
         left = f", and {_left(best.errors, parts)}" if _floors_left(best.errors, parts) > NOISE_KNOWN_TO else ""
-        return f"Missing: {names}{or_another}; {fell}{left}.{apart}{knife_edges_sentence(best.errors)}"
+        return f"Missing: {names}{or_another}; {fell}{left}.{apart}{knife_edges_sentence(best.errors, length)}"
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
-    begun = f" {names} {part}: {fell}." if names else f" The held-out error is {after:.3g} mm."
+    begun = f" {names} {part}: {fell}." if names else f" The held-out error is {length.said(best.errors.test_rmse_m)}."
     if verdict == "unexplained":
-        return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts)}"
+        return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, steps, library) + begun
 
 
@@ -57,16 +66,16 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
     """Say that a parameter is off which no fit has moved; empty where nothing does better by another name."""
     if equivalent is None or equivalent.model is None:
         return ""
-    fell = reduction_sentence(best.errors, equivalent.model.errors)
+    fell = reduction_sentence(best.errors, equivalent.model.errors, best.fit.kind.length)
     return (
         f"a parameter that was kept is off: with {equivalent.name}, the bare valve by another name, {fell}. "
-        f"Fit again with the mass free.{knife_edges_sentence(equivalent.model.errors)}"
+        f"Fit again with the mass free.{knife_edges_sentence(equivalent.model.errors, best.fit.kind.length)}"
     )
 
 
-def _adequate(errors: BlockErrors, parts: Split) -> str:
+def _adequate(errors: BlockErrors, parts: Split, length: Scale) -> str:
     """Say that the valve as it is explains the record, and what it leaves of it."""
-    after, floors = f"{1e3 * errors.test_rmse_m:.3g} mm", _floors_left(errors, parts)
+    after, floors = length.said(errors.test_rmse_m), _floors_left(errors, parts)
     if floors <= NOISE_KNOWN_TO:
         return f"Nothing is missing: no effect lowers the held-out error of {after} as it must."
     return (
@@ -98,23 +107,23 @@ def _unproved(verdict: Verdict, steps: Sequence[EffectStep], library: Mapping[st
     return f"Broken off in step {len(steps)}, with {tried} of {missing} effects refitted; nothing is judged."
 
 
-def reduction_sentence(before: BlockErrors, after: BlockErrors) -> str:
+def reduction_sentence(before: BlockErrors, after: BlockErrors, length: Scale) -> str:
     """Say how the held-out error falls; where a narrowly mistimed slip outweighs all else, in a typical second."""
-    whole = f"from {1e3 * before.test_rmse_m:.3g} to {1e3 * after.test_rmse_m:.3g} mm"
+    whole = f"from {length.number(before.test_rmse_m)} to {length.said(after.test_rmse_m)}"
     if after.test_rmse_m < before.test_rmse_m:
         return f"the held-out error falls {whole}"
-    typical = f"from {1e3 * before.test_block_m:.3g} to {1e3 * after.test_block_m:.3g} mm"
+    typical = f"from {length.number(before.test_block_m)} to {length.said(after.test_block_m)}"
     return (
         f"the held-out error of a typical second falls {typical}, though a narrowly mistimed slip moves the rms {whole}"
     )
 
 
-def knife_edges_sentence(errors: BlockErrors) -> str:
+def knife_edges_sentence(errors: BlockErrors, length: Scale) -> str:
     """Name the held-out slips that were excepted, with a leading space; empty if none was."""
     if not errors.knife_edges:
         return ""
     named = "; ".join(each.sentence for each in errors.knife_edges)
-    return f" Excepted on what was held out: {named}; without, {1e3 * errors.test_rest_rmse_m:.3g} mm rms."
+    return f" Excepted on what was held out: {named}; without, {length.said(errors.test_rest_rmse_m)} rms."
 
 
 def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
@@ -141,13 +150,14 @@ def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
     )
 
 
-def _scatter(parts: Split) -> str:
+def _scatter(parts: Split, length: Scale) -> str:
     """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it."""
     known = [each.record.noise_m for each in (parts.train, parts.test) if each.record.noise_m is not None]
     noise_m = max(known, default=None)
     if noise_m is None or parts.floor_m is None or parts.floor_m < SCATTERS * noise_m:
         return ""
     return (
-        f" The valve itself scatters: a repeated command repeats the position to {1e3 * parts.floor_m:.3g} mm, where "
-        f"the sensor's noise is {1e3 * noise_m:.2g} mm. What makes the difference follows neither command nor position."
+        f" The valve itself scatters: a repeated command repeats the position to {length.said(parts.floor_m)}, where "
+        f"the sensor's noise is {length.said(noise_m, '.2g')}. What makes the difference follows neither command nor "
+        "position."
     )

@@ -305,7 +305,7 @@ class Desk:
             InputError: there is none.
         """
         file = self._model().valve
-        remarks = Journal.beside(self.valve.path).remarks if self.valve else ()
+        remarks = Journal.beside(self.valve.path).remarks(file.valve.own.length) if self.valve else ()
         return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(file))
 
     def clear(self) -> None:

@@ -48,7 +48,7 @@ class FindingsPanel:
             error = self._units.length_unit().fine(compared.rms_m)
             ui.label(f"error: {error}, {of_stroke(compared.rms_m, self._stroke_m)}").classes("quiet")
         self.jumps.clear()
-        slips, said = compared.slips, slip_sentences(compared.slips)
+        slips, said = compared.slips, slip_sentences(compared.slips, compared.own.length)
         times = (slips.missed_s, slips.spurious_s, tuple(each.time_s for each in slips.matched))
         with self.jumps:
             for (kind, texts), times_s in zip(said.items(), times, strict=True):

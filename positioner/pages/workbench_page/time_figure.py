@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from config.drive import VALVE
 from config.recording import Column
 from positioner.pages.parts.theme import Ink
 from positioner.pages.parts.units import Unit, Units
@@ -90,7 +91,7 @@ class TimeFigure:
 
     def marks(self) -> Mapping[str, list[Any]]:
         """Return x, y and what is said of the marks, a list each."""
-        said = slip_sentences(self.slips)
+        said = slip_sentences(self.slips, VALVE.length)
         texts = [*(list(said[kind]) for kind in SLIPS), []]
         per_si = self._unit("measured").per_si
         times = (self.slips.missed_s, self.slips.spurious_s, tuple(each.time_s for each in self.slips.matched),
