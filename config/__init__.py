@@ -3,6 +3,7 @@
 Its files:
 
     valve_file, slave_file, daemon_file           what a person writes: the valve, the simulated slave, the daemon
+    drive                                         the names and units of what a force, torque or current moves
     data_sheet                                    a valve file from what a data sheet says
     extended_valve                                a valve file worked out for the controller
     loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all

@@ -71,6 +71,11 @@ class Kind:
     """What its travel and its command are called."""
 
     @property
+    def noun(self) -> str:
+        """What it is, as a title begins."""
+        return "Valve" if self.name == "valve" else "Drive"
+
+    @property
     def turns(self) -> bool:
         """Whether it turns."""
         return self.lengths == "rad"

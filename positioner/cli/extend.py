@@ -65,5 +65,5 @@ def run(arguments: argparse.Namespace) -> int:
         whole = as_json(extension) | {"valve": str(arguments.out), "seconds": time.monotonic() - began_s}
         write_json(arguments.json, whole)
     if arguments.report is not None:
-        report_journal(journal, arguments.report, extension.valve.valve.name)
+        report_journal(journal, arguments.report, extension.valve.valve.name, extension.valve.valve.own)
     return 0 if extension.falls else 1

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from config.drive import VALVE
 from config.errors import InputError
 from config.recording import Recording, write_recording
 from positioner.cli.main import main
@@ -243,7 +244,7 @@ STEP = {
 
 def test_a_journal_shows_the_error_at_each_step(tmp_path: Path) -> None:
     second = STEP | {"effects": ("preload", "<b>"), "extended_train_rmse_m": 5.1e-5, "extended_test_rmse_m": 5.2e-5}
-    report_journal(Journal.model_validate({"steps": (STEP, second)}), tmp_path / "journal.html", "FV-1")
+    report_journal(Journal.model_validate({"steps": (STEP, second)}), tmp_path / "journal.html", "FV-1", VALVE)
     page = read(tmp_path / "journal.html")
     assert page.fetched == []
     bars = {each["name"]: each for each in page.figures["plot-journal"]["data"]}

@@ -3,7 +3,7 @@
     report_comparison(compare(recording, valve), path, Subject(valve, ("rec.csv",), recording.metadata))
     report_diagnosis(diagnose(recording, valve), path, Subject(valve, ("rec.csv",), recording.metadata))
     report_forces(diagnose_forces(recordings, valve), path, Subject(valve, ("bench.csv",)))
-    report_journal(Journal.beside(Path("better.toml")), path, valve.valve.name)
+    report_journal(Journal.beside(Path("better.toml")), path, valve.valve.name, valve.valve.own)
 
 The same input, the same bytes. Its files:
 

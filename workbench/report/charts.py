@@ -7,6 +7,7 @@ import numpy as np
 
 from workbench.compare.residuals import Correlation, Profile, Spectrum
 from workbench.report.plot_series import significant
+from workbench.report.units import Reading
 
 Figure = dict[str, Any]
 Trace = dict[str, Any]
@@ -129,22 +130,25 @@ def correlation(each: Correlation, title: str) -> Figure:
     }
 
 
-def spectrum(each: Spectrum) -> Figure:
-    """Return the spectrum as amplitude density, mm over root Hz."""
+def spectrum(each: Spectrum, read: Reading) -> Figure:
+    """Return the spectrum as amplitude density, a length over root Hz."""
+    length = read.kind.length
     seen = each.frequency_hz > 0.0
     density = np.sqrt(each.density_m2_per_hz[seen])
     trace = line(
         significant(each.frequency_hz[seen]),
-        significant(1e3 * density),
+        significant(length.factor * density),
         "error",
         MODEL,
-        "%{y:.3~g} mm/√Hz (%{customdata:.3~g} m/√Hz)<br>at %{x:.3~g} Hz",
+        f"%{{y:.3~g}} {length.unit}/√Hz (%{{customdata:.3~g}} {read.si}/√Hz)<br>at %{{x:.3~g}} Hz",
         customdata=significant(density),
     )
     return {
         "data": [trace],
         "layout": layout(
-            xaxis=axis("frequency, Hz", type="log"), yaxis=axis("error, mm/√Hz", type="log"), showlegend=False
+            xaxis=axis("frequency, Hz", type="log"),
+            yaxis=axis(f"error, {length.unit}/√Hz", type="log"),
+            showlegend=False,
         ),
     }
 

@@ -27,7 +27,7 @@ from workbench.report.page import (
 )
 from workbench.report.plot_series import MOST, stretch
 from workbench.report.signature_loop import signature
-from workbench.report.units import Shown, length, of_stroke, times
+from workbench.report.units import Reading, Shown, of_stroke, times
 
 MEANINGS = {
     "stuck": "the stem rests",
@@ -66,9 +66,9 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> N
     stroke_m = subject.valve.valve.stroke_m
     write(
         path,
-        f"Valve {name}: model against measurement",
+        f"{comparison.own.noun} {name}: model against measurement",
         [
-            heading(f"Valve “{name}”: model against measurement", subject, facts(comparison)),
+            heading(f"{comparison.own.noun} “{name}”: model against measurement", subject, facts(comparison)),
             _verdict(comparison),
             _key_figures(comparison, stroke_m),
             _overlay(comparison),
@@ -110,10 +110,15 @@ def _verdict(each: Comparison) -> Html:
 
 def _key_figures(each: Comparison, stroke_m: float) -> Html:
     missed, spurious = len(each.slips.missed_s), len(each.slips.spurious_s)
+    read, floor = Reading(each.own), "sensor noise" if _is_noise(each) else "repeatability of the valve"
     return figures_of_merit(
         [
-            ("Error, rms, mm", length(each.rms_m), of_stroke(each.rms_m, stroke_m)),
-            ("Floor, mm", length(each.floor_m), "sensor noise" if _is_noise(each) else "repeatability of the valve"),
+            (read.title("Error, rms, mm"), read.length(each.rms_m), of_stroke(each.rms_m, stroke_m)),
+            (
+                read.title("Floor, mm"),
+                read.length(each.floor_m),
+                floor,
+            ),
             ("Error in floors", Shown(times(each.rms_m, each.floor_m)), f"a model that holds: at most {ADEQUATE:g} ×"),
             ("Fit", Shown(f"{each.fit_percent:.1f} %"), "100 % is perfect"),
             ("Slips matched", Shown(f"{len(each.slips.matched)}"), f"{missed} missed, {spurious} spurious"),
@@ -130,7 +135,7 @@ def _model(each: Comparison) -> Simulated:
 
 
 def _signature(each: Comparison) -> Html:
-    return signature(each.command_pa, each.measured_m, [_model(each)])
+    return signature(each.command_pa, each.measured_m, [_model(each)], Reading(each.own))
 
 
 def _overlay(each: Comparison) -> Html:
@@ -143,6 +148,7 @@ def _overlay(each: Comparison) -> Html:
         phase_shades(each.phase, valid),
         each.slips,
         by_setpoint=each.by_setpoint,
+        read=Reading(each.own),
     )
     return overlaid(figure, "The ground shows what the measured stem is doing; white: it rests.", each.time_s.size)
 
@@ -170,6 +176,7 @@ def thinned(count: int) -> str:
 
 
 def _phases(each: Comparison, stroke_m: float) -> Html:
+    read = Reading(each.own)
     return section(
         "phases",
         "Where it fails",
@@ -182,35 +189,35 @@ def _phases(each: Comparison, stroke_m: float) -> Html:
             [
                 "What the stem does",
                 "Samples",
-                "Error, rms, mm",
+                read.title("Error, rms, mm"),
                 "In floors",
                 "Of stroke",
-                "Mean error, mm",
+                read.title("Mean error, mm"),
                 "Of whole error",
             ],
-            [_phase(part, each.floor_m, stroke_m) for part in each.phases if part.count],
+            [_phase(part, each.floor_m, stroke_m, read) for part in each.phases if part.count],
         ),
         text(
             "The same error over the position, the velocity, the last direction and the pressure; bars: ± 1 std. error."
         ),
         pair(
-            _profile("position", each, "over the stem's position, mm", 1e3),
-            _profile("velocity", each, "over the stem's velocity, mm/s (opening +)", 1e3),
+            _profile("position", each, "over the stem's position, mm", read.kind.length.factor),
+            _profile("velocity", each, "over the stem's velocity, mm/s (opening +)", read.kind.length.factor),
             _profile("direction", each, "over the last direction of motion", 1.0),
-            _profile("pressure", each, "over the actuator pressure, kPa", 1e-3),
+            _profile("pressure", each, "over the actuator pressure, kPa", read.kind.command.factor),
         ),
     )
 
 
-def _phase(part: Phase, floor_m: float | None, stroke_m: float) -> Row:
+def _phase(part: Phase, floor_m: float | None, stroke_m: float, read: Reading) -> Row:
     return Row(
         [
             part.name,
             f"{part.count}",
-            length(part.rms_m),
+            read.length(part.rms_m),
             times(part.rms_m, floor_m),
             f"{100 * part.rms_m / stroke_m:.2g} %",
-            length(part.mean_m, sign=True),
+            read.length(part.mean_m, sign=True),
             f"{100 * part.share:.1f} %",
         ],
         MEANINGS[part.name],
@@ -218,10 +225,14 @@ def _phase(part: Phase, floor_m: float | None, stroke_m: float) -> Row:
     )
 
 
+def _mean_error(read: Reading) -> tuple[str, float, str, str]:
+    return read.title("mean error, mm"), read.kind.length.factor, read.kind.length.unit, read.si
+
+
 def _profile(over: str, each: Comparison, title: str, factor: float) -> Html:
-    figure = profiles(
-        [("error", MODEL, getattr(each, f"over_{over}"))], (title, factor), ("mean error, mm", 1e3, "mm", "m")
-    )
+    read = Reading(each.own)
+    title = read.title(title)
+    figure = profiles([("error", MODEL, getattr(each, f"over_{over}"))], (title, factor), _mean_error(read))
     if over == "direction":
         figure["layout"]["xaxis"] |= {"tickvals": [-1, 1], "ticktext": ["closing", "opening"], "range": [-1.6, 1.6]}
     return plot(f"plot-over-{over}", figure, 270, f"Mean error {title}.")
@@ -229,13 +240,14 @@ def _profile(over: str, each: Comparison, title: str, factor: float) -> Html:
 
 def _friction(each: Comparison) -> Html:
     both = (("measured", MEASURED), ("model", MODEL))
-    force = ("friction, N", 1.0, "N", "N")
+    read = Reading(each.own)
+    force = (read.title("friction, N"), 1.0, read.kind.force.unit, read.kind.force.unit)
 
     def drawn(way: str) -> Figure:
         pair_ = getattr(each.friction, way)
         parts = [(name, colour, part) for (name, colour), part in zip(both, pair_, strict=True)]
         millimetres = "velocity, mm/s (opening +)" if way == "over_velocity" else "position, mm"
-        return profiles(parts, (millimetres, 1e3), force)
+        return profiles(parts, (read.title(millimetres), read.kind.length.factor), force)
 
     return section(
         "friction",
@@ -254,7 +266,7 @@ def _friction(each: Comparison) -> Html:
 
 
 def _slips(each: Comparison) -> Html:
-    slips = each.slips
+    slips, read = each.slips, Reading(each.own)
     rows = []
     for name, wanted in (("opening", 1), ("closing", -1)):
         for reversal, when in ((True, "after a reversal"), (False, "going on")):
@@ -262,7 +274,9 @@ def _slips(each: Comparison) -> Html:
             if found:
                 late_s = float(np.median([pair_.late_s for pair_ in found]))
                 farther_m = float(np.median([pair_.farther_m for pair_ in found]))
-                rows.append(Row([f"{name}, {when}", f"{len(found)}", f"{late_s:+.3f}", length(farther_m, sign=True)]))
+                rows.append(
+                    Row([f"{name}, {when}", f"{len(found)}", f"{late_s:+.3f}", read.length(farther_m, sign=True)])
+                )
     return section(
         "slips",
         "Slips: matched, missed, spurious",
@@ -271,12 +285,12 @@ def _slips(each: Comparison) -> Html:
             f"{_at(slips.missed_s)}. Spurious, the model slipped and the stem did not: {len(slips.spurious_s)}"
             f"{_at(slips.spurious_s)}."
         ),
-        *(_matched_slips(rows) if rows else ()),
+        *(_matched_slips(rows, read) if rows else ()),
     )
 
 
-def _matched_slips(rows: list[Row]) -> tuple[Html, Html]:
-    head = ["Matched slips", "Number", "Model later by, s", "Model farther by, mm"]
+def _matched_slips(rows: list[Row], read: Reading) -> tuple[Html, Html]:
+    head = ["Matched slips", "Number", "Model later by, s", read.title("Model farther by, mm")]
     return table("table-slips", head, rows), text("Medians; a minus: earlier, or not far enough.")
 
 
@@ -289,6 +303,7 @@ def _at(times_s: tuple[float, ...]) -> str:
 
 
 def _statistics(each: Comparison) -> Html:
+    read = Reading(each.own)
     return folded(
         "statistics",
         "For specialists: correlations and spectrum of the error",
@@ -312,27 +327,28 @@ def _statistics(each: Comparison) -> Html:
                 "outside the band of white noise.",
             ),
         ),
-        plot("plot-spectrum", spectrum(each.spectrum), 280, "Spectrum of the error."),
+        plot("plot-spectrum", spectrum(each.spectrum, read), 280, "Spectrum of the error."),
         plot(
             "plot-over-time",
-            profiles([("error", MODEL, each.over_time)], ("time, s", 1.0), ("mean error, mm", 1e3, "mm", "m")),
+            profiles([("error", MODEL, each.over_time)], ("time, s", 1.0), _mean_error(read)),
             250,
             "Mean error over time: a slope is drift.",
         ),
-        text(f"Robust error, median of the rms over blocks of 1 s: {length(each.robust_m).text} mm."),
+        text(f"Robust error, median of the rms over blocks of 1 s: {read.said(each.robust_m)}."),
     )
 
 
 def _pressure(each: Comparison) -> list[str]:
-    side = each.pressure_side
+    side, read = each.pressure_side, Reading(each.own)
     if side is None:
         return [
             "The recording has no measured actuator pressure: whether an error arises before the actuator (converter, "
             "tubing) or at the stem can only be told from its shape"
         ]
     return [
-        f"The actuator pressure is measured; the model's is off by {1e-3 * side.pressure_rms_pa:.3g} kPa rms. Run from "
-        f"the measured pressure instead of the command, the error is {length(side.stem_rms_m).text} mm rms, "
+        f"The {read.title('actuator pressure')} is measured; the model's is off by "
+        f"{read.kind.command.said(side.pressure_rms_pa)} rms. Run from the measured {read.kind.words[1]} instead of "
+        f"the command, the error is {read.said(side.stem_rms_m)} rms, "
         f"fit {side.stem_fit_percent:.1f} %: that much arises at the stem"
     ]
 

@@ -35,7 +35,7 @@ from workbench.report.page import (
 from workbench.report.plot_series import drawn, rounded
 from workbench.report.ranking import RankedEffect
 from workbench.report.signature_loop import signature
-from workbench.report.units import LENGTH, Shown, length, of_stroke, parameter, times
+from workbench.report.units import Reading, Shown, of_stroke, times
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
@@ -86,9 +86,9 @@ def report_diagnosis(diagnosis: Diagnosis, path: Path, subject: Subject, command
     name = subject.valve.valve.name
     write(
         path,
-        f"Valve {name}: which effect is missing",
+        f"{diagnosis.kind.noun} {name}: which effect is missing",
         [
-            heading(f"Valve “{name}”: which effect is missing", subject, _facts(diagnosis, validation)),
+            heading(f"{diagnosis.kind.noun} “{name}”: which effect is missing", subject, _facts(diagnosis, validation)),
             _verdict(diagnosis, validation),
             _key_figures(diagnosis, validation),
             _fall(diagnosis, validation),
@@ -123,18 +123,18 @@ def _verdict(diagnosis: Diagnosis, validation: _Validation) -> Html:
 
 
 def _key_figures(diagnosis: Diagnosis, validation: _Validation) -> Html:
-    before, after = diagnosis.base.errors, diagnosis.best.errors
+    before, after, read = diagnosis.base.errors, diagnosis.best.errors, Reading(diagnosis.kind)
     stroke_m = diagnosis.base.fit.valve.valve.stroke_m
     added = ", ".join(find_effect(name, "effects").name.replace("_", " ") for name in diagnosis.missing)
     return figures_of_merit(
         [
             (
-                "Held-out error before, rms, mm",
-                length(before.test_rmse_m),
+                read.title("Held-out error before, rms, mm"),
+                read.length(before.test_rmse_m),
                 f"{of_stroke(before.test_rmse_m, stroke_m)}, base parameters refitted",
             ),
-            ("and after, mm", length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
-            ("Floor, mm", length(validation.floor_m), "no model does better"),
+            (read.title("and after, mm"), read.length(after.test_rmse_m), of_stroke(after.test_rmse_m, stroke_m)),
+            (read.title("Floor, mm"), read.length(validation.floor_m), "no model does better"),
             ("Added", Shown(added or "nothing"), f"of {len(_names(diagnosis))} effects tried"),
         ]
     )
@@ -152,15 +152,16 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
         if step.added and step.added.model
     ]
     errors = [(name, model.errors.train_rmse_m, model.errors.test_rmse_m) for name, model, _ in stages]
-    figure = ranking.error_reduction(errors, validation.floor_m, LENGTH)
+    read = Reading(diagnosis.kind)
+    figure = ranking.error_reduction(errors, validation.floor_m, read.errors)
     rows = [
         Row(
             [
                 name,
-                length(model.errors.train_rmse_m),
-                length(model.errors.test_rmse_m),
+                read.length(model.errors.train_rmse_m),
+                read.length(model.errors.test_rmse_m),
                 times(model.errors.test_rmse_m, validation.floor_m),
-                length(model.errors.test_block_m),
+                read.length(model.errors.test_block_m),
                 "–" if candidate is None or candidate.gain is None else f"{candidate.gain.bic:.4g}",
             ],
             "" if model.explained else "something is left to explain",
@@ -169,6 +170,7 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
         for name, model, candidate in stages
     ]
     head = ["Model", "Error, fitted, mm", "Held out, mm", "In floors", "Median second, held out, mm", "Evidence"]
+    head = [read.title(each) for each in head]
     return section(
         "fall",
         "How the error fell",
@@ -177,7 +179,7 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
             figure,
             300,
             f"Error, rms, of each model, on a logarithmic scale. The held-out data it had not seen before. Dashed: the "
-            f"floor, {length(validation.floor_m).text} mm.",
+            f"floor, {read.said(validation.floor_m)}.",
         ),
         table("table-fall", head, rows),
         text(
@@ -196,7 +198,8 @@ def _models(validation: _Validation) -> list[Simulated]:
 
 
 def _signature(validation: _Validation) -> Html:
-    return signature(validation.base.command_pa, validation.base.measured_m, _models(validation))
+    base = validation.base
+    return signature(base.command_pa, base.measured_m, _models(validation), Reading(base.own))
 
 
 def _overlay(validation: _Validation) -> Html:
@@ -209,15 +212,17 @@ def _overlay(validation: _Validation) -> Html:
         _models(validation),
         [] if whole else [Shade("held out", HELD_OUT, validation.held_out)],
         by_setpoint=base.by_setpoint,
+        read=Reading(base.own),
     )
     told = "All of it was held out." if whole else "On the green ground: what was held out."
     return overlaid(figure, told, base.time_s.size)
 
 
 def _where(validation: _Validation) -> Html:
+    read = Reading(validation.base.own)
     rows = [
         Row(
-            [before.name, length(before.rms_m), length(after.rms_m), times(after.rms_m, validation.floor_m)],
+            [before.name, read.length(before.rms_m), read.length(after.rms_m), times(after.rms_m, validation.floor_m)],
             MEANINGS[before.name],
         )
         for before, after in zip(validation.base.phases, validation.best.phases, strict=True)
@@ -228,17 +233,18 @@ def _where(validation: _Validation) -> Html:
         f"{len(each.slips.spurious_s)} spurious"
         for when, each in (("before", validation.base), ("after", validation.best))
     ]
+    head = ["What the stem does", read.title("Error before, mm"), read.title("After, mm"), "After, in floors"]
     return section(
         "where",
         "Where it failed, and what is left",
-        table("table-phases", ["What the stem does", "Error before, mm", "After, mm", "After, in floors"], rows),
+        table("table-phases", head, rows),
         bullets([*slips, *(f"after: {each}" for each in validation.best.sentences)]),
     )
 
 
 def _ranking(diagnosis: Diagnosis, validation: _Validation) -> Html:
     steps = [RankedStep(step.before.effects, step.before.errors.test_rmse_m, ranked(step)) for step in diagnosis.steps]
-    return tried_effects(steps, validation.floor_m, LENGTH, "second by second")
+    return tried_effects(steps, validation.floor_m, Reading(diagnosis.kind).errors, "second by second")
 
 
 def ranked(step: EffectStep) -> list[RankedEffect]:
@@ -259,20 +265,25 @@ def ranked(step: EffectStep) -> list[RankedEffect]:
 
 
 def _added(diagnosis: Diagnosis) -> Html:
+    read = Reading(diagnosis.kind)
     names = dict.fromkeys([*diagnosis.base.fit.parameters, *diagnosis.best.fit.parameters])
     rows = [
-        _parameter(name, diagnosis.base.fit.parameters.get(name), diagnosis.best.fit.parameters.get(name))
+        _parameter(name, diagnosis.base.fit.parameters.get(name), diagnosis.best.fit.parameters.get(name), read)
         for name in names
     ]
     head = ["Parameter", "Before", "After", "95 % interval", "Unit"]
     return added_effects(diagnosis.missing, table("table-parameters", head, rows, (0,)))
 
 
-def _parameter(name: str, before: Fitted | None, after: Fitted | None) -> Row:
-    words, factor, unit = parameter(name)
+def _parameter(name: str, before: Fitted | None, after: Fitted | None, read: Reading) -> Row:
+    words, factor, unit = read.parameter(name)
 
     def shown(each: Fitted | None) -> Shown:
-        return Shown("–") if each is None else Shown(f"{factor * each.value:.4g}", f"{name} = {each.value:.6g}")
+        return (
+            Shown("–")
+            if each is None
+            else Shown(f"{factor * each.value:.4g}", f"{read.kind.text(name)} = {each.value:.6g}")
+        )
 
     interval = "–" if after is None else f"{factor * after.lower:.4g} to {factor * after.upper:.4g}"
     remark = "at the end of its physical range" if after and after.at_bound else ""
@@ -293,7 +304,12 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
             f"every rival has been refitted: the wrong one is then left with an error of {chosen.separation:.3g} times "
             "the sensor's noise. It stays within the pressures of the recording and begins at rest.",
         ),
-        plot("plot-experiment", _command(chosen), 260, "The command of the experiment; --experiment FILE writes it."),
+        plot(
+            "plot-experiment",
+            _command(chosen, Reading(diagnosis.kind)),
+            260,
+            "The command of the experiment; --experiment FILE writes it.",
+        ),
         text("Then diagnose again with both recordings."),
         *acting,
     )
@@ -329,24 +345,29 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
     return advice
 
 
-def _command(chosen: Experiment) -> dict[str, object]:
-    series = drawn(chosen.time_s, chosen.command_pa)
+def _command(chosen: Experiment, read: Reading) -> dict[str, object]:
+    series, command = drawn(chosen.time_s, chosen.command_pa), read.kind.command
     trace = line(
         rounded(series.time_s, 4),
-        rounded(1e-3 * series.value, 3),
+        rounded(command.factor * series.value, 3),
         "command",
         QUIET,
-        "%{y:.2f} kPa (%{customdata:.6~g} Pa)<br>at %{x:.3f} s",
+        f"%{{y:.2f}} {command.unit} (%{{customdata:.6~g}} {read.kind.command_unit})<br>at %{{x:.3f}} s",
         customdata=rounded(series.value, 0),
     )
-    return {"data": [trace], "layout": layout(xaxis=axis("time, s"), yaxis=axis("command, kPa"), showlegend=False)}
+    return {
+        "data": [trace],
+        "layout": layout(xaxis=axis("time, s"), yaxis=axis(f"command, {command.unit}"), showlegend=False),
+    }
 
 
 def _undetectable(diagnosis: Diagnosis) -> Html:
-    best = diagnosis.best.fit
-    said = [each.sentence(lambda name: parameter(name)[0]) for each in best.undetermined]
+    best, read = diagnosis.best.fit, Reading(diagnosis.kind)
+    said = [each.sentence(lambda name: read.parameter(name)[0]) for each in best.undetermined]
     said += [
-        f"at the end of its physical range: {parameter(key)[0]}" for key, f in best.parameters.items() if f.at_bound
+        f"at the end of its physical range: {read.parameter(key)[0]}"
+        for key, f in best.parameters.items()
+        if f.at_bound
     ]
     said += [each.sentence for each in undetectable(diagnosis.split, best.valve)]
     if not best.trusted:

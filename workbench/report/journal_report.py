@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from config.drive import Kind
 from workbench.report import ranking
 from workbench.report.page import (
     Html,
@@ -18,7 +19,7 @@ from workbench.report.page import (
     verdict,
     write,
 )
-from workbench.report.units import LENGTH, Shown, length, parameter, times
+from workbench.report.units import Reading, Shown, times
 from workbench.select.extension_journal import ExtensionStep, Journal
 
 WORDS = {
@@ -30,46 +31,51 @@ WORDS = {
 }
 
 
-def report_journal(journal: Journal, path: Path, name: str) -> None:
+def report_journal(journal: Journal, path: Path, name: str, kind: Kind) -> None:
     """Write the report of the steps by which a valve file came to be.
 
     Args:
         journal: at least one step.
         path: the HTML file.
         name: the valve's.
+        kind: its names and units.
 
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
     """
-    what = f"Valve “{name}”: how its model grew"
-    last = journal.steps[-1]
+    what = f"{kind.noun} “{name}”: how its model grew"
+    last, read = journal.steps[-1], Reading(kind)
     fell = (
-        f"Error on held-out data {length(last.extended_test_rmse_m).text} mm rms, "
+        f"Error on held-out data {read.said(last.extended_test_rmse_m)} rms, "
         f"{times(last.extended_test_rmse_m, last.floor_m)} the floor"
     )
     better = last.extended_test_rmse_m < last.refitted_test_rmse_m
     write(
         path,
-        f"Valve {name}: how its model grew",
+        f"{kind.noun} {name}: how its model grew",
         [
             heading_alone(what, f"{len(journal.steps)} step{'s' if len(journal.steps) > 1 else ''}"),
             verdict(
                 "good" if better else "bad",
                 f"{fell}.",
-                bullets([_remark(*each) for each in enumerate(journal.steps, start=1)]),
+                bullets([_remark(*each, read) for each in enumerate(journal.steps, start=1)]),
             ),
             section(
                 "fall",
                 "How the error fell",
                 plot(
                     "plot-journal",
-                    ranking.error_reduction(_stages(journal.steps), last.floor_m, LENGTH),
+                    ranking.error_reduction(_stages(journal.steps), last.floor_m, read.errors),
                     320,
-                    f"Error, rms, at each step. Dashed: the floor of the last, {length(last.floor_m).text} mm.",
+                    f"Error, rms, at each step. Dashed: the floor of the last, {read.said(last.floor_m)}.",
                 ),
-                table("table-journal", HEAD, [_row(*each, last.floor_m) for each in _stages(journal.steps)]),
+                table(
+                    "table-journal",
+                    [read.title(each) for each in HEAD],
+                    [_row(*each, last.floor_m, read) for each in _stages(journal.steps)],
+                ),
             ),
-            *(_step(number, each) for number, each in enumerate(journal.steps, start=1)),
+            *(_step(number, each, read) for number, each in enumerate(journal.steps, start=1)),
             section("words", "Words used here", glossary(WORDS)),
         ],
     )
@@ -90,22 +96,22 @@ def _stages(steps: Sequence[ExtensionStep]) -> list[tuple[str, float, float]]:
     return stages
 
 
-def _remark(number: int, step: ExtensionStep) -> str:
+def _remark(number: int, step: ExtensionStep, read: Reading) -> str:
     return (
-        f"step {number}, {', '.join(step.effects)} added: held-out error {length(step.refitted_test_rmse_m).text} to "
-        f"{length(step.extended_test_rmse_m).text} mm"
+        f"step {number}, {', '.join(step.effects)} added: held-out error {read.length(step.refitted_test_rmse_m).text} "
+        f"to {read.said(step.extended_test_rmse_m)}"
     )
 
 
-def _row(name: str, train_m: float, test_m: float, floor_m: float | None) -> Row:
-    return Row([name, length(train_m), length(test_m), times(test_m, floor_m)])
+def _row(name: str, train_m: float, test_m: float, floor_m: float | None, read: Reading) -> Row:
+    return Row([name, read.length(train_m), read.length(test_m), times(test_m, floor_m)])
 
 
-def _step(number: int, step: ExtensionStep) -> Html:
+def _step(number: int, step: ExtensionStep, read: Reading) -> Html:
     rows = []
     for name, value in step.parameters.items():
-        words, factor, unit = parameter(name)
-        rows.append(Row([words, Shown(f"{factor * value:.4g}", f"{name} = {value:.6g}"), unit]))
+        words, factor, unit = read.parameter(name)
+        rows.append(Row([words, Shown(f"{factor * value:.4g}", f"{read.kind.text(name)} = {value:.6g}"), unit]))
     return section(
         f"step-{number}",
         f"ExtensionStep {number}: {', '.join(step.effects)}",

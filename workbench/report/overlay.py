@@ -16,6 +16,7 @@ from workbench.compare.phases import PHASES, STUCK
 from workbench.compare.slip_matching import SlipEvents
 from workbench.report.charts import GRID, INK, MEASURED, QUIET, Figure, Trace, axis, layout, line
 from workbench.report.plot_series import drawn, rounded, running_s
+from workbench.report.units import OF_VALVE, Reading
 
 SHADES = {
     "slipping up": "rgba(60,130,200,0.13)",
@@ -59,7 +60,12 @@ class Asked(NamedTuple):
     """After the point, in SI."""
 
 
-COMMAND, SETPOINT = Asked("command", "kPa", "Pa", 1e-3, 0), Asked("set point", "mm", "m", 1e3, 7)
+def _asked(read: Reading, by_setpoint: bool) -> Asked:
+    length, command = read.kind.length, read.kind.command
+    if by_setpoint:
+        return Asked("set point", length.unit, read.si, length.factor, 7)
+    fine = 0 if read.kind.name == "valve" else 7
+    return Asked("command", command.unit, read.kind.command_unit, command.factor, fine)
 
 
 def overlay(
@@ -71,21 +77,22 @@ def overlay(
     slips: SlipEvents | None = None,
     *,
     by_setpoint: bool = False,
+    read: Reading = OF_VALVE,
 ) -> Figure:
     """Return the figure; time, s, command, Pa, and positions, m, are (n,), NaN where there is nothing.
 
     Behind a positioner (`by_setpoint`) the command is a set point, m.
     """
     traces: list[Trace] = [*_grounds(time_s, shades)]
-    traces.append(_position(time_s, measured_m, "measured", MEASURED, "y"))
+    traces.append(_position(time_s, measured_m, "measured", MEASURED, "y", read))
     for each in models:
-        traces.append(_position(time_s, each.position_m, each.name, each.colour, "y"))
+        traces.append(_position(time_s, each.position_m, each.name, each.colour, "y", read))
         error_m = each.position_m - measured_m
-        traces.append(_position(time_s, error_m, f"error, {each.name}", each.colour, "y2", showlegend=False))
+        traces.append(_position(time_s, error_m, f"error, {each.name}", each.colour, "y2", read, showlegend=False))
     if slips is not None and bool(np.all(np.diff(time_s) > 0.0)):
         traces += _marks(time_s, measured_m, slips)
     command = drawn(time_s, command_pa)
-    asked = SETPOINT if by_setpoint else COMMAND
+    asked = _asked(read, by_setpoint)
     traces.append(
         line(
             rounded(command.time_s, 5),
@@ -112,20 +119,20 @@ def overlay(
                 spikethickness=1,
                 spikecolor=GRID,
             ),
-            **_axes(bool(shades), f"{asked.name}, {asked.unit}"),
+            **_axes(bool(shades), f"{asked.name}, {asked.unit}", read),
         ),
     }
 
 
-def _axes(has_ground: bool, asked: str) -> Figure:
+def _axes(has_ground: bool, asked: str, read: Reading) -> Figure:
     """Return the ordinates; a ground is an axis of its own from 0 to 1, which gives its place to what overlays it."""
     position, error = {"domain": [0.50, 1.0]}, {"domain": [0.21, 0.45]}
     ground = {"range": [0, 1], "visible": False, "fixedrange": True}
     zero = {"zeroline": True, "zerolinecolor": INK, "zerolinewidth": 1}
     behind = {"yaxis4": position | ground, "yaxis5": error | ground} if has_ground else {}
     return {
-        "yaxis": axis("position, mm", **({"overlaying": "y4"} if has_ground else position)),
-        "yaxis2": axis("error, mm", **zero, **({"overlaying": "y5"} if has_ground else error)),
+        "yaxis": axis(read.title("position, mm"), **({"overlaying": "y4"} if has_ground else position)),
+        "yaxis2": axis(read.title("error, mm"), **zero, **({"overlaying": "y5"} if has_ground else error)),
         "yaxis3": axis(asked, domain=[0.0, 0.16], nticks=4),
         **behind,
     }
@@ -140,14 +147,16 @@ def phase_shades(phase: NDArray[np.int64], valid: Mask) -> list[Shade]:
     ]
 
 
-def _position(time_s: Column, position_m: Column, name: str, colour: str, y_axis: str, **changes: object) -> Trace:
+def _position(
+    time_s: Column, position_m: Column, name: str, colour: str, y_axis: str, read: Reading, **changes: object
+) -> Trace:
     series = drawn(time_s, position_m)
     return line(
         rounded(series.time_s, 5),
-        rounded(1e3 * series.value, 4),
+        rounded(read.kind.length.factor * series.value, 4),
         name,
         colour,
-        "%{y:.3f} mm (%{customdata:.5~g} m)<br>at %{x:.3f} s",
+        f"%{{y:.3f}} {read.kind.length.unit} (%{{customdata:.5~g}} {read.si})<br>at %{{x:.3f}} s",
         customdata=rounded(series.value, 7),
         yaxis=y_axis,
         **changes,

@@ -11,6 +11,7 @@ from workbench.report.charts import MEASURED, Figure, Trace, axis, layout, line
 from workbench.report.overlay import Simulated
 from workbench.report.page import Html, plot, section
 from workbench.report.plot_series import extremes, rounded
+from workbench.report.units import Reading
 
 MOST = 6000
 """Points drawn of one loop at most."""
@@ -20,20 +21,23 @@ TOLD = (
 )
 
 
-def signature(command_pa: Column, measured_m: Column, models: Sequence[Simulated]) -> Html:
+def signature(command_pa: Column, measured_m: Column, models: Sequence[Simulated], read: Reading) -> Html:
     """Return the section; command, Pa, and positions, m, are (n,), NaN where there is nothing."""
-    traces = [_loop(command_pa, measured_m, "measured", MEASURED)]
-    traces += [_loop(command_pa, each.position_m, each.name, each.colour) for each in models]
-    figure: Figure = {"data": traces, "layout": layout(xaxis=axis("command, kPa"), yaxis=axis("position, mm"))}
+    traces = [_loop(command_pa, measured_m, "measured", MEASURED, read)]
+    traces += [_loop(command_pa, each.position_m, each.name, each.colour, read) for each in models]
+    figure: Figure = {
+        "data": traces,
+        "layout": layout(xaxis=axis(read.title("command, kPa")), yaxis=axis(read.title("position, mm"))),
+    }
     return section("signature", "The signature: position over command", plot("plot-signature", figure, 420, TOLD))
 
 
-def _loop(command_pa: Column, position_m: Column, name: str, colour: str) -> Trace:
-    rows = extremes(position_m, MOST)
+def _loop(command_pa: Column, position_m: Column, name: str, colour: str, read: Reading) -> Trace:
+    rows, length, command = extremes(position_m, MOST), read.kind.length, read.kind.command
     return line(
-        rounded(1e-3 * command_pa[rows], 3),
-        rounded(1e3 * position_m[rows], 4),
+        rounded(command.factor * command_pa[rows], 5),
+        rounded(length.factor * position_m[rows], 4),
         name,
         colour,
-        "%{y:.3f} mm at %{x:.2f} kPa",
+        f"%{{y:.3f}} {length.unit} at %{{x:.4~g}} {command.unit}",
     )

@@ -1,8 +1,11 @@
 """Units that people at a plant use, each with the SI value beside it."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
+
+from config.drive import SI, VALVE, Kind
 
 FINE_M = 1e-5
 """Below it three decimals of a millimetre say too little."""
@@ -47,11 +50,7 @@ class Shown:
 
 def length(value_m: float | None, *, sign: bool = False) -> Shown:
     """Show a length in mm."""
-    if value_m is None or not isfinite(value_m):
-        return Shown("–")
-    plus = "+" if sign else ""
-    fine = 0.0 < abs(value_m) < FINE_M
-    return Shown(f"{1e3 * value_m:{plus}.2g}" if fine else f"{1e3 * value_m:{plus}.3f}", f"{value_m:.6g} m")
+    return OF_VALVE.length(value_m, sign=sign)
 
 
 def force(value_n: float | None) -> Shown:
@@ -69,8 +68,63 @@ class Quantity:
     si: str
 
 
-LENGTH = Quantity(length, 1e3, "mm", "m")
 FORCE = Quantity(force, 1.0, "N", "N")
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How what a report is of is read: in its kind's names and units."""
+
+    kind: Kind
+
+    def length(self, value_m: float | None, *, sign: bool = False) -> Shown:
+        """Show a length."""
+        if value_m is None or not isfinite(value_m):
+            return Shown("–")
+        plus, read = "+" if sign else "", self.kind.length
+        if self.kind.turns:
+            text = read.number(value_m, f"{plus}.4g")
+        else:
+            text = read.number(value_m, f"{plus}.2g" if 0.0 < abs(value_m) < FINE_M else f"{plus}.3f")
+        return Shown(text, f"{value_m:.6g} {self.si}")
+
+    def said(self, value_m: float | None) -> str:
+        """Say a length with its unit."""
+        return f"{self.length(value_m).text} {self.kind.length.unit}"
+
+    @property
+    def si(self) -> str:
+        """The SI unit of a length."""
+        return SI[self.kind.lengths]
+
+    @property
+    def errors(self) -> Quantity:
+        """What errors of a simulated position are of."""
+        return Quantity(self.length, self.kind.length.factor, self.kind.length.unit, self.si)
+
+    def title(self, text: str) -> str:
+        """Return a title that is worded for a valve, mm, kPa and N, in this kind's words and units."""
+        travel, moved_by = self.kind.words
+        own = {"mm": self.kind.length.unit, "kPa": self.kind.command.unit, "N": self.kind.force.unit}
+        words = own | {"position": travel, "actuator pressure": moved_by}
+        return re.sub("|".join(rf"\b{each}\b" for each in words), lambda found: words[found[0]], text)
+
+    def parameter(self, name: str) -> tuple[str, float, str]:
+        """Return a parameter's name in words, the factor from SI to the unit shown, and the unit."""
+        words, factor, unit = parameter(name)
+        if self.kind.name == "valve" or not unit:
+            return words, factor, unit
+        ending = next(each for each in SUFFIXES if name.endswith(each))
+        units = self.kind.own(f"x{ending}").removeprefix("x_").split("_")
+        return words, 1.0, " ".join(WRITTEN.get(each, each) for each in units).replace(" per ", "/")
+
+
+OF_VALVE = Reading(VALVE)
+WRITTEN = {
+    "n": "N", "nm": "N m", "ns": "N s", "nms": "N m s", "nms2": "N m s²", "ns2": "N s²", "a": "A", "rad2": "rad²",
+    "rad3": "rad³", "m2": "m²", "m3": "m³",
+}  # fmt: skip
+"""Units of names as they are written."""
 
 
 def of_stroke(value_m: float, stroke_m: float) -> str:

@@ -18,7 +18,7 @@ from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
-from workbench.report.units import LENGTH, length
+from workbench.report.units import OF_VALVE, length
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.extension import Extension, extension_of
 
@@ -218,8 +218,8 @@ class SearchPanel:
             {
                 "effects": diagnosis.with_those_before(number, each.name),
                 "effect": self._desk.plain(each.name),
-                "fitted": LENGTH.shown(each.train).text,
-                "test": LENGTH.shown(each.test).text,
+                "fitted": OF_VALVE.length(each.train).text,
+                "test": OF_VALVE.length(each.test).text,
                 "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
                 "outcome": each.said,
             }
