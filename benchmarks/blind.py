@@ -34,8 +34,8 @@ from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.equivalence import algebraic_class
 
 SEEDS: Mapping[str, range] = {
-    "clean": range(71000, 71020),
-    "dirty": range(72000, 72020),
+    "clean": range(71000, 71160),
+    "dirty": range(72000, 72140),
     "nothing": range(73000, 73010),
     "two": range(74000, 74010),
     "removed": range(75000, 75008),
