@@ -19,19 +19,26 @@ drive's, `command_nm` for `command_pa`, `spring_nm_per_rad` for `spring_n_per_m`
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 KindName = Literal["valve", "linear", "linear motor", "rotary", "rotary motor"]
-Ending = Mapping[str, str]
-_WORD = re.compile(r"\b[a-z]\w*?((?:_(?:per|kg|ms?|m\d|n|ns\d?|pa|s))+)\b(?!\()")
-"""A name that ends in units; these are all that follow its last other word."""
-LINEAR: Ending = {}
-ROTARY: Ending = {"m": "rad", "m2": "rad2", "m3": "rad3", "n": "nm", "ns": "nms", "ns2": "nms2", "ms": "rads"}
-"""What units of what slides are of what turns."""
-KEPT = ("per", "s", "kg", "m", "m2", "m3", "n", "ns", "ns2", "ms")
-SI: Ending = {"pa": "Pa", "n": "N", "nm": "N m", "a": "A", "m": "m", "rad": "rad"}
+OF_VALVE = ("per", "s", "kg", "m", "m2", "m3", "n", "ns", "ns2", "ms", "pa")
+"""Units at the end of a valve's names."""
+TURNING: Mapping[str, str] = {
+    "m": "rad",
+    "m2": "rad2",
+    "m3": "rad3",
+    "n": "nm",
+    "ns": "nms",
+    "ns2": "nms2",
+    "ms": "rads",
+}
+"""What these are of what turns,"""
 NAMES: Mapping[str, str] = {"mass_kg": "inertia_kg_m2", "stroke_m": "travel_rad"}
-"""Of what turns, beyond the units."""
+"""and what has another name there."""
+COLUMNS = ("command_pa", "position_m", "pressure_pa", "reference_m", "load_n", "velocity_m_per_s")
+"""Of a recording, with units of a kind's own."""
+_NAME = re.compile(rf"\b[a-z]\w*?((?:_(?:{'|'.join(OF_VALVE)}))+)\b(?!\()")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +57,23 @@ class Scale:
         return f"{self.factor * value:{digits}}"
 
 
-MILLIMETRES, NEWTONS = Scale(1e3, "mm"), Scale(1.0, "N")
+class Quantity(NamedTuple):
+    """What commands or moves: its name, its SI unit, and how it is read."""
+
+    word: str
+    si: str
+    read: Scale
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "pa": Quantity("pressure", "Pa", Scale(1e-3, "kPa")),
+    "n": Quantity("force", "N", Scale(1.0, "N")),
+    "nm": Quantity("torque", "N m", Scale(1.0, "N m")),
+    "a": Quantity("current", "A", Scale(1.0, "A")),
+    "m": Quantity("position", "m", Scale(1e3, "mm")),
+    "rad": Quantity("angle", "rad", Scale(1.0, "rad")),
+}
+"""By the unit at the end of a name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,17 +81,12 @@ class Kind:
     """A kind of machine: its names and units."""
 
     name: KindName
-    command: Scale
-    length: Scale
-    force: Scale
-    area: str
-    """What A is called; empty: the command is the force."""
     asked: str
-    """The unit at the end of a command's name."""
-    lengths: str
-    """The unit at the end of a position's name."""
-    words: tuple[str, str] = ("position", "pressure")
-    """What its travel and its command are called."""
+    """The unit at the end of its command's name, and"""
+    moved: str
+    """of its position's."""
+    area: str = ""
+    """What A is called; empty: the command is the force."""
 
     @property
     def noun(self) -> str:
@@ -78,12 +96,27 @@ class Kind:
     @property
     def turns(self) -> bool:
         """Whether it turns."""
-        return self.lengths == "rad"
+        return self.moved == "rad"
 
     @property
-    def command_unit(self) -> str:
-        """The SI unit of its command."""
-        return SI[self.asked]
+    def command(self) -> Quantity:
+        """What commands it."""
+        return QUANTITIES[self.asked]
+
+    @property
+    def travel(self) -> Quantity:
+        """What its travel is."""
+        return QUANTITIES[self.moved]
+
+    @property
+    def force(self) -> Quantity:
+        """What holds it back: a force, or a torque."""
+        return QUANTITIES["nm" if self.turns else "n"]
+
+    @property
+    def length(self) -> Scale:
+        """How its travel is read."""
+        return self.travel.read
 
     def own(self, name: str) -> str:
         """Return what a valve's parameter or column is called in this kind's files.
@@ -94,10 +127,10 @@ class Kind:
         if name == "diaphragm_area_m2" and self.area:
             return self.area
         if name == "pressure_pa" and self.asked != "pa":
-            return f"{self.words[1]}_{self.asked}"
+            return f"{self.command.word}_{self.asked}"
         if self.turns and name in (*NAMES, *NAMES.values()):
             return NAMES.get(name, name)
-        return _WORD.sub(self._own_units, name)
+        return _NAME.sub(self._own_units, name)
 
     def of_valve(self, name: str) -> str:
         """Return what a name of this kind's files is called in a valve's; a force where the command is one as well.
@@ -108,7 +141,7 @@ class Kind:
         back = {own: unit for unit, own in self._units.items() if own != "n"}
         *words, last = name.split("_")
         units: list[str] = []
-        while last in back or last in KEPT:
+        while last in back or last in OF_VALVE:
             units.insert(0, back.get(last, last))
             if not words:
                 return name
@@ -121,12 +154,12 @@ class Kind:
         >>> KINDS["rotary"].text("static_n must be at least coulomb_n")
         'static_nm must be at least coulomb_nm'
         """
-        return text if self.name == "valve" else _WORD.sub(lambda found: self.own(found[0]), text)
+        return text if self.name == "valve" else _NAME.sub(lambda found: self.own(found[0]), text)
 
     @property
-    def _units(self) -> Ending:
-        """Its units by those of a valve, where they are others; the command's first."""
-        return {"pa": self.asked, **(ROTARY if self.turns else LINEAR)}
+    def _units(self) -> Mapping[str, str]:
+        """Its units by those of a valve, where they are others; the command's first, a force goes before it."""
+        return {"pa": self.asked, **(TURNING if self.turns else {})}
 
     def _own_units(self, found: "re.Match[str]") -> str:
         begin = found[0].removesuffix(found[1])
@@ -136,25 +169,14 @@ class Kind:
 KINDS: Mapping[str, Kind] = {
     each.name: each
     for each in (
-        Kind("valve", Scale(1e-3, "kPa"), MILLIMETRES, NEWTONS, "diaphragm_area_m2", "pa", "m"),
-        Kind("linear", NEWTONS, MILLIMETRES, NEWTONS, "", "n", "m", ("position", "force")),
-        Kind("linear motor", Scale(1.0, "A"), MILLIMETRES, NEWTONS, "force_n_per_a", "a", "m", ("position", "current")),
-        Kind("rotary", Scale(1.0, "N m"), Scale(1.0, "rad"), Scale(1.0, "N m"), "", "nm", "rad", ("angle", "torque")),
-        Kind(
-            "rotary motor",
-            Scale(1.0, "A"),
-            Scale(1.0, "rad"),
-            Scale(1.0, "N m"),
-            "torque_nm_per_a",
-            "a",
-            "rad",
-            ("angle", "current"),
-        ),
+        Kind("valve", "pa", "m", "diaphragm_area_m2"),
+        Kind("linear", "n", "m"),
+        Kind("linear motor", "a", "m", "force_n_per_a"),
+        Kind("rotary", "nm", "rad"),
+        Kind("rotary motor", "a", "rad", "torque_nm_per_a"),
     )
 }
 VALVE = KINDS["valve"]
-COLUMNS = ("command_pa", "position_m", "pressure_pa", "reference_m", "load_n", "velocity_m_per_s")
-"""Of a recording, with units of a kind's own."""
 
 
 def kind_of_columns(names: Collection[str]) -> Kind:

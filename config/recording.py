@@ -162,17 +162,17 @@ class Recording(Result):
 
         figure, (above, below) = panels((3.0, 1.6))
         time_s = self.time_s - self.time_s[0]
-        length, command, (travel, moved_by) = self.kind.length, self.kind.command, self.kind.words
+        length, command, travel = self.kind.length, self.kind.command, self.kind.travel.word
         if "reference_m" in self.columns:
             reference = length.factor * self.columns["reference_m"]
             line(above, time_s, reference, MODEL, "reference", drawstyle="steps-post")
         line(above, time_s, length.factor * self.position_m, MEASURED, travel)
         if "command_pa" in self.columns:
-            line(below, time_s, command.factor * self.command_pa, QUIET, "command", drawstyle="steps-post")
+            line(below, time_s, command.read.factor * self.command_pa, QUIET, "command", drawstyle="steps-post")
         if "pressure_pa" in self.columns:
-            line(below, time_s, command.factor * self.columns["pressure_pa"], MODEL, moved_by)
+            line(below, time_s, command.read.factor * self.columns["pressure_pa"], MODEL, command.word)
         above.set_ylabel(f"{travel}, {length.unit}")
-        below.set_ylabel(f"{moved_by}, {command.unit}")
+        below.set_ylabel(f"{command.word}, {command.read.unit}")
         below.set_xlabel("time, s")
         legend(above)
         legend(below)

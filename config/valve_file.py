@@ -43,7 +43,7 @@ class ValveParameters(Schema):
     @model_validator(mode="after")
     def _static_friction_is_at_least_coulomb_friction(self) -> Self:
         if self.static_n < self.coulomb_n:
-            coulomb, static = (self.own.force.said(each, "g") for each in (self.coulomb_n, self.static_n))
+            coulomb, static = (self.own.force.read.said(each, "g") for each in (self.coulomb_n, self.static_n))
             raise ValueError(f"static_n must be at least coulomb_n ({coulomb}), it is {static}")
         return self
 

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from config.drive import SI
 from config.recording import Column, Recording
 
 LONGEST_STROKE_M = 1.5
@@ -42,7 +41,7 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
     said = [*(_of_size(position_m, stroke_m) if of_valve else ()), *_of_rows(recording)]
     whole = np.isfinite(position_m)
     if whole.any() and np.ptp(position_m[whole]) == 0.0:
-        where = f"{position_m[whole][0]:g} {SI[kind.lengths]}"
+        where = f"{position_m[whole][0]:g} {kind.travel.si}"
         said.append(f"the position is {where} throughout: a stem that never moves says nothing")
     elif whole.any() and command_pa is not None and of_valve:
         said += [*_of_pressure(command_pa), *_of_action(position_m, command_pa), *_of_sampling(recording)]

@@ -127,7 +127,7 @@ def wrong_table(table: str, key: str | None) -> str | None:
     """Say what is wrong with `[table] key` of the daemon's or the slave's file."""
     fields = [schema.model_fields[table] for schema in (DaemonFile, SlaveFile) if table in schema.model_fields]
     if not fields:
-        return None if table in {"valve", "effect"} else "no such table"
+        return None if table in {"valve", "drive", "effect"} else "no such table"
     return None if key is None or any(key in keys(field.annotation) for field in fields) else "no such key"
 
 

@@ -152,7 +152,7 @@ class Comparison(Result):
             f"99 % band; with the command: {self.input_correlation.outside} of {len(self.input_correlation.lag)}",
         ]
         if side is not None:
-            pressure, unit = self.own.words[1], self.own.command_unit
+            pressure, unit = self.own.command.word, self.own.command.si
             lines.append(
                 f"measured {pressure}: the model's is off by {side.pressure_rms_pa:.4g} {unit} rms; run from the "
                 f"measured one, the error is {self.own.length.said(side.stem_rms_m, '.4g')} rms"
@@ -181,7 +181,7 @@ class Comparison(Result):
         label = f"model, error {length.said(self.rms_m, '.4g')} rms"
         line(above, time_s, length.factor * self.simulated_m, MODEL, label)
         line(below, time_s, length.factor * self.residual_m, MODEL)
-        above.set_ylabel(f"{self.own.words[0]}, {length.unit}")
+        above.set_ylabel(f"{self.own.travel.word}, {length.unit}")
         below.set_ylabel(f"error, {length.unit}")
         below.set_xlabel("time, s")
         legend(above)

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from config.drive import KINDS, SI, KindName
+from config.drive import KINDS, KindName
 from config.errors import InputError
 from config.noise import quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
@@ -126,7 +126,7 @@ def ready(recording: Recording) -> Record:
     repeated_m = repeatability_m(command_pa[longest], seen_m[longest]) if _is_even(time_s[longest]) else None
     quantum = quantum_m(position_m[valid])
     finest_m = FINEST * float(np.ptp(position_m[valid]))
-    noise_m, unit = said_noise_m(recording), SI[recording.kind.lengths]
+    noise_m, unit = said_noise_m(recording), recording.kind.travel.si
     if noise_m is None:
         noise_m = not_repeating_m(noise_std_m(seen_m[longest], command_pa[longest]), repeated_m, quantum)
     if noise_m is not None and noise_m < finest_m:

@@ -204,7 +204,7 @@ def _phases(each: Comparison, stroke_m: float) -> Html:
             _profile("position", each, "over the stem's position, mm", read.kind.length.factor),
             _profile("velocity", each, "over the stem's velocity, mm/s (opening +)", read.kind.length.factor),
             _profile("direction", each, "over the last direction of motion", 1.0),
-            _profile("pressure", each, "over the actuator pressure, kPa", read.kind.command.factor),
+            _profile("pressure", each, "over the actuator pressure, kPa", read.kind.command.read.factor),
         ),
     )
 
@@ -241,7 +241,7 @@ def _profile(over: str, each: Comparison, title: str, factor: float) -> Html:
 def _friction(each: Comparison) -> Html:
     both = (("measured", MEASURED), ("model", MODEL))
     read = Reading(each.own)
-    force = (read.title("friction, N"), 1.0, read.kind.force.unit, read.kind.force.unit)
+    force = (read.title("friction, N"), 1.0, read.kind.force.si, read.kind.force.si)
 
     def drawn(way: str) -> Figure:
         pair_ = getattr(each.friction, way)
@@ -347,8 +347,8 @@ def _pressure(each: Comparison) -> list[str]:
         ]
     return [
         f"The {read.title('actuator pressure')} is measured; the model's is off by "
-        f"{read.kind.command.said(side.pressure_rms_pa)} rms. Run from the measured {read.kind.words[1]} instead of "
-        f"the command, the error is {read.said(side.stem_rms_m)} rms, "
+        f"{read.kind.command.read.said(side.pressure_rms_pa)} rms. Run from the measured {read.kind.command.word} "
+        f"instead of the command, the error is {read.said(side.stem_rms_m)} rms, "
         f"fit {side.stem_fit_percent:.1f} %: that much arises at the stem"
     ]
 

@@ -346,13 +346,13 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
 
 
 def _command(chosen: Experiment, read: Reading) -> dict[str, object]:
-    series, command = drawn(chosen.time_s, chosen.command_pa), read.kind.command
+    series, command = drawn(chosen.time_s, chosen.command_pa), read.kind.command.read
     trace = line(
         rounded(series.time_s, 4),
         rounded(command.factor * series.value, 3),
         "command",
         QUIET,
-        f"%{{y:.2f}} {command.unit} (%{{customdata:.6~g}} {read.kind.command_unit})<br>at %{{x:.3f}} s",
+        f"%{{y:.2f}} {command.unit} (%{{customdata:.6~g}} {read.kind.command.si})<br>at %{{x:.3f}} s",
         customdata=rounded(series.value, 0),
     )
     return {

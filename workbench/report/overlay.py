@@ -61,11 +61,11 @@ class Asked(NamedTuple):
 
 
 def _asked(read: Reading, by_setpoint: bool) -> Asked:
-    length, command = read.kind.length, read.kind.command
+    length, command = read.kind.length, read.kind.command.read
     if by_setpoint:
         return Asked("set point", length.unit, read.si, length.factor, 7)
     fine = 0 if read.kind.name == "valve" else 7
-    return Asked("command", command.unit, read.kind.command_unit, command.factor, fine)
+    return Asked("command", command.unit, read.kind.command.si, command.factor, fine)
 
 
 def overlay(

@@ -33,7 +33,7 @@ def signature(command_pa: Column, measured_m: Column, models: Sequence[Simulated
 
 
 def _loop(command_pa: Column, position_m: Column, name: str, colour: str, read: Reading) -> Trace:
-    rows, length, command = extremes(position_m, MOST), read.kind.length, read.kind.command
+    rows, length, command = extremes(position_m, MOST), read.kind.length, read.kind.command.read
     return line(
         rounded(command.factor * command_pa[rows], 5),
         rounded(length.factor * position_m[rows], 4),

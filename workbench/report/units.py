@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 
-from config.drive import SI, VALVE, Kind
+from config.drive import VALVE, Kind
 
 FINE_M = 1e-5
 """Below it three decimals of a millimetre say too little."""
@@ -95,7 +95,7 @@ class Reading:
     @property
     def si(self) -> str:
         """The SI unit of a length."""
-        return SI[self.kind.lengths]
+        return self.kind.travel.si
 
     @property
     def errors(self) -> Quantity:
@@ -104,9 +104,9 @@ class Reading:
 
     def title(self, text: str) -> str:
         """Return a title that is worded for a valve, mm, kPa and N, in this kind's words and units."""
-        travel, moved_by = self.kind.words
-        own = {"mm": self.kind.length.unit, "kPa": self.kind.command.unit, "N": self.kind.force.unit}
-        words = own | {"position": travel, "actuator pressure": moved_by}
+        kind = self.kind
+        own = {"mm": kind.length.unit, "kPa": kind.command.read.unit, "N": kind.force.read.unit}
+        words = own | {"position": kind.travel.word, "actuator pressure": kind.command.word}
         return re.sub("|".join(rf"\b{each}\b" for each in words), lambda found: words[found[0]], text)
 
     def parameter(self, name: str) -> tuple[str, float, str]:

@@ -23,10 +23,10 @@ class ErrorUnit:
 
 def lengths(kind: Kind) -> ErrorUnit:
     """Return what errors of a simulated position are of."""
-    return ErrorUnit(kind.length, f"_{kind.lengths}", kind)
+    return ErrorUnit(kind.length, f"_{kind.moved}", kind)
 
 
-NEWTONS = ErrorUnit(VALVE.force, "_n", VALVE)
+NEWTONS = ErrorUnit(VALVE.force.read, "_n", VALVE)
 
 
 @dataclass(frozen=True, slots=True)
