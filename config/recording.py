@@ -74,7 +74,7 @@ class Recording(Result):
             return cls(columns, {key: each for key, each in metadata.items() if key != KIND})
         names = {kind.own(name): name for name in COLUMNS}
         named = {names.get(name, name): column for name, column in columns.items()}
-        said = {**metadata, KIND: kind.name}
+        said = {**metadata, **of_kind(kind)}
         if "position_m" not in named:
             named["position_m"] = _integrated(named["time_s"], named["velocity_m_per_s"])
             said[INTEGRATED] = f"integrated from {kind.own('velocity_m_per_s')}, from zero"
@@ -180,6 +180,11 @@ class Recording(Result):
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+
+def of_kind(kind: Kind) -> dict[str, str]:
+    """Return what a recording says of itself so that `Recording.kind` knows whose it is; of a valve nothing."""
+    return {} if kind is VALVE else {KIND: kind.name}
 
 
 def _integrated(time_s: Column, velocity_m_per_s: Column) -> Column:

@@ -136,6 +136,17 @@ def _of_valve(kind: Kind, table: Any, source: str) -> Any:
     return {kind.of_valve(key): value for key, value in table.items()}
 
 
+def valve_alone(file: ValveFile, source: str, who: str) -> ValveFile:
+    """Return a valve file to one who knows no drives.
+
+    Raises:
+        InputError: it is a drive's; says who knows none.
+    """
+    if file.valve.own is not VALVE:
+        raise InputError(source, f"is of a drive: {who}")
+    return file
+
+
 def valve(name: Path | str) -> ValveFile:
     """Read a valve file, or one that comes with the package by its name.
 

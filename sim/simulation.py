@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from config.errors import InputError
 from config.loading import validated
-from config.recording import Column, Recording
+from config.recording import Column, Recording, of_kind
 from config.slave_file import Sensor
 from config.valve_file import ValveFile
 from sim.transmitter import Transmitter
@@ -59,7 +59,7 @@ def simulate(
             "position_m": np.array([transmitter.measure(position_m) for position_m in response.indicated_m]),
             "pressure_pa": response.pressure_pa,
         },
-        {"valve": valve.valve.name, "source": "positioner simulate"},
+        {"valve": valve.valve.name, "source": "positioner simulate", **of_kind(valve.valve.own)},
     )
 
 

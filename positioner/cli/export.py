@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write it, and say what goes in and comes out."""
-    from config.valve_file import find_valve, load_valve
+    from config.valve_file import find_valve, load_valve, valve_alone
     from positioner.cli.parts.output_files import writable
     from positioner.cli.parts.progress import at_work
     from sim.composition import Composition
@@ -25,7 +25,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
-    composition = Composition.from_file(load_valve(path), str(path))
+    valve = valve_alone(load_valve(path), str(path), "an FMU here has pressures and positions, Pa and m")
+    composition = Composition.from_file(valve, str(path))
     with at_work("export", f"compiling {arguments.valve}"):
         export_fmu(composition, arguments.out)
     by_causality = {"input": "in", "output": "out"}

@@ -36,7 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
     path = find_valve(arguments.valve)
     valve = load_valve(path)
     by_setpoint = any(find_effect(each.name, str(path)).by_setpoint for each in valve.effect)
-    time_s, command_pa = read_series(arguments.input, "reference_m" if by_setpoint else "command_pa")
+    asked = valve.valve.own.own("reference_m" if by_setpoint else "command_pa")
+    time_s, command_pa = read_series(arguments.input, asked)
     what = f"simulating {time_s[-1] - time_s[0]:g} s"
     with naming({"valve file": str(path), "sensor": "--noise-m, --seed"}), at_work("simulate", what):
         recording = simulate(valve, time_s, command_pa, noise_std_m=arguments.noise_m, seed=arguments.seed)

@@ -104,5 +104,5 @@ def test_degrees_taken_for_radians_are_recognised(axis: ValveFile, recording: Re
 
 
 def test_the_daemon_does_not_command_it(axis: ValveFile) -> None:
-    with pytest.raises(InputError, match="is of a drive, which the daemon does not command"):
+    with pytest.raises(InputError, match="is of a drive: the daemon commands none"):
         extended_valve(axis, "axis.toml")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from config.errors import InputError
 from config.results.block import Block, Table
 from config.results.result import Result
-from config.valve_file import find_valve, load_valve
+from config.valve_file import find_valve, load_valve, valve_alone
 from workbench.fleet.engine import TIME_LIMIT_S, cluster, work
 from workbench.fleet.examination import AS_BEFORE, UNREADABLE, Examination, Request, unreadable
 from workbench.fleet.manifest import Entry, Manifest, read_manifest
@@ -153,7 +153,8 @@ class _Running:
         self.examined = 0
         self.course = ValveCourse(name)
         try:
-            self._model = self.course.given = load_valve(_valve_path(entries[0].file, manifest.folder))
+            path = _valve_path(entries[0].file, manifest.folder)
+            self._model = self.course.given = valve_alone(load_valve(path), str(path), "a fleet is of valves")
         except InputError as error:
             for entry in entries:
                 self._tell(entry, unreadable(f"valve file {entry.file}: {error.problem}"))

@@ -16,7 +16,7 @@ from typing import Any
 
 from config.errors import InputError
 from config.recording import Column, Recording
-from config.valve_file import ValveFile, find_valve, load_valve
+from config.valve_file import ValveFile, find_valve, load_valve, valve_alone
 from config.writing import valve_toml, write_valve
 from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.background import Limits, Task, Work, effect_checked
@@ -351,4 +351,5 @@ def named_valve(text: str, name: str = "") -> NamedValve:
         InputError: there is none, or it is wrong.
     """
     path = find_valve(text)
-    return NamedValve(name or text, path, load_valve(path))
+    file = valve_alone(load_valve(path), name or text, "this page reads mm and kPa; positioner diagnose reads it")
+    return NamedValve(name or text, path, file)
