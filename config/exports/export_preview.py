@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from config.drive import KINDS, VALVE
 from config.errors import InputError
-from config.exports.export_units import allowed_units, ending_of, unit_in_header, unit_named
+from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_in_header, unit_named
 from config.exports.header_search import Header, begins_number, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
 from config.exports.raw_table import Cell, raw_tables
@@ -132,8 +133,9 @@ def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[s
     words: list[str] = []
     open_: list[str] = []
     left = list(columns)
-    for ours in COMMON:
-        chosen = next((each for each in left if _looks_like(ours, each)), None)
+    of_drive = _of_drive(columns)
+    for ours in ("time_s", *of_drive) if of_drive else COMMON:
+        chosen = of_drive.get(ours) or next((each for each in left if _looks_like(ours, each)), None)
         if chosen is None and ours == "time_s":
             chosen = next((each for each in left if _most_are(each.cells, STAMP)), None)
         if chosen is None:
@@ -153,6 +155,24 @@ def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[s
     if any(word.endswith(":%") and word.startswith("position") for word in words):
         words += ["--stroke-m", "M"]
     return tuple(words), tuple(open_)
+
+
+def _of_drive(columns: Sequence[ColumnPreview]) -> dict[str, ColumnPreview]:
+    """Return which columns are the travel and the command of a drive, by the units they are in; none of a valve's."""
+    if any(each.unit in UNITS["_pa"] for each in columns):
+        return {}
+    for kind in KINDS.values():
+        for moved in ("position_m", "velocity_m_per_s"):
+            names = [kind.own(moved), kind.own("command_pa")]
+            found = [next((each for each in columns if _is_in(name, each)), None) for name in names]
+            if kind is not VALVE and all(found):
+                return {name: each for name, each in zip(names, found, strict=True) if each}
+    return {}
+
+
+def _is_in(ours: str, column: ColumnPreview) -> bool:
+    """Whether the file says that a column is in one of the units of ours; mA may be a share of a range."""
+    return column.numbers and column.unit in UNITS[ending_of(ours)] and column.unit not in SHARES
 
 
 def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], separator: str) -> Iterator[str]:

@@ -8,6 +8,7 @@ import pytest
 from config.drive import KINDS, VALVE
 from config.errors import InputError
 from config.exports.column_mapping import read_mapping
+from config.exports.export_preview import preview
 from config.historian_export import read_export
 from config.recording import Recording
 from config.valve_file import ValveParameters, load_valve
@@ -164,6 +165,17 @@ def test_an_export_in_degrees_and_milliamperes_is_read(tmp_path: Path) -> None:
     assert found.kind.name == "rotary motor"
     assert found.command_pa == pytest.approx(CURRENT_A, abs=1e-8)
     assert found.position_m == pytest.approx(ANGLE_RAD, abs=1e-7)
+
+
+def test_what_reads_an_export_of_a_drive_is_proposed_by_its_units(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.csv"
+    rows = zip(TIME_S.tolist(), CURRENT_A.tolist(), np.degrees(ANGLE_RAD).tolist(), strict=True)
+    path.write_text("t [s];Iq [A];phi [deg]\n" + "".join(f"{a:.4f};{b:.6f};{c:.6f}\n" for a, b, c in rows))
+    found = preview(path)
+    assert found.open == ()
+    words = [each for each in found.words if "=" in each]
+    assert words == ["time_s=t [s]:s", "position_rad=phi [deg]:deg", "command_a=Iq [A]:A"]
+    assert read_export(path, read_mapping(words), None).kind.name == "rotary motor"
 
 
 def test_a_mapping_names_what_a_drives_recording_lacks() -> None:
