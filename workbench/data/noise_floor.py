@@ -43,7 +43,7 @@ def with_noise(recording: Recording, noise_m: float | None) -> Recording:
         return recording
     if not 0.0 < noise_m < np.inf:
         raise InputError(NOISE, f"must be positive, it is {noise_m:g}")
-    return replace(recording, metadata={**recording.metadata, NOISE: repr(noise_m)})
+    return replace(recording, metadata={**recording.metadata, NOISE: repr(float(noise_m))})
 
 
 def said_noise_m(recording: Recording) -> float | None:
