@@ -33,24 +33,23 @@ print("numba" in sys.modules, valve.position_m.hex())
 """
 
 
-def test_of_processes_that_begin_at_once_one_compiles_and_the_others_take_its_kernel(tmp_path: Path) -> None:
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+def probed(cache: Path, count: int = 1) -> list[tuple[str, str]]:
+    """Begin so many processes at once; return of each whether it started numba, and where its stem came to."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
     command = [sys.executable, "-c", PROBE]
-    probes = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(3)]
+    probes = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(count)]
     said = [process.communicate()[0].split() for process in probes]
-    assert sorted(compiles for compiles, _ in said) == ["False", "False", "True"], "the others do not even start numba"
-    assert len({position for _, position in said}) == 1
+    return [(numba, position) for numba, position in said]
 
 
-def test_where_the_machine_code_is_of_another_processor_the_bitcode_is_translated_without_numba(tmp_path: Path) -> None:
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    command = [sys.executable, "-c", PROBE]
-    said = [subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()]
+def test_a_kernel_is_compiled_by_one_process_and_translated_again_for_another_processor(tmp_path: Path) -> None:
+    at_once = probed(tmp_path, 3)
+    assert sorted(numba for numba, _ in at_once) == ["False", "False", "True"], "the others do not even start it"
     (code,) = tmp_path.rglob("*.o")
     code.rename(code.with_suffix(".another.o"))
-    said += [subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()]
-    assert [compiles for compiles, _ in said] == ["True", "False"]
-    assert said[0][1] == said[1][1]
+    ((numba, position),) = probed(tmp_path)
+    assert numba == "False", "the bitcode is there"
+    assert {position} == {each for _, each in at_once}
 
 
 def test_the_laws_are_compiled_once_for_all_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
