@@ -92,6 +92,16 @@ def test_of_an_adequate_valve_what_is_suspected_is_said(parts: Split) -> None:
     assert "standard errors, more than 3 needed" in said
 
 
+def test_of_what_is_left_unexplained_what_is_suspected_is_said(parts: Split) -> None:
+    """At the floor, yet the residual hangs on the state."""
+    before = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M, structure=1.0, agreement=1)
+    suspect = model_of("preload", cost=1.1 * AT_FLOOR, error_m=1.1 * FLOOR_M, scatter=0.14)
+    found = diagnosed(parts, step(before, preload=suspect))
+    assert (found.verdict, found.missing, found.suspected) == ("untrusted", (), ("preload",))
+    assert found.sentence.startswith("Not to be trusted: ")
+    assert " Suspected, not proved: preload; of preload, the held-out error falls by " in found.sentence
+
+
 def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:
     found = diagnosed(parts, step(EXPLAINED, sensor_gain=model_of("sensor_gain", cost=0.5 * AT_FLOOR, error_m=3e-5)))
     assert (found.verdict, found.missing) == ("adequate", ())

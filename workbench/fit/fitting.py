@@ -27,7 +27,7 @@ from workbench.fit.fit_result import Fit, with_profile
 from workbench.fit.objective import SimulationError
 from workbench.fit.setpoint_starts import FREE as FREE_BY_SETPOINT
 from workbench.fit.setpoint_starts import setpoint_starts
-from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
+from workbench.fit.starts import base_starts, effect_starts, forces_regressed, moved_starts, weakest_start
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
@@ -255,8 +255,9 @@ def _begun(
         workers,
         tell,
         weakest=weakest,
-        waiting=starts.at_landings,
+        waiting=starts.at_landings[1:],
         added=added,
         grid=starts.grid,
     )
-    return widely(begun, [*starts.begins, *starts.at_landings[:1]])
+    # Viscous friction stands in no landing: where it is far off, a start from there is far off until it is moved.
+    return widely(begun, [*starts.begins, *moved_starts(error, starts.at_landings[:1], added)])

@@ -41,13 +41,11 @@ def _said(
     if off and verdict in ("adequate", "missing", "one_of"):
         begun = f"Missing: {names}{or_another}; {fell}. But" if names else "No effect is missing, but"
         return f"{begun} {off}{apart}"
+    suspicion = _suspicion(steps[-1].suspected)
     if verdict == "adequate":
-        said = _adequate(best.errors, parts, length)
-        return (
-            said + knife_edges_sentence(best.errors, length) + _suspicion(steps[0].suspected) + _scatter(parts, length)
-        )
+        said = _adequate(best.errors, parts, length) + knife_edges_sentence(best.errors, length)
+        return said + suspicion + _scatter(parts, length)
     if verdict == "missing":
-        suspicion = _suspicion(steps[-1].suspected) if steps[-1].added is None else ""
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts)}."
         return said + knife_edges_sentence(best.errors, length) + suspicion
     if verdict == "one_of":
@@ -58,8 +56,9 @@ def _said(
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
     begun = f" {names} {part}: {fell}." if names else f" The held-out error is {length.said(best.errors.test_rmse_m)}."
     if verdict == "unexplained":
-        return f"Something is missing that the library does not have.{begun}{repeat}{_scatter(parts, length)}"
-    return _unproved(verdict, steps, library) + begun
+        said = f"Something is missing that the library does not have.{begun}"
+        return f"{said}{suspicion}{repeat}{_scatter(parts, length)}"
+    return _unproved(verdict, steps, library) + begun + (suspicion if verdict == "untrusted" else "")
 
 
 def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
