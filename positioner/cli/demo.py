@@ -178,6 +178,7 @@ def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
     aged = valve.model_copy(update={"coulomb_n": AGEING * valve.coulomb_n, "static_n": AGEING * valve.static_n})
     with Dcs("127.0.0.1", port) as dcs:
         _observe(dcs, 0.5, "S0, nothing moves")
+        _acknowledge(dcs)
         dcs.set("mode", 2)
         identified = identify(dcs, "new", ALPHA_PA, valve)
         steps = _steps(dcs, "new", counted=True)
@@ -187,6 +188,16 @@ def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
         steps += _steps(dcs, "identified anew", counted=True)
         cycle = dcs.get_all(*(register.name for register in STATISTICS))
     return DemoOutcome(steps, identified, cycle)
+
+
+def _acknowledge(dcs: "Dcs") -> None:
+    """Acknowledge, as an operator would, what was latched while the processes began on a busy machine; say it."""
+    from config.codes import Fault
+
+    if fault := int(dcs.get("fault")):
+        _print_line(f"acknowledged: {Fault(fault).text}")
+        dcs.set("acknowledge", 1)
+        _observe(dcs, 0.5, "S0, nothing moves")
 
 
 def identify(dcs: "Dcs", phase: str, alpha_pa: float, valve: "ValveParameters") -> list[ComparedEstimate]:
