@@ -169,8 +169,12 @@ def parameter_vector(file: ValveFile, effects: Sequence[Effect], source: str) ->
     for late in (each for each in path[1:] if each.by_setpoint):
         raise InputError(source, f"effect {late.name} obeys a set point: it must stand before {path[0].name}")
     theta = [float(getattr(file.valve, name)) for name in BASE]
+    by_force = not file.valve.own.area
     for effect, table in zip(effects, file.effect, strict=True):
-        theta += effect.values(table.parameters, f"{source}: effect {table.name}")
+        written = table.parameters
+        if by_force:
+            written = {effect.declared(key): value for key, value in written.items()}
+        theta += effect.values(written, f"{source}: effect {table.name}")
     vector = np.array(theta)
     vector.flags.writeable = False
     return vector

@@ -222,15 +222,14 @@ class Effect:
         Raises:
             InputError: unknown, missing, not a number, or out of its range.
         """
-        written = {self._declared(key): value for key, value in written.items()}
         for key in written:
             if key not in self.parameters:
                 allowed = ", ".join(self.parameters) or "none"
                 raise InputError(source, f"{key}: unknown parameter of {self.name}; allowed: {allowed}")
         return tuple(self._value(key, written, source) for key in self.parameters)
 
-    def _declared(self, key: str) -> str:
-        """Return the name under which a parameter is declared: to a drive that a force moves, a command is a force."""
+    def declared(self, key: str) -> str:
+        """Return the name under which a drive's parameter is declared, its command being a force as well."""
         in_pa = (each for each in self.parameters if each.replace("_pa", "_n") == key)
         return key if key in self.parameters else next(in_pa, key)
 

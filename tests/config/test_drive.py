@@ -11,7 +11,7 @@ from config.exports.column_mapping import read_mapping
 from config.exports.export_preview import preview
 from config.historian_export import read_export
 from config.recording import Recording
-from config.valve_file import ValveParameters, load_valve
+from config.valve_file import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
 from config.writing import write_valve
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
@@ -87,6 +87,14 @@ def test_where_the_command_is_the_force_itself_no_factor_is_said(tmp_path: Path)
     write_valve(tmp_path / "again.toml", file)
     assert "area" not in (tmp_path / "again.toml").read_text()
     assert load_valve(tmp_path / "again.toml") == file
+
+
+def test_a_valves_command_is_no_force() -> None:
+    """Only where a force moves it may `supply_n` stand for `supply_pa`."""
+    table = EffectTable.model_validate({"name": "supply_limit", "supply_n": 2e5, "exhaust_pa": 0.0})
+    seed = load_valve(shipped_valve("seed")).valve
+    with pytest.raises(InputError, match="supply_n: unknown parameter of supply_limit"):
+        Composition.from_file(ValveFile(valve=seed, effect=(table,)))
 
 
 @pytest.mark.parametrize(
