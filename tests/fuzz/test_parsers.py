@@ -17,7 +17,7 @@ from tests.fuzz.inputs import near
 from tests.fuzz.parser import Parser
 
 PARSERS = {**bus_parsers(), **file_parsers()}
-FEWEST, MOST = 30, 400
+FEWEST, MOST = 30, 1000
 LONGEST_S = 1.0
 """Of work for one input, on a busy machine too."""
 MOST_MEMORY_KB = 300_000

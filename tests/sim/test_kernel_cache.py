@@ -39,6 +39,7 @@ def probed(cache: Path, count: int = 1) -> list[tuple[str, str]]:
     command = [sys.executable, "-c", PROBE]
     probes = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(count)]
     said = [process.communicate()[0].split() for process in probes]
+    assert [process.returncode for process in probes] == [0] * count
     return [(numba, position) for numba, position in said]
 
 
