@@ -25,7 +25,7 @@ from workbench.report.page import (
     text,
     write_without_plots,
 )
-from workbench.report.units import Shown, length
+from workbench.report.units import OF_VALVE, Shown
 
 WIDTH_PX, HEIGHT_PX, RADIUS_PX = 120, 24, 2
 LEAST_RATIO, MOST_RATIO = 1.0, 100.0
@@ -89,10 +89,10 @@ def _drill_down(rank: int, course: ValveCourse, report: str | None) -> Html:
     assert course.gravest
     entry, found = course.gravest
     history = [
-        Row((each.time.date().isoformat(), each.recording, _outcome(came), length(came.error_before_m)))
+        Row((each.time.date().isoformat(), each.recording, _outcome(came), OF_VALVE.length(came.error_before_m)))
         for each, came in course.examined
     ]
-    tried = [Row((each.name, length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
+    tried = [Row((each.name, OF_VALVE.length(each.held_out_m), each.remark or "accepted")) for each in found.candidates]
     models = [Row((f"{each.when:%Y-%m-%d}", each.recording, each.found.sentence)) for each in course.models]
     command = f"positioner diagnose {entry.recording} --valve {entry.file} --report {course.name}.html"
     return folded(

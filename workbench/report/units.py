@@ -48,11 +48,6 @@ class Shown:
     si: str = ""
 
 
-def length(value_m: float | None, *, sign: bool = False) -> Shown:
-    """Show a length in mm."""
-    return OF_VALVE.length(value_m, sign=sign)
-
-
 def force(value_n: float | None) -> Shown:
     """Show a force in N."""
     return Shown("–") if value_n is None or not isfinite(value_n) else Shown(f"{value_n:.4g}", f"{value_n:.6g} N")

@@ -18,7 +18,7 @@ from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
-from workbench.report.units import OF_VALVE, length
+from workbench.report.units import OF_VALVE
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.extension import Extension, extension_of
 
@@ -199,9 +199,8 @@ class SearchPanel:
             if diagnosis.experiment is not None:
                 ui.label(f"An experiment would tell them apart: {diagnosis.experiment.name}.")
             for number, step in enumerate(diagnosis.steps, start=1):
-                ui.label(f"step {number}: {length(step.before.errors.test_rmse_m).text} mm held out before").classes(
-                    "quiet"
-                )
+                before = OF_VALVE.said(step.before.errors.test_rmse_m)
+                ui.label(f"step {number}: {before} held out before").classes("quiet")
                 self._candidates(diagnosis, number, may_add=may_add)
 
     def _candidates(self, diagnosis: Diagnosis, number: int, *, may_add: bool) -> None:
