@@ -16,7 +16,7 @@ from config.loading import validated
 from config.valve_file import ValveFile, ValveParameters
 from sim.effect import SHIPPED, Effect, find_effect
 from sim.karnopp import MEMORY, Vector
-from sim.kernel import Kernel, QuasiStaticKernel, kernel, quasi_static_kernel
+from sim.kernel import EitherKernel, Kernel, QuasiStaticKernel, kernel, quasi_static_kernel
 
 BASE = (
     "mass_kg",
@@ -91,6 +91,14 @@ class Composition:
         """Set a state at rest, by whichever kernel is there."""
         self._either.rest(theta, state, time_s, position_m, command_pa)
 
+    def begin(
+        self, theta: Vector, time_s: float, position_m: float, velocity_m_per_s: float, command_pa: float
+    ) -> Vector:
+        """Return the state, (state_size,), of `sim.karnopp.begin`, by whichever kernel is there."""
+        state = np.zeros(self.state_size)
+        self._either.begin(theta, state, time_s, position_m, velocity_m_per_s, command_pa)
+        return state
+
     def balance_n(self, theta: Vector, landings: Vector, arriving_m_per_s: float, speed_m_per_s: float) -> Vector:
         """Return F_e, F_c and F_s, N, (landings, 3), of a stem that has slid to each of the landings, (landings, 7).
 
@@ -102,9 +110,9 @@ class Composition:
         return forces_n
 
     @property
-    def _either(self) -> Kernel | QuasiStaticKernel:
+    def _either(self) -> EitherKernel:
         """Whichever kernel is there."""
-        found: Kernel | QuasiStaticKernel = self._compiled.get("quasi-static") or self.kernel
+        found: EitherKernel = self._compiled.get("quasi-static") or self.kernel
         return found
 
     def _kernel(self, name: str, compiled: Callable[[Sequence[Effect]], T]) -> T:

@@ -424,6 +424,36 @@ def rest(theta: Vector, state: Vector, time: float, position: float, command: fl
     write(state, Condition(time, position, 0.0, p, STUCK, 0.0, indicated))
 
 
+def begin(theta: Vector, state: Vector, time: float, shown: float, velocity: float, command: float) -> None:
+    """Set the state: a sensor shows this position, at this velocity.
+
+    The pressure is the nearest to the command, long held, with which the forces of the bare valve are in balance.
+    """
+    valve = karnopp(theta)
+    x = shown
+    for _ in range(CORRECTIONS):
+        rest(theta, state, time, x, equilibrium(valve, x, velocity, command))
+        off = shown - read(state).indicated
+        if off == 0.0:
+            break
+        x += off
+    if velocity != 0.0:
+        now = read(state)
+        sigma = 1.0 if velocity > 0.0 else -1.0
+        write(state, Condition(now.t, now.x, velocity, now.p, SLIP, sigma, now.indicated))
+
+
+def equilibrium(valve: Karnopp, x: float, v: float, command: float) -> float:
+    """Return the pressure, Pa, nearest to a command with which the forces are in balance.
+
+    At rest |A p - k_s x| <= F_s; in motion A p = k_s x + F_v v + F_c sign v.
+    """
+    middle = valve.k_s * x + valve.F_v * v
+    if v != 0.0:
+        return (middle + (valve.F_c if v > 0.0 else -valve.F_c)) / valve.A
+    return min(max(command, (middle - valve.F_s) / valve.A), (middle + valve.F_s) / valve.A)
+
+
 def carry(
     valve: Karnopp,
     now: Condition,

@@ -1,10 +1,11 @@
 """Compiles the bare valve with a set of effects in their places into one kernel, cached across processes.
 
-The laws, `karnopp.py`, are compiled once, with their places open; a kernel's own text is what fills these: each
-effect's functions called in the order in which the effects are listed. Both texts are written to a cache folder under
-their own SHA-256. The laws' head holds the digests of the elements that effects share, of this file and of those that
-compile, and the numba version; a kernel's head those of the laws and of the effects' texts. A change in any of them is
-another name, so that an old kernel is never taken for a new one; what is compiled is the very text that was hashed.
+The laws, `karnopp.py` and what goes with it, are compiled once, with their places open; a kernel's own text is what
+fills these: each effect's functions called in the order in which the effects are listed. Both texts are written to a
+cache folder under their own SHA-256. The laws' head holds the digests of the elements that effects share, of this file
+and of those that compile, and the numba version; a kernel's head those of the laws and of the effects' texts. A change
+in any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text
+that was hashed.
 Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a processor, so that
 numba is started, and LLVM translates, only where a kernel is new.
 
@@ -25,55 +26,67 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sim import karnopp, machine_code, quasi_static
+from sim import karnopp, machine_code, misfit, quasi_static
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
 from sim.kernel_source import SHARED, kernel_source
 from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, is_bitcode, loaded, processor, translated
 
 BASE = Path(karnopp.__file__)
+MISFIT = Path(misfit.__file__)
 SLOW = Path(quasi_static.__file__)
 COMPILER = Path(__file__).with_name("kernel_compiler.py")
 WRITABLE_BY_OTHERS = 0o022
 KARNOPP_IMPORT = re.compile(r"^from sim\.karnopp import \([^)]*\)\n", re.MULTILINE)
 """What stands in one text with `karnopp.py` need not be imported from it."""
 BITCODE = ".bc"
-AT_REST: Mapping[str, tuple[int, ...]] = {
+EITHER: Mapping[str, tuple[int, ...]] = {
     "rest": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER),
+    "begin": (VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, NUMBER),
     "balance": (VECTOR, VECTOR, MATRIX, NUMBER, NUMBER, MATRIX),
+    "compare": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR),
 }
 """Entries with and without inertia."""
 ENTRIES: Mapping[str, tuple[int, ...]] = {
-    **AT_REST,
+    **EITHER,
     "respond": (VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, MATRIX),
+    "misfit": (
+        *(VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER),
+        *(MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR),
+    ),
 }
 SLOW_ENTRIES: Mapping[str, tuple[int, ...]] = {
-    **AT_REST,
+    **EITHER,
     "glide": (VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, MATRIX),
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Kernel:
-    """`rest`, `balance` and `respond` of `karnopp.py`, compiled with the effects in their places."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EitherKernel:
+    """`rest`, `begin` and `balance` of `karnopp.py`, `compare` of `misfit.py`, with the effects in their places."""
 
     digest: str
+    state_size: int
+    rest: Entry[Vector, Vector, float, float, float]
+    begin: Entry[Vector, Vector, float, float, float, float]
+    balance: Entry[Vector, Vector, Vector, float, float, Vector]
+    compare: Entry[Vector, Vector, Vector, Vector, Vector]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kernel(EitherKernel):
+    """The same and `respond` of `karnopp.py`, `misfit` of `misfit.py`."""
+
     bitcode: bytes = field(repr=False)
     """LLVM's, of the functions as `sim.machine_code` calls them."""
-    state_size: int
-    rest: Entry[Vector, Vector, float, float, float]
-    balance: Entry[Vector, Vector, Vector, float, float, Vector]
     respond: Entry[Vector, Vector, Vector, Vector, float, float, Vector]
+    misfit: Entry[Vector, Vector, Vector, Vector, float, float, Vector, Vector, Vector, Vector, Vector, Vector]
 
 
-@dataclass(frozen=True, slots=True)
-class QuasiStaticKernel:
-    """`rest` and `balance` of `karnopp.py`, `glide` of `quasi_static.py`, compiled with the effects in their places."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuasiStaticKernel(EitherKernel):
+    """The same and `glide` of `quasi_static.py`."""
 
-    digest: str
-    state_size: int
-    rest: Entry[Vector, Vector, float, float, float]
-    balance: Entry[Vector, Vector, Vector, float, float, Vector]
     glide: Entry[Vector, Vector, Vector, Vector, Vector, float, Vector]
 
 
@@ -83,8 +96,8 @@ def kernel(effects: Sequence[Effect]) -> Kernel:
     Raises:
         InputError: an effect's function is not what numba can compile; names its file.
     """
-    digest, bitcode, compiled = _of(effects, BASE.read_text(encoding="utf-8"), ENTRIES)
-    return Kernel(digest, bitcode, _state_size(effects), **compiled)
+    digest, bitcode, compiled = _of(effects, (BASE, MISFIT), ENTRIES)
+    return Kernel(digest=digest, bitcode=bitcode, state_size=_state_size(effects), **compiled)
 
 
 def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
@@ -93,10 +106,8 @@ def quasi_static_kernel(effects: Sequence[Effect]) -> QuasiStaticKernel:
     Raises:
         InputError: as `kernel`.
     """
-    slow = KARNOPP_IMPORT.sub("", SLOW.read_text(encoding="utf-8"))
-    laws = "\n".join([BASE.read_text(encoding="utf-8"), slow])
-    digest, _, compiled = _of(effects, laws, SLOW_ENTRIES)
-    return QuasiStaticKernel(digest, _state_size(effects), **compiled)
+    digest, _, compiled = _of(effects, (BASE, MISFIT, SLOW), SLOW_ENTRIES)
+    return QuasiStaticKernel(digest=digest, state_size=_state_size(effects), **compiled)
 
 
 def _state_size(effects: Sequence[Effect]) -> int:
@@ -104,13 +115,14 @@ def _state_size(effects: Sequence[Effect]) -> int:
 
 
 def _of(
-    effects: Sequence[Effect], laws: str, entries: Mapping[str, tuple[int, ...]]
+    effects: Sequence[Effect], files: Sequence[Path], entries: Mapping[str, tuple[int, ...]]
 ) -> tuple[str, bytes, dict[str, Any]]:
     """Return the digest, the bitcode and the entries, by name, of the kernel of these laws and effects.
 
     The compiled entries are kept by the texts, for an effect that was edited is another one.
     """
-    laws = _with_head(laws)
+    texts = [KARNOPP_IMPORT.sub("", each.read_text(encoding="utf-8")) for each in files]
+    laws = _with_head("\n".join(texts))
     sources = tuple((each.path, each.source) for each in effects)
     return _compiled(laws, _text(effects, laws), sources, _state_size(effects), tuple(entries.items()))
 

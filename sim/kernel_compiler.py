@@ -30,7 +30,7 @@ OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
 """numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
 INNER: Mapping[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Of functions that only compiled ones call: to make them callable from Python would take a third of the time."""
-NOT_INLINED = ("bogacki_shampine", "push", "balanced", "breaks", "landed", "passed")
+NOT_INLINED = ("bogacki_shampine", "respond", "rest", "push", "balanced", "breaks", "landed", "passed")
 """Left to the compiler to inline: large, and called from several places."""
 NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 PLACES: Mapping[str, Callable[..., Any]] = {

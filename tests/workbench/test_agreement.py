@@ -32,7 +32,7 @@ class MadeUp:
     def theta(self, z: Vector) -> Vector:
         return z
 
-    def residuals(self, z: Vector) -> Vector:
+    def residuals(self, z: Vector, scale: float = FINAL) -> Vector:
         apart = z - BEST
         if apart[0] > 0.5 * self._second:
             apart = apart - [self._second, 0.0, 0.0]
@@ -45,9 +45,6 @@ class MadeUp:
 
     def least(self, places: Iterable[Vector], scale: float = FINAL) -> Vector:
         return min(places, key=lambda z: self.cost(z, scale))
-
-    def keep(self, z: Vector, residuals: Vector, scale: float) -> None:
-        """Keep nothing: a residual costs next to nothing."""
 
     def jacobian(self, z: Vector, here: Vector, step: float) -> Vector:
         return np.array([(self.residuals(z + step * each) - here) / step for each in np.eye(3)]).T
@@ -94,7 +91,7 @@ def test_a_search_goes_over_stairs_that_no_derivative_sees() -> None:
 class Rounded(MadeUp):
     """The same, each residual rounded to 20: stairs run across all coordinates."""
 
-    def residuals(self, z: Vector) -> Vector:
+    def residuals(self, z: Vector, scale: float = FINAL) -> Vector:
         return np.asarray(self._noise + 20.0 * np.round(self._slopes @ (z - BEST) / 20.0))
 
 

@@ -10,7 +10,7 @@ from sim.karnopp import Vector
 from tests.workbench.valves import SLIM, creeping, record_of
 from workbench.data.motion import Directions, slips
 from workbench.data.record import Record, ready
-from workbench.fit.objective import SimulationError
+from workbench.fit.objective import SimulationError, soft
 from workbench.fit.uncertainty import uncertainty
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -31,8 +31,9 @@ class Straight(SimulationError):
         self.lower, self.upper = np.array([-5.0]), np.array([5.0])
         self._slope, self._wrong = slope, wrong
 
-    def residuals(self, z: Vector) -> Vector:
-        return np.asarray(self._wrong + self._slope * z[0])
+    def compared(self, z: Vector, scale: float, limit: float) -> tuple[Vector, float]:
+        apart = np.asarray(self._wrong + self._slope * z[0])
+        return apart, soft(apart, scale)
 
     def by_slips(self, *_: object) -> "Straight":
         return self

@@ -62,8 +62,7 @@ def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
     def residuals(there: Vector) -> Vector:
         nonlocal latest
         if latest[0] != there.tobytes():
-            latest = there.tobytes(), error.residuals(there)
-            error.keep(there, latest[1], stage.scale)
+            latest = there.tobytes(), error.residuals(there, stage.scale)
         return latest[1]
 
     def jacobian(there: Vector) -> NDArray[np.float64]:

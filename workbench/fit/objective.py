@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sim.composition import Composition
 from sim.karnopp import Vector
+from sim.misfit import Judge
 from workbench.fit.breaking_off import go_on
 from workbench.model.free_run import FINE, ROUGH, Accuracy, FreeRun
 from workbench.model.multiple_shooting import MultipleShooting
@@ -45,9 +46,10 @@ class SimulationError:
         """Of the record that are judged, (count,)."""
         whole = rows.size == len(record)
         self._rows = slice(None) if whole else rows
-        self._measured_m = record.position_m
-        self._counted = None if whole else run.judged & record.valid
+        self._measured_m = np.full(len(record), np.nan)
+        self._measured_m[rows] = record.position_m[rows]
         self.sigma_m = record.scale_m or 1e-6 * composition.valve.stroke_m
+        self._unit_m, self._inside_m = self.sigma_m, 0.0
         self._hopeless_m = HOPELESS * composition.valve.stroke_m
         self._theta = np.array(theta)
         self._costs: dict[tuple[bytes, float], float] = {}
@@ -92,48 +94,34 @@ class SimulationError:
         z = np.array([each.coordinate(theta) for each in self.parameters])
         return np.asarray(np.clip(z, self.lower, self.upper))
 
-    def residuals(self, z: Vector) -> Vector:
-        """Return r, one a valid sample."""
+    def compared(self, z: Vector, scale: float, limit: float) -> tuple[Vector, float]:
+        """Return r, one a valid sample, and what they cost by a scale; r is not whole where that is the limit."""
         go_on()
-        apart_m = self.run.position_m(self.simulated(z))[self._rows] - self._measured_m[self._rows]
-        return self.weighed(self._bounded_m(apart_m))
+        judge = Judge(self._unit_m, self._inside_m, self._hopeless_m, scale, limit)
+        errors, cost = self.run.misfit(self.simulated(z), self._measured_m, judge)
+        return errors[self._rows], cost
 
     def simulated(self, z: Vector) -> Vector:
         """Return the parameter vector that is simulated for z."""
         return self.theta(z)
 
-    def weighed(self, apart_m: Vector) -> Vector:
-        """Return r of simulated less measured positions, m."""
-        return np.asarray(apart_m / self.sigma_m)
-
-    def _bounded_m(self, apart_m: Vector) -> Vector:
-        if not apart_m.size or (apart_m.max() < self._hopeless_m and apart_m.min() > -self._hopeless_m):
-            return apart_m
-        return np.where(np.isnan(apart_m), self._hopeless_m, np.clip(apart_m, -self._hopeless_m, self._hopeless_m))
+    def residuals(self, z: Vector, scale: float = FINAL) -> Vector:
+        """Return r, one a valid sample; what they cost by a scale is kept."""
+        errors, cost = self.compared(z, scale, inf)
+        self._costs[z.tobytes(), scale] = cost
+        return errors
 
     def cost(self, z: Vector, scale: float = FINAL) -> float:
         """Return the soft-L1 cost, half a sum of squares for small residuals; once worked out it is kept."""
-        key = (z.tobytes(), scale)
-        if key not in self._costs:
-            self._costs[key] = soft(self.residuals(z), scale)
-        return self._costs[key]
+        return self.cost_below(z, inf, scale)
 
     def cost_below(self, z: Vector, limit: float, scale: float = FINAL) -> float:
-        """Return the cost where it is below a limit, else infinity: a run is given up as soon as it has come to that.
-
-        The cost only grows along the record. What is compared with a best so far mostly shows early that it is worse.
-        """
+        """Return the cost where it is below a limit, else infinity; a run that has come to the limit is given up."""
         key = (z.tobytes(), scale)
         if key not in self._costs:
-            go_on()
-            cost = 0.0
-            for rows, position_m in self.run.stretches(self.simulated(z)):
-                apart_m = position_m - self._measured_m[rows]
-                if self._counted is not None:
-                    apart_m = apart_m[self._counted[rows]]
-                cost += soft(self.weighed(self._bounded_m(apart_m)), scale)
-                if cost >= limit:
-                    return inf
+            _, cost = self.compared(z, scale, limit)
+            if cost >= limit:
+                return inf
             self._costs[key] = cost
         return self._costs[key] if self._costs[key] < limit else inf
 
@@ -151,10 +139,6 @@ class SimulationError:
             if cost < limit:
                 best = sorted([*best, (cost, z)], key=itemgetter(0))[:count]
         return [z for _, z in best]
-
-    def keep(self, z: Vector, residuals: Vector, scale: float) -> None:
-        """Keep the cost at z, of residuals that were worked out elsewhere."""
-        self._costs[z.tobytes(), scale] = soft(residuals, scale)
 
     def screened(self, pool: Iterable[Vector], count: int) -> list[Vector]:
         """Return the best of a pool, by the middling scale's cost of the rough simulation."""
@@ -194,18 +178,13 @@ class Unrounded(SimulationError):
         self._index = quantum.index
         quantum_m = float(theta[quantum.index])
         self._measured_m = quantum_m * np.round(self._measured_m / quantum_m)
-        self._inside_m = INSIDE * quantum_m
+        self._unit_m, self._inside_m = SHARPER * self.sigma_m, INSIDE * quantum_m
 
     def simulated(self, z: Vector) -> Vector:
         """Return the parameter vector at z without rounding."""
         theta = self.theta(z)
         theta[self._index] = 0.0
         return theta
-
-    def weighed(self, apart_m: Vector) -> Vector:
-        """Return r of simulated positions less the measured quanta, m."""
-        outside_m = np.maximum(np.abs(apart_m) - self._inside_m, 0.0)
-        return np.asarray(np.sign(apart_m) * outside_m / (SHARPER * self.sigma_m))
 
 
 def smoothed(error: SimulationError, z: Vector) -> SimulationError:

@@ -25,7 +25,6 @@ a slide ended in are judged.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
@@ -37,7 +36,8 @@ from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, Composition
-from sim.karnopp import SLIP, Vector, read, write
+from sim.karnopp import Vector, equilibrium, karnopp, read, write
+from sim.misfit import AT_ONCE, Judge
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
 from sim.quasi_static import FREE
 from workbench.data.record import Mask, Record
@@ -47,7 +47,6 @@ from workbench.model.initial_state import (
     InitialState,
     before_start,
     broke_loose_pa,
-    equilibrium_pa,
     held,
     initial_state,
     landed_pa,
@@ -72,10 +71,6 @@ FINE = Accuracy(1.0, 3e-4)
 """Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
 ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
-LOOKS = (0.25, 0.5)
-"""Parts of a stretch without a gap after which somebody looks whether it is worth while to go on."""
-MOST_CORRECTIONS = 3
-"""Of the stem at the start, until the model indicates what was measured there."""
 CASCADE = 16
 """Steps to a sample where effects of the pressure path with a memory follow each other, without inertia."""
 JUDGED = 10
@@ -110,6 +105,8 @@ class Segment(NamedTuple):
     """Between its samples, s."""
     step_s: float
     """Longest of the integration, s."""
+    shots: Vector
+    """Periods before which the stem is put back, and to where it is shown then, m, (shots, 2)."""
 
 
 class FreeRun:
@@ -188,25 +185,32 @@ class FreeRun:
             indicated_m[first:end] = path[INDICATED]
         return indicated_m
 
-    def stretches(self, theta: Vector) -> Iterator[tuple[slice | npt.NDArray[np.int64], Column]]:
-        """Simulate stretch by stretch: the rows, and the indicated position there, m, as `position_m` has it."""
+    def misfit(self, theta: Vector, measured_m: Column, judge: Judge) -> tuple[Column, float]:
+        """Simulate and compare with positions, m, (n,), as `sim.misfit` does: r, (n,), and what they cost.
+
+        Rows without a position, or not judged, hold nothing. A run is given up once it costs the limit.
+        """
+        errors, cost, by = np.empty(len(self.record)), np.zeros(1), np.array(judge)
         if self.by.slow:
             for glided, path in self._glides(theta):
-                yield glided.judged, path[INDICATED, glided.at]
-            return
-        vector = np.array(theta[self._kept])
+                apart = np.empty(glided.judged.size)
+                shown_m = path[INDICATED, glided.at]
+                self._composition.quasi_static.compare(shown_m, measured_m[glided.judged], by, apart, cost)
+                errors[glided.judged] = apart
+                if cost[0] >= judge.limit:
+                    break
+            return errors, float(cost[0])
+        vector, path = np.array(theta[self._kept]), np.empty((PATH_ROWS, AT_ONCE + 1))
         for each in self._segments:
             drive_pa, state = self._started(vector, each)
-            count = each.periods_s.size
-            looks = sorted({0, count, *(round(part * count) for part in LOOKS)})
-            for at, over in pairwise(looks):
-                path = np.empty((PATH_ROWS, over - at + 1))
-                held = slice(at, over)
-                self._composition.kernel.respond(
-                    vector, state, drive_pa[held], each.periods_s[held], each.step_s, self._tolerance, path
-                )
-                known = 1 if at else 0  # the first row is the last of the stretch before
-                yield slice(each.first + at + known, each.first + over + 1), path[INDICATED, known:]
+            rows = slice(each.first, each.end)
+            self._composition.kernel.misfit(
+                *(vector, state, drive_pa, each.periods_s, each.step_s, self._tolerance),
+                *(each.shots, path, measured_m[rows], by, errors[rows], cost),
+            )
+            if cost[0] >= judge.limit:
+                break
+        return errors, float(cost[0])
 
     def _glides(self, theta: Vector) -> Iterator[tuple["SlowSegment", Vector]]:
         """Simulate each segment without inertia: it, and what the kernel writes, (5, rows kept)."""
@@ -261,7 +265,8 @@ class FreeRun:
         A path without a dead band reaches then what is a straight line in what it begins with: two show it.
         """
         begin = lead.begin
-        nearest_pa = equilibrium_pa(theta, begin.position_m, begin.velocity_m_per_s, float(lead.drive_pa[0]))
+        valve = karnopp(theta)
+        nearest_pa = equilibrium(valve, begin.position_m, begin.velocity_m_per_s, float(lead.drive_pa[0]))
         if not lead.before.leaves or begin.velocity_m_per_s:
             return nearest_pa
         middle_pa = landed_pa(theta, begin.position_m, 0)
@@ -270,7 +275,7 @@ class FreeRun:
             return nearest_pa
         loose_pa = broke_loose_pa(theta, begin.position_m, lead.before.leaves, 0.0)
         share = (loose_pa - reached_pa[0]) / (reached_pa[1] - reached_pa[0])
-        return equilibrium_pa(theta, begin.position_m, 0.0, middle_pa + share * (nearest_pa - middle_pa))
+        return equilibrium(valve, begin.position_m, 0.0, middle_pa + share * (nearest_pa - middle_pa))
 
     def _led(self, theta: Vector, lead: Lead, begin_pa: float, periods: int, step_s: float) -> tuple[Vector, float]:
         """Return the state after so many periods of a lead, the stem held, and the pressure amid the last one, Pa."""
@@ -299,18 +304,7 @@ class FreeRun:
         return float(0.5 * (pressure_pa[-1] + pressure_pa[-2]) - pressure_pa[0])
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
-        stem_m = begin.position_m
-        for _ in range(MOST_CORRECTIONS):
-            held_pa = equilibrium_pa(theta, stem_m, begin.velocity_m_per_s, pressure_pa)
-            state = at_rest(self._composition, theta, time_s, stem_m, held_pa)
-            off_m = begin.position_m - read(state).indicated
-            if off_m == 0.0:
-                break
-            stem_m += off_m
-        if begin.velocity_m_per_s:
-            direction = float(np.sign(begin.velocity_m_per_s))
-            write(state, read(state)._replace(v=begin.velocity_m_per_s, mode=SLIP, sigma=direction))
-        return state
+        return self._composition.begin(theta, time_s, begin.position_m, begin.velocity_m_per_s, pressure_pa)
 
 
 class SlowSegment(NamedTuple):
@@ -387,7 +381,7 @@ def _segment(
     step_s = checked_step(min(float(periods_s.max()), longest_s))
     begin = initial_state(record, first, end, moving=not by_setpoint)
     before = before_start(record, first, end, begin.position_m) if by_setpoint else None
-    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, step_s)
+    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, step_s, np.empty((0, 2)))
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:

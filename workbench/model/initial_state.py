@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.errors import InputError
-from sim.composition import AREA, COULOMB, SPRING, STATIC, VISCOUS
+from sim.composition import AREA, COULOMB, SPRING, STATIC
 from sim.karnopp import Vector
 from workbench.data.record import Record
 
@@ -85,15 +85,6 @@ def before_start(record: Record, first: int, end: int, place_m: float) -> Before
     if not left.size or rows[left[0]] == first:
         return BeforeStart(0, 0, 0)
     return BeforeStart(0, int(np.sign(off_m[left[0]])), int(rows[left[0]] - first))
-
-
-def equilibrium_pa(theta: Vector, position_m: float, velocity_m_per_s: float, command_pa: float) -> float:
-    """Return the pressure, Pa, nearest to a command with which the forces are in balance; theta, (parameters,)."""
-    middle_n = theta[SPRING] * position_m + theta[VISCOUS] * velocity_m_per_s
-    if velocity_m_per_s:
-        return float((middle_n + theta[COULOMB] * np.sign(velocity_m_per_s)) / theta[AREA])
-    least_pa, most_pa = ((middle_n + sign * theta[STATIC]) / theta[AREA] for sign in (-1.0, 1.0))
-    return float(min(max(command_pa, least_pa), most_pa))
 
 
 def landed_pa(theta: Vector, position_m: float, came: int) -> float:

@@ -10,14 +10,14 @@ Pressure and the effects' memories go on as simulated: they are not measured. It
 """
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from math import nan
 
 import numpy as np
 
-from config.recording import Column
 from sim.composition import Composition
-from sim.karnopp import STUCK, Vector, read, write
-from sim.open_loop import INDICATED, PATH_ROWS
+from sim.karnopp import Vector
+from sim.misfit import put_back
+from sim.open_loop import PATH_ROWS
 from workbench.data.motion import slips
 from workbench.data.record import Mask, Record
 from workbench.model.free_run import FINE, Accuracy, FreeRun
@@ -25,13 +25,6 @@ from workbench.model.sampling import Sampling
 
 LONGEST_MEAN = 10
 """Samples at the end of a rest that are averaged at most: a stem that creeps has been elsewhere before."""
-
-
-class Shot(NamedTuple):
-    """Where the run is put back: row of the record, and the indicated position there, m."""
-
-    row: int
-    position_m: float
 
 
 class MultipleShooting(FreeRun):
@@ -54,7 +47,7 @@ class MultipleShooting(FreeRun):
         part: int | None = None,
     ) -> None:
         super().__init__(composition, record, from_pressure=from_pressure, accuracy=accuracy, by=by)
-        self._shots = [_shots(record, each.first, each.end) for each in self._segments]
+        self._segments = [each._replace(shots=_shots(record, each.first, each.end)) for each in self._segments]
         self._part = part
 
     @property
@@ -63,30 +56,25 @@ class MultipleShooting(FreeRun):
         rows = super().judged
         if self._part is not None:
             begins = np.zeros(rows.size, np.int64)
-            begins[[shot.row + 1 for shots in self._shots for shot in shots]] = 1
+            for each in self._segments:
+                begins[each.first + 1 + each.shots[:, 0].astype(np.int64)] = 1
             rows &= np.cumsum(begins) % 2 == self._part
         return rows
 
-    def stretches(self, theta: Vector) -> Iterator[tuple[slice, Column]]:
-        """Simulate slip by slip: the rows, and the indicated position there, m."""
-        for first, end, path in self._paths(theta):
-            yield slice(first, end), path[INDICATED]
-
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
         vector = np.array(theta[self._kept])
-        for each, shots in zip(self._segments, self._shots, strict=True):
+        for each in self._segments:
             drive_pa, state = self._started(vector, each)
-            at, known = each.first, 0  # but for the first, a row stands in the path before
-            for shot in (*shots, None):
-                over = shot.row if shot else each.end - 1
+            at, known = 0, 0  # but for the first, a row stands in the path before
+            for period, shown_m in (*each.shots.tolist(), (each.periods_s.size, nan)):
+                over = int(period)
                 path = np.empty((PATH_ROWS, over - at + 1))
-                held = slice(at - each.first, over - each.first)
+                held = slice(at, over)
                 self._composition.kernel.respond(
                     vector, state, drive_pa[held], each.periods_s[held], each.step_s, self._tolerance, path
                 )
-                yield at + known, over + 1, path[:, known:]
-                if shot:
-                    _put_back(state, shot.position_m)
+                yield each.first + at + known, each.first + over + 1, path[:, known:]
+                put_back(state, shown_m)
                 at, known = over, 1
 
 
@@ -95,21 +83,17 @@ def slips_from_rest(record: Record) -> int:
     return sum(len(_shots(record, first, end)) for first, end in record.segments)
 
 
-def _shots(record: Record, first: int, end: int) -> list[Shot]:
-    """Return where the rests of a stretch without a gap end, rows first to end (half open)."""
+def _shots(record: Record, first: int, end: int) -> Vector:
+    """Return the periods before which the stem is put back, and where it is shown then, m, (shots, 2).
+
+    They are where the rests of a stretch without a gap end, rows first to end (half open).
+    """
     position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
     found, rest = [], 0
     for slip in slips(position_m, record.scale_m):
         # Velocities are taken over two samples to either side: at its first row the stem still rests.
         at_rest_m = position_m[max(rest, slip.first + 1 - LONGEST_MEAN) : slip.first + 1]
         if slip.first > rest + 1 and not np.isnan(at_rest_m).all():
-            found.append(Shot(first + slip.first, float(np.nanmean(at_rest_m))))
+            found.append((slip.first, np.nanmean(at_rest_m)))
         rest = slip.last
-    return found
-
-
-def _put_back(state: Vector, position_m: float) -> None:
-    """Put the stem at rest to where the sensor indicates a position, m."""
-    now = read(state)
-    stem_m = now.x + position_m - now.indicated
-    write(state, now._replace(x=stem_m, v=0.0, mode=STUCK, sigma=0.0, indicated=position_m))
+    return np.array(found, np.float64).reshape(-1, 2)

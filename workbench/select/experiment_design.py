@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -382,8 +383,10 @@ class _Held(SimulationError):
 
     def of_record(self, z: Vector) -> Vector:
         """Return the residuals in the answer alone."""
-        return super().residuals(z)
+        return super().compared(z, FINAL, inf)[0]
 
-    def residuals(self, z: Vector) -> Vector:
+    def compared(self, z: Vector, scale: float, limit: float) -> tuple[Vector, float]:
         """Return those, and what moving the parameters costs."""
-        return np.concatenate([self.of_record(z), self._root @ (z - self.middle)])
+        errors, cost = super().compared(z, scale, limit)
+        moved = self._root @ (z - self.middle)
+        return np.concatenate([errors, moved]), cost + soft(moved, scale)
