@@ -4,7 +4,7 @@
     answer    0x580 + n    the same; specifier 0x80: refused, the data says why
 
 canopen makes and reads the frames; they are sent and awaited here, in the calling thread. An answer that names another
-object than the request is not taken for its answer. Nodes that share a node id show by answers beyond the requests; so
+object than the request, or is of another kind, is not taken for its answer: other masters ask the node, too. Nodes that share a node id show by answers beyond the requests; so
 that a slow node's answers to an earlier session are not counted, `open` lets them go by first.
 """
 
@@ -38,10 +38,11 @@ RESERVED = range(0x0400, 0x1000)
 """Indices at which CiA 301 lets no node have an object."""
 UNNAMED = bytes(3)
 """What some nodes say for the object that they refuse."""
-DOWNLOAD_REQUEST, UPLOAD_REQUEST = 0x20, 0x40
-UPLOAD_ANSWER, DOWNLOAD_ANSWER, ABORT = 0x40, 0x60, 0x80
+DOWNLOAD_REQUEST, UPLOAD_REQUEST, ABORT = 0x20, 0x40, 0x80
 SPECIFIER = 0xE0
 """The bits of the first byte that say which kind of request or answer it is."""
+ANSWERS = {DOWNLOAD_REQUEST: 0x60, UPLOAD_REQUEST: 0x40, 0x00: 0x20, 0x60: 0x00}
+"""The kind of answer to each kind of request: the first two name their object, their further segments do not."""
 REALS = (0x08, 0x11)
 """Data types REAL32 and REAL64."""
 
@@ -264,10 +265,8 @@ class SdoTransfers:
             if answer is None:
                 continue
             self._answers += 1
-            names_object = answer[0] & SPECIFIER in (UPLOAD_ANSWER, DOWNLOAD_ANSWER, ABORT)
-            asks_object = request[0] & SPECIFIER in (DOWNLOAD_REQUEST, UPLOAD_REQUEST)
-            if names_object and asks_object and answer[1:4] != request[1:4]:
-                continue  # the answer to another request
+            if not _answers(request, answer):
+                continue
             if answer[0] == ABORT:
                 raise SdoAbortedError(struct.unpack_from("<I", answer, 4)[0])
             return answer
@@ -325,6 +324,14 @@ class SdoTransfers:
             return Refused(f"{self._bus.who}: {NodeEvent.SDO_ABORT}: {where}: {error}", error.code)
         said = f"{where}: {error} within {1e3 * self._timeout_s:g} ms"
         return self._bus.fault(NoReply, NodeEvent.SDO_TIMEOUT, said)
+
+
+def _answers(request: bytes, answer: bytes) -> bool:
+    """Return whether it answers this request: of its kind, or a refusal, and of the object asked for."""
+    kind = request[0] & SPECIFIER
+    if answer[0] != ABORT and answer[0] & SPECIFIER != ANSWERS.get(kind):
+        return False
+    return kind not in (DOWNLOAD_REQUEST, UPLOAD_REQUEST) or answer[1:4] == request[1:4]
 
 
 class _Client(SdoClient):

@@ -264,6 +264,26 @@ def test_an_answer_to_nothing_asked_is_never_taken_for_another(driver: CanopenDr
     recovers(driver, node)
 
 
+def test_what_another_master_is_told_of_the_same_object_does_not_confirm_a_write(
+    driver: CanopenDriver, node: Scripted
+) -> None:
+    """The answer to its read names the object that is written, and is of another kind."""
+    driver.open()
+    entry = driver._config.map.command_pa
+    read = b"\x43" + struct.pack("<HB", entry.index, entry.subindex) + struct.pack("<f", 99e3)
+
+    def told_too(identity: int, data: bytes) -> list[tuple[int, bytes]]:
+        confirms = identity == ANSWER and data[0] == 0x60
+        return [(ANSWER, read), (identity, data)] if confirms else [(identity, data)]
+
+    node.fault = told_too
+    driver._sdo.set(entry, PUSH_PA)
+    node.fault = lambda identity, data: [(ANSWER, read)] if data[0] == 0x60 else [(identity, data)]
+    driver._sdo._timeout_s = 0.1
+    with pytest.raises(NoReply, match="no answer"):
+        driver._sdo.set(entry, PUSH_PA)
+
+
 def test_every_request_answered_twice_is_two_nodes(driver: CanopenDriver, node: Scripted) -> None:
     node.fault = lambda identity, data: [(identity, data)] * (2 if identity == ANSWER else 1)
     assert "answers to" in fails(BadReply, NodeEvent.NODE_ID_TAKEN, driver.open)
