@@ -159,6 +159,17 @@ EXPLAINED = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M)
 """The valve as it is, at the floor: nothing is left to explain."""
 
 
+def test_what_acts_too_rarely_to_show_in_what_was_held_out_is_suspected() -> None:
+    rarely = off_by(1.0, EXPLAINED, "dwell_stiction", 0.9 * AT_FLOOR)
+    step = judged(EXPLAINED, dwell_stiction=rarely, ip_lag=EXPLAINED)
+    assert step.added is None
+    assert [each.name for each in step.suspected] == ["dwell_stiction"]
+    worse = model_of("dwell_stiction", cost=0.9 * AT_FLOOR, error_m=1.3 * FLOOR_M)
+    assert judged(EXPLAINED, dwell_stiction=worse).suspected == (), "what was held out speaks against it"
+    barely = off_by(1.0, EXPLAINED, "dwell_stiction", 1.19 * AT_FLOOR)
+    assert judged(EXPLAINED, dwell_stiction=barely).suspected == ()
+
+
 def test_what_nothing_proves_beside_a_valve_that_explains_all_is_suspected_and_no_more() -> None:
     assert EXPLAINED.explained
     between = 0.5 * (LEAST_STANDARD_ERRORS + AT_THE_FLOOR)

@@ -15,6 +15,8 @@ from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import BlockErrors, relative_error_reduction
 
 LEAST_BIC = 10.0
+OVERWHELMING_BIC = 10.0 * LEAST_BIC
+"""Of independent samples; suspected whatever was held out, for an effect that acts rarely need not show there."""
 LEAST_REDUCTION = 0.05
 LEAST_STANDARD_ERRORS, AT_THE_FLOOR = 2.0, 3.0
 """More where the error is at the floor: of twenty candidates one falls by two deviations by pure chance."""
@@ -31,6 +33,11 @@ class Gain:
     """The same in its own standard errors."""
     independent_share: float
     """Share of the samples that are independent: the evidence is worth so much of `bic`."""
+
+    @property
+    def overwhelming(self) -> bool:
+        """Whether the fitted part leaves no doubt, and what was held out does not speak against it."""
+        return self.independent_share * self.bic > OVERWHELMING_BIC and self.held_out >= 0.0
 
     def rejection_reason(self, at_floor: bool) -> str:
         """Say what the candidate lacks to be accepted; empty if nothing.

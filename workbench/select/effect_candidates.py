@@ -198,9 +198,10 @@ def _better_than(equivalent: EffectCandidate, candidates: Sequence[EffectCandida
 
 
 def _suspect(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]) -> EffectCandidate | None:
-    """Return what has the most evidence of all that would be accepted if more were left to explain."""
-    passing = _passing(candidates, at_floor=False)
-    return max((each for each in passing if _may_be_there(each, library)), key=_evidence, default=None)
+    """Return what has the most evidence: of all that would be accepted if more were left, or that have overwhelming."""
+    overwhelming = [each for each in candidates if each.gain and each.gain.overwhelming]
+    suspects = [*_passing(candidates, at_floor=False), *overwhelming]
+    return max((each for each in suspects if _may_be_there(each, library)), key=_evidence, default=None)
 
 
 def _rivals(
