@@ -5,8 +5,8 @@
 
 canopen makes and reads the frames; they are sent and awaited here, in the calling thread. An answer that names another
 object than the request, or is of another kind, is not taken for its answer: other masters ask the node, too. Nodes that
-share a node id show by answers beyond the requests; so that a slow node's answers to an earlier session are not counted,
-`open` lets them go by first.
+share a node id show by answers beyond the requests; so that a slow node's answers to an earlier session are not
+counted, `open` lets them go by first.
 """
 
 import math
