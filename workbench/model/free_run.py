@@ -37,7 +37,7 @@ from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, Composition
 from sim.karnopp import Vector, equilibrium, karnopp, read, write
-from sim.misfit import AT_ONCE, Judge
+from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
 from sim.quasi_static import FREE
 from workbench.data.record import Mask, Record
@@ -225,15 +225,22 @@ class FreeRun:
             yield each, path
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
-        """Simulate each segment: its rows and what the kernel writes, (5, rows)."""
+        """Simulate each segment, from shot to shot: its rows and what the kernel writes, (5, rows)."""
         vector = np.array(theta[self._kept])
         for each in self._segments:
             drive_pa, state = self._started(vector, each)
-            path = np.empty((PATH_ROWS, each.end - each.first))
-            self._composition.kernel.respond(
-                vector, state, drive_pa, each.periods_s, each.step_s, self._tolerance, path
-            )
-            yield each.first, each.end, path
+            shown_m = {int(period): float(to_m) for period, to_m in each.shots}
+            at, known = 0, 0  # but for the first, a row stands in the path before
+            for over in (*shown_m, each.periods_s.size):
+                if known:
+                    put_back(state, shown_m[at])
+                path = np.empty((PATH_ROWS, over - at + 1))
+                held = slice(at, over)
+                self._composition.kernel.respond(
+                    vector, state, drive_pa[held], each.periods_s[held], each.step_s, self._tolerance, path
+                )
+                yield each.first + at + known, each.first + over + 1, path[:, known:]
+                at, known = over, 1
 
     def _started(self, theta: Vector, segment: Segment) -> tuple[Vector, Vector]:
         """Return the pressures of a segment's periods, Pa, and the state that it begins with."""

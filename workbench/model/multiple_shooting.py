@@ -9,15 +9,10 @@ smooth in all that a slip shows by its course: friction over velocity, damping, 
 Pressure and the effects' memories go on as simulated: they are not measured. It judges nothing: it sees positions.
 """
 
-from collections.abc import Iterator
-from math import nan
-
 import numpy as np
 
 from sim.composition import Composition
 from sim.karnopp import Vector
-from sim.misfit import put_back
-from sim.open_loop import PATH_ROWS
 from workbench.data.motion import slips
 from workbench.data.record import Mask, Record
 from workbench.model.free_run import FINE, Accuracy, FreeRun
@@ -60,22 +55,6 @@ class MultipleShooting(FreeRun):
                 begins[each.first + 1 + each.shots[:, 0].astype(np.int64)] = 1
             rows &= np.cumsum(begins) % 2 == self._part
         return rows
-
-    def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
-        vector = np.array(theta[self._kept])
-        for each in self._segments:
-            drive_pa, state = self._started(vector, each)
-            at, known = 0, 0  # but for the first, a row stands in the path before
-            for period, shown_m in (*each.shots.tolist(), (each.periods_s.size, nan)):
-                over = int(period)
-                path = np.empty((PATH_ROWS, over - at + 1))
-                held = slice(at, over)
-                self._composition.kernel.respond(
-                    vector, state, drive_pa[held], each.periods_s[held], each.step_s, self._tolerance, path
-                )
-                yield each.first + at + known, each.first + over + 1, path[:, known:]
-                put_back(state, shown_m)
-                at, known = over, 1
 
 
 def slips_from_rest(record: Record) -> int:
