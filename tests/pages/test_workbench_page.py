@@ -135,6 +135,7 @@ def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Pa
         assert error_mm(page) < 0.01 * given_mm
         page.get_by_test_id("back").click()
         expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
+        expect(page.get_by_test_id("comparison")).to_be_focused()  # which would close a list that is open already
 
         # Of several that do as well any may be added.
         diagnosed(page, "preload", "sensor_offset")
