@@ -2,7 +2,8 @@
 
     r_i = (simulated_i - measured_i) / sigma,    cost_s = sum s^2 (sqrt(1 + (r_i / s)^2) - 1)       soft L1 of scale s
 
-The wide scales do with a simulation of longer steps (`rough`); what is compared in the end is always the fine one.
+The wide scales do with a simulation of longer steps, and fewer rows (`rough`); what is compared in the end is always
+the fine one.
 """
 
 from collections.abc import Iterable
@@ -20,6 +21,7 @@ from workbench.fit.breaking_off import go_on
 from workbench.model.free_run import FINE, ROUGH, Accuracy, FreeRun
 from workbench.model.multiple_shooting import MultipleShooting
 from workbench.model.parameters import Parameter
+from workbench.model.thinning import thinned
 
 FINAL, MIDDLE = 5.0, 30.0
 """Scales, in sigma: of the cost by which fits are compared, and of that by which starts are chosen."""
@@ -58,12 +60,11 @@ class SimulationError:
 
     @cached_property
     def rough(self) -> "SimulationError":
-        """The same over a simulation of longer steps; itself where steps are of a sample."""
+        """The same over a simulation of longer steps, by fewer rows; itself where steps are of a sample."""
         if self.run.by.slow:
             return self
-        run = FreeRun(
-            self.composition, self.run.record, from_pressure=self.run.from_pressure, accuracy=ROUGH, by=self.run.by
-        )
+        record = thinned(self.run.record, self.composition.valve)
+        run = FreeRun(self.composition, record, from_pressure=self.run.from_pressure, accuracy=ROUGH, by=self.run.by)
         return self.over(run)
 
     def by_slips(self, accuracy: Accuracy = FINE, part: int | None = None) -> "SimulationError":

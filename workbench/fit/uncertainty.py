@@ -210,9 +210,12 @@ class _Curve:
     def _below(self, i: int, way: float, distance: float) -> bool:
         """Whether the cost stays below the limit: moved alone, along the valley, or there with the others refitted."""
         alone, there = self._moved(i, way * distance)
-        return any(self.error.cost(each) < self.limit for each in (there, alone)) or any(
-            self.error.cost(self._given_way(i, each)) < self.limit for each in (there, alone)
+        return any(map(self._is_below, (there, alone))) or any(
+            self._is_below(self._given_way(i, each)) for each in (there, alone)
         )
+
+    def _is_below(self, z: Vector) -> bool:
+        return self.error.cost_below(z, self.limit) < self.limit
 
     def _within_scatter(self, i: int, distance: float) -> bool:
         """Whether what it costs to go so far, on the average of both ways, is no more than its scatter allows."""
@@ -259,10 +262,16 @@ class _Curve:
     def _given_way(self, i: int, z: Vector) -> Vector:
         """Return z after one step of Gauss and Newton by the other coordinates, with the derivatives of the minimum."""
         others = np.arange(z.size) != i
-        residuals = self.weights * self.error.residuals(z)
+        Q, R = self._reduced
         move = np.zeros(z.size)
-        move[others] = np.linalg.lstsq(self.J[:, others], -residuals, rcond=1e-10)[0]
+        move[others] = np.linalg.lstsq(R[:, others], -Q.T @ (self.weights * self.error.residuals(z)), rcond=1e-10)[0]
         return self._clipped(z + np.clip(move, -FARTHEST, FARTHEST))
+
+    @cached_property
+    def _reduced(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """J = Q R: least squares by some columns of R are those by the same of J."""
+        Q, R = np.linalg.qr(self.J)
+        return Q, R
 
     def _direction(self, i: int) -> Vector:
         """Return the move of all coordinates per unit of the i-th."""

@@ -197,7 +197,7 @@ def diagnose(
             if on_preview:
                 on_preview(scores)
             steps = search.steps(base)
-            base, best = search.with_intervals(steps[0].before), search.with_intervals(_last(steps))
+            base, best = search.with_intervals((steps[0].before, _last(steps)))
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
             chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):

@@ -200,9 +200,15 @@ class EffectSearch:
         rivals = tuple(each for each in step.indistinguishable if each.name in own | as_good)
         return replace(step, indistinguishable=rivals)
 
-    def with_intervals(self, model: EvaluatedModel) -> EvaluatedModel:
-        """Return a model with the profile intervals of its parameters."""
-        return replace(model, fit=profiled(model.fit, self._split.train.recording))
+    def with_intervals(self, models: Sequence[EvaluatedModel]) -> tuple[EvaluatedModel, ...]:
+        """Return models with the profile intervals of their parameters; equal ones once."""
+
+        def found(model: EvaluatedModel) -> EvaluatedModel:
+            return replace(model, fit=profiled(model.fit, self._split.train.recording))
+
+        different = list({id(each): each for each in models}.values())
+        by_model = dict(zip(map(id, different), on_threads(found, different, self._workers), strict=True))
+        return tuple(by_model[id(each)] for each in models)
 
     def experiment(self, steps: Sequence[EffectStep]) -> Experiment | None:
         """Choose the input for the first set with more than one class: one valve of each class."""
