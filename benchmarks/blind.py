@@ -4,6 +4,7 @@
     dirty      the same with pressure noise, break-away jitter and 12 bits
     nothing    no effect, clean and dirty in turn
     two        two effects, clean
+    two_dirty  two effects, dirty
     removed    one effect, clean, taken out of the library: the right verdict is "unexplained"
     others     what `tests/workbench/generators.py` makes: other integrators and friction laws, what the library has
     outside    the same, what the library lacks
@@ -37,7 +38,8 @@ SEEDS: Mapping[str, range] = {
     "clean": range(71000, 71160),
     "dirty": range(72000, 72140),
     "nothing": range(73000, 73010),
-    "two": range(74000, 74010),
+    "two": range(74000, 74020),
+    "two_dirty": range(76000, 76016),
     "removed": range(75000, 75008),
     "others": range(2660, 2672),
     "outside": range(2780, 2792),
@@ -70,8 +72,8 @@ def problem(family: str, seed: int) -> Problem:
     """Make the case of a family with a seed."""
     if family in {"others", "outside"}:
         return _other(family, seed)
-    count = {"nothing": 0, "two": 2}.get(family, 1)
-    dirty = family == "dirty" or (family == "nothing" and seed % 2 == 1)
+    count = {"nothing": 0, "two": 2, "two_dirty": 2}.get(family, 1)
+    dirty = family in {"dirty", "two_dirty"} or (family == "nothing" and seed % 2 == 1)
     made = hide(seed, effects=count, dirty=dirty)
     hidden = tuple(each.name for each in made.truth.effect)
     library = [name for name in tried_effects() if family != "removed" or name not in _same(hidden[0])]
@@ -194,7 +196,7 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         yield share("the bare valve by another name: nothing named", [not each["missing"] for each in same])
     yield share("true effect first, or in the set with it", [first(each) for each in known])
     yield share("true effect named", [any(named(each, name) for name in each["hidden"]) for each in known])
-    if family == "two":
+    if family in {"two", "two_dirty"}:
         yield share("both named", [all(named(each, name) for name in each["hidden"]) for each in known])
     ones = [each for each in known if single(each)]
     yield share("one alone named: right", [first(each) for each in ones])
