@@ -8,7 +8,7 @@ It defines
     class Parameters(NamedTuple)    each field an Annotated[float, Parameter(text, least, most)], unit in its name
     MEMORY = n                      number of its state variables, if it has any
     STEP_S = h                      longest step over which its memory comes out well, s; FINE_STEP_S if not given, and
-                                    any step without a memory
+                                    any step without a memory; what `straight` cuts it by comes on top of that
     LOOKS = text                    what it looks like in a record
     AFTER = name                    effect that a search tries first: this one only where that has evidence and leaves
                                     something to explain
@@ -29,6 +29,10 @@ With a memory it also defines
 
     start      sets the memory for a valve long at rest, signal being what enters it (at the stem: x, and F_e, N, too)
     advance    carries the memory over a step h, s, during which the signal goes from before to after
+
+In the pressure path it may also define
+
+    straight   for how long, at most h, s, what leaves it goes straight from t on, while u enters it: a step ends there
 
 What undoes it stands beside its equation, for a daemon that is given the extended valve (`sim.static_inverse`); an
 effect without it is refused there. It is one of
@@ -82,6 +86,8 @@ UPKEEP: Mapping[str, tuple[str, ...]] = {
     "advance": ("before", "after", "h", *EVERYWHERE),
 }
 """What keeps a memory, and the arguments it may name."""
+CUTS: Mapping[str, tuple[str, ...]] = {"straight": ("u", "h", *EVERYWHERE)}
+"""What cuts a step, and the arguments it may name."""
 AT_STEM = ("force", "friction", "motion")
 FINE_STEP_S = 2.5e-4
 """For a memory of which nothing is known."""
@@ -337,7 +343,7 @@ def read_effect(path: Path) -> Effect:
 def _declared(path: Path, source: str) -> Effect:
     namespace: dict[str, Any] = {"__name__": path.stem}
     execute(source, path, namespace)
-    allowed = {**PLACES, **UPKEEP}
+    allowed = {**PLACES, **UPKEEP, **CUTS}
     if any(place in namespace for place in AT_STEM):
         allowed["start"] = ("F_e", *UPKEEP["start"])
     functions = {name: tuple(inspect.signature(namespace[name]).parameters) for name in allowed if name in namespace}
@@ -435,6 +441,8 @@ def _check_places(effect: Effect) -> None:
         raise InputError(str(effect.path), f"{alone.pop()} must be an effect's only place, got {', '.join(places)}")
     if any((name in effect.functions) != (effect.memory > 0) for name in UPKEEP):
         raise InputError(str(effect.path), "start and advance belong with MEMORY = 1 or more: all three or none")
+    if "straight" in effect.functions and "pressure" not in places:
+        raise InputError(str(effect.path), f"straight belongs in the pressure path, got {', '.join(places)}")
 
 
 def _check_step(effect: Effect) -> None:

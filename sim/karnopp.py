@@ -15,9 +15,10 @@
                                                      drop, both laws point at the border -> it creeps at v = sigma dz
 
 x stem position, m; v velocity, m/s; p actuator pressure, Pa; t time, s; the command u, Pa, is held over a period.
-A period is cut into equal steps h. Over a step the pressure goes straight from its start to its end value; inside it
-every change of mode is found to h / 2^30, and the motion is integrated by Bogacki and Shampine's pair of orders
-3 and 2, the sub-step halved until the pair agrees on v to tolerance (|v| + v_s), TOLERANCE unless another is asked for.
+A period is cut into equal steps h, and these where the pressure jumps or bends (`straight`). Over a step it goes
+straight from its start to its end value; inside it every change of mode is found to h / 2^30, and the motion is
+integrated by Bogacki and Shampine's pair of orders 3 and 2, the sub-step halved until the pair agrees on v to
+tolerance (|v| + v_s), TOLERANCE unless another is asked for.
 The Stribeck slope near v_s grows deviations at up to 0.86 (F_s - F_c) / (m v_s), 7e5 1/s on the seed's valve: there the
 sub-steps are some 0.1 us; away from it one sub-step is one step.
 
@@ -469,15 +470,19 @@ def carry(
     n = 1 if duration <= longest_step else ceil(duration / longest_step - 1e-6)
     h = duration / n
     for i in range(n):
-        t0, x0 = t + i * h, x
-        p0, p = pressure(command, h, Stem(t0, x, v, p), q, z)
-        x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / h), h, x, v, mode, sigma, tolerance, q, z)
-        x, v = settle(valve, Stem(t0 + h, x, v, p), q, z)
-        if v == 0.0:
-            mode = STUCK
-        stem = Stem(t0 + h, x, v, p)
-        remember(x0, h, stem, q, z)
-        indicated = sensor(x0, h, stem, q, z)
+        t0, left = t + i * h, h
+        while left > 0.0:
+            s, x0 = straight(command, left, Stem(t0, x, v, p), q, z), x
+            p0, p = pressure(command, s, Stem(t0, x, v, p), q, z)
+            x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, q, z)
+            x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
+            if v == 0.0:
+                mode = STUCK
+            t0 += s
+            left -= s
+            stem = Stem(t0, x, v, p)
+            remember(x0, s, stem, q, z)
+            indicated = sensor(x0, s, stem, q, z)
     return Condition(t + duration, x, v, p, mode, sigma, indicated)
 
 
@@ -555,6 +560,11 @@ def start_pressure(u: float, stem: Stem, q: Any, z: Any) -> float:
 def start_stem(F_e: float, stem: Stem, q: Any, z: Any) -> float:
     """Set the memories at the stem and of the sensor for a stem at rest; return the indicated position."""
     return stem.x
+
+
+def straight(u: float, h: float, stem: Stem, q: Any, z: Any) -> float:
+    """Return for how long, at most h, the actuator pressure goes straight with the command held."""
+    return h
 
 
 def pressure(u: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:

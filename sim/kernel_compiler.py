@@ -36,6 +36,7 @@ NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
 PLACES: Mapping[str, Callable[..., Any]] = {
     "start_pressure": karnopp.start_pressure,
     "start_stem": karnopp.start_stem,
+    "straight": karnopp.straight,
     "pressure": karnopp.pressure,
     "pressure_ends": quasi_static.pressure_ends,
     "force": karnopp.force,

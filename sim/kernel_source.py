@@ -37,6 +37,14 @@ def kernel_source(effects: Sequence[Effect]) -> str:
             lines += [f"{signal} = {call(place, i, **{signal: signal})}"]
         return lines
 
+    def until_bent() -> list[str]:
+        cutting = [i for i in at["pressure"] if "straight" in effects[i].functions]
+        lines = []
+        for i in at["pressure"] if cutting else []:
+            lines += [f"h = {call('straight', i, u='start', h='h')}"] if i in cutting else []
+            lines += [f"start = {call('pressure', i, u='start', middle='stem.t + 0.5 * h')}"]
+        return lines
+
     def passed(place: str, signal: str, begins: str, middle: str | None, ends: str) -> list[str]:
         lines = []
         for i in at[place]:
@@ -61,6 +69,7 @@ def kernel_source(effects: Sequence[Effect]) -> str:
             _function("memories(state)", [], f"({_memories(effects)})"),
             _place("start_pressure(u, stem, q, z)", [], started("pressure", "u"), "u"),
             _place("start_stem(F_e, stem, q, z)", ["y = stem.x"], at_rest, "y"),
+            _place("straight(u, h, stem, q, z)", ["start = u"], until_bent(), "h"),
             _place("pressure(u, h, stem, q, z)", ["start, end = u, u"], through_pressure, "start, end"),
             _place("pressure_ends(u, h, stem, q, z)", ["start, end = u, u"], ends_of_pressure, "start, end"),
             _place("force(stem, q, z)", ["F = 0.0"], forces, "F"),

@@ -5,9 +5,10 @@
 T dead time, s; u entering pressure, p leaving pressure, Pa. What entered is kept as stretches of straight lines,
 (time, value, slope) each, in a ring of STRETCHES; a held command is one stretch. Stretches shorter than
 T / (STRETCHES - 1) are joined, so that the ring always reaches back to t - T: a command held for longer than that comes
-out exact. In a step during which one stretch follows another, p is held at its mean.
+out exact. A step ends where one stretch follows another.
 """
 
+from math import inf
 from typing import Annotated, NamedTuple
 
 from config.extended_valve import Inverse
@@ -15,14 +16,14 @@ from sim.effect import Memory, Parameter
 
 STRETCHES = 4096
 MEMORY = 2 + 3 * STRETCHES
-STEP_S = 2e-3
+STEP_S = inf
 COUNT, READ = 0, 1
 """Stretches written so far, and which of them was read last."""
 TIME, VALUE, SLOPE = 2, 2 + STRETCHES, 2 + 2 * STRETCHES
 """Where the columns of the ring begin."""
 LONG_AGO_S = -1e9
-NO_TIME = 1e-6
-"""Of half a step: a stretch that reaches no farther into it does not count."""
+NO_TIME_S = 1e-9
+"""A stretch that lasts no longer is over."""
 LOOKS = "Everything is late by the same time: after each change of the command nothing happens for T, then all of it."
 CONFOUNDED = {
     "ip_lag": "the first moments after a step: the dead time answers not at all, the lag at once",
@@ -45,32 +46,27 @@ def start(t: float, signal: float, z: Memory) -> None:
     z[SLOPE] = 0.0
 
 
+def straight(u: float, h: float, t: float, q: Parameters, z: Memory) -> float:
+    """Until the stretch that comes out ends; the newest one's successor begins now if u does not go on with it."""
+    T = q.dead_time_s
+    if T <= NO_TIME_S:
+        return h
+    k = stretch_at(t - T + NO_TIME_S, z)
+    lasts = h
+    if k < int(z[COUNT]) - 1:
+        lasts = z[TIME + (k + 1) % STRETCHES] - (t - T)
+    elif u != z[VALUE + k % STRETCHES] + z[SLOPE + k % STRETCHES] * (t - z[TIME + k % STRETCHES]):
+        lasts = T
+    return float(lasts) if lasts < h - NO_TIME_S else h
+
+
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
-    """Return p, its mean over the step if that is of more than one stretch."""
-    T, half = q.dead_time_s, abs(middle - t)
-    if T <= 0.0:
+    """Return p, of the stretch that comes out amid the step; u where that is not written down yet."""
+    T = q.dead_time_s
+    if max(NO_TIME_S, abs(middle - t)) >= T:
         return u
-    begins, ends, written = middle - half - T, middle + half - T, middle - half
-    k = stretch_at(begins + NO_TIME * half, z)
-    until = z[TIME + (k + 1) % STRETCHES] if k < int(z[COUNT]) - 1 else written
-    if until >= ends - NO_TIME * half:
-        k %= STRETCHES
-        return float(z[VALUE + k] + z[SLOPE + k] * (t - T - z[TIME + k]))
-    return mean(begins, ends, written, k, u, z)
-
-
-def mean(begins: float, ends: float, written: float, k: int, u: float, z: Memory) -> float:
-    """Return the mean of what entered between two times, from the k-th stretch on; after what is written, u."""
-    area, time = u * max(0.0, ends - written), begins
-    while time < min(ends, written):
-        until = min(ends, written)
-        if k < int(z[COUNT]) - 1:
-            until = min(until, float(z[TIME + (k + 1) % STRETCHES]))
-        here = k % STRETCHES
-        area += (until - time) * (z[VALUE + here] + z[SLOPE + here] * (0.5 * (time + until) - z[TIME + here]))
-        time = until
-        k += 1
-    return area / (ends - begins)
+    k = stretch_at(middle - T, z) % STRETCHES
+    return float(z[VALUE + k] + z[SLOPE + k] * (t - T - z[TIME + k]))
 
 
 def stretch_at(time: float, z: Memory) -> int:

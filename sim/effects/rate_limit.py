@@ -2,17 +2,20 @@
 
     p = u where that keeps   -r_v <= p' <= r_f,   else p goes towards u at the limit
 
-r_f filling rate, r_v venting rate, Pa/s; u entering pressure, p leaving pressure, Pa. Where p arrives within a step it
-is shown as the straight line with the same end and the same mean.
+r_f filling rate, r_v venting rate, Pa/s; u entering pressure, p leaving pressure, Pa. A step ends where p arrives at u;
+where u itself moves, p is shown as the straight line with the same end and the same mean.
 """
 
+from math import inf
 from typing import Annotated, NamedTuple
 
 from config.extended_valve import Inverse
 from sim.effect import Memory, Parameter
 
 MEMORY = 1
-STEP_S = 2e-3
+STEP_S = inf
+NO_TIME_S = 1e-9
+"""In which p has arrived."""
 UNLIMITED = 1e10
 """Pa/s, from which a jump is made at once."""
 LOOKS = (
@@ -57,6 +60,14 @@ class Parameters(NamedTuple):
 def start(signal: float, z: Memory) -> None:
     """Settled."""
     z[0] = signal
+
+
+def straight(u: float, h: float, q: Parameters, z: Memory) -> float:
+    """Until p is at u."""
+    way = u - z[0]
+    rate = q.filling_pa_per_s if way > 0.0 else q.venting_pa_per_s
+    arrives_s = abs(way) / rate
+    return float(arrives_s) if NO_TIME_S < arrives_s < h - NO_TIME_S and rate < UNLIMITED else h
 
 
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:

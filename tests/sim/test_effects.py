@@ -191,6 +191,7 @@ HEAD = "from typing import Annotated, NamedTuple\nfrom sim.effect import Paramet
         ("def force(speed): return speed", "force: unknown argument speed; allowed: t, x, v, p, q, z"),
         ("def sensor(y): return y\ndef force(x): return x", "sensor must be an effect's only place"),
         ("MEMORY = 1\ndef force(x): return x", "start and advance belong with MEMORY"),
+        ("def force(x): return x\ndef straight(h): return h", "straight belongs in the pressure path, got force"),
         ("STEP_S = 0\ndef force(x): return x", "STEP_S: must be a time in seconds above 0.0, got 0"),
         (
             "from typing import NamedTuple\nclass Parameters(NamedTuple):\n    k: float\ndef force(x): return x",

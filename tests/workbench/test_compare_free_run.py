@@ -9,11 +9,11 @@ import pytest
 from config.recording import Recording
 from sim.composition import Composition
 from sim.open_loop import respond
-from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
+from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, record_of, with_effect
 from workbench import compare
 from workbench.compare.comparison import as_json
 from workbench.data.record import ready
-from workbench.model.free_run import FINE, ROUGH, Accuracy, FreeRun
+from workbench.model.free_run import FINE, ROUGH, FreeRun
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -87,16 +87,28 @@ def test_segments_are_simulated_apart() -> None:
 
 
 @pytest.mark.parametrize(
-    "effect", [{}, {"name": "ip_lag", "time_constant_s": 0.05}, {"name": "backlash", "width_m": 1e-3}]
+    "effect",
+    [
+        {},
+        {"name": "ip_lag", "time_constant_s": 0.05},
+        {"name": "backlash", "width_m": 1e-3},
+        {"name": "dead_time", "dead_time_s": 0.0537},
+        {"name": "dead_time", "dead_time_s": 0.0037},
+        {"name": "rate_limit", "filling_pa_per_s": 213e3, "venting_pa_per_s": 391e3},
+    ],
 )
 def test_a_run_is_as_exact_as_it_says(effect: dict[str, Any]) -> None:
     bare = drawn_valve(np.random.default_rng(0))
     valve = with_effect(bare, **effect) if effect else bare
     record, composition = ready(record_of(valve, 0)), Composition.from_file(valve)
-    finest, fine, rough = (
-        FreeRun(composition, record, accuracy=each).position_m(composition.theta)
-        for each in (Accuracy(0.01 * FINE.steps, 0.01 * FINE.tolerance), FINE, ROUGH)
-    )
+    fine, rough = (FreeRun(composition, record, accuracy=each).position_m(composition.theta) for each in (FINE, ROUGH))
+    begin_m = float(FreeRun(composition, record).run(composition.theta).stem_m[0])
+    command_pa = record.command_pa
+    finest = respond(
+        *(composition, composition.theta, command_pa[:-1], PERIOD_S),
+        position_m=begin_m,
+        pressure_pa=float(command_pa[0]),
+    ).indicated_m
     assert np.std(fine - finest) < 5e-7
     assert np.max(np.abs(rough - finest)) < 5e-5
 
