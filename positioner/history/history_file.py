@@ -208,8 +208,9 @@ def require_tables(connection: sqlite3.Connection, path: Path) -> None:
         InputError: there are others.
         DatabaseError: it is damaged.
     """
-    there = {said for (said,) in connection.execute("SELECT sql FROM sqlite_master WHERE type = 'table'")}
-    if there != set(schema()):
+    # As bytes: of a damaged file they may be no text.
+    there = connection.execute("SELECT CAST(sql AS BLOB) FROM sqlite_master WHERE type = 'table'")
+    if {said for (said,) in there} != {each.encode() for each in schema()}:
         raise InputError(str(path), f"has other tables than a history of version {VERSION} has; move it away")
 
 
