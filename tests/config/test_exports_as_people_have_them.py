@@ -335,6 +335,7 @@ OPEN = rows(";", time=[str(i) for i in range(N)], pv=[f"{x:.3f}" for x in PV + 0
 STANDSTILL = rows(time=[f"12:00:{int(t):02d}" for t in T])
 OVERLAP = shuffled(rows(time=[f"{t + (0 if i < 30 else -7.27):.2f}" for i, t in enumerate(T)]), list(range(N)))
 
+
 def archived(name: str) -> bytes:
     """An archive of one empty file."""
     made = io.BytesIO()
