@@ -106,7 +106,7 @@ def _pressure_noise(generator: np.random.Generator, count: int, period_s: float)
 
 
 def refitted_rmse_m(trials: Sequence[Trial], answers: Sequence[Column], without: ValveFile) -> list[float]:
-    """Return the rms distance, m, of a valve refitted to the first trial from the true one's answers, trial by trial."""
+    """Return the rms distance, m, of a valve refitted to what the true one answers in the first trial, by trial."""
     known = Composition.from_file(without)
     first = trials[0]
 
