@@ -88,7 +88,8 @@ class State(NamedTuple):
 
 def inlined(function: Function) -> Function:
     """Compile what only compiled functions call; LLVM inlines it, where numba's own way compiles twice as long."""
-    compiled: Function = numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    options: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    compiled: Function = numba.njit(**options)(function)
     return compiled
 
 
