@@ -53,7 +53,7 @@ def case(seed: int) -> Line:
     found = list(refits(autumn, known))
     trial = Trial(bare.test.command_pa, PERIOD_S)
     least_m = [rms(_answer_m(trial, valve) - clean_m) for valve in (known, *(each.valve for each, _ in found))]
-    least_m += refitted_rmse_m([trial], truth, bare.truth)
+    least_m += refitted_rmse_m([trial], [_answer_m(trial, truth)], bare.truth)
     return {
         "seed": seed,
         "effect": name,

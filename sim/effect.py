@@ -253,17 +253,17 @@ class Effect:
 
 def shipped_effects() -> list[str]:
     """Return the names of the effects that come with the package."""
-    return sorted(path.stem for path in SHIPPED.glob("[!_]*.py"))
+    return sorted(each[:-3] for each in os.listdir(SHIPPED) if each.endswith(".py") and each[0] != "_")
 
 
 def tried_effects() -> list[str]:
     """Return the names of those of them that may be missing in a valve file: a positioner is there or not."""
-    return [name for name in shipped_effects() if not shipped_effect(name, "shipped effects").by_setpoint]
+    return [name for name in shipped_effects() if not _shipped(name).by_setpoint]
 
 
 def first_effects() -> list[str]:
     """Return the names of those of these that a search tries from the first."""
-    return [name for name in tried_effects() if not shipped_effect(name, "shipped effects").after]
+    return [name for name in tried_effects() if not _shipped(name).after]
 
 
 def shipped_effect(name: str, source: str) -> Effect:
@@ -274,6 +274,10 @@ def shipped_effect(name: str, source: str) -> Effect:
     """
     if name not in shipped_effects():
         raise InputError(source, f"no effect named {name!r}; there are: {', '.join(shipped_effects())}")
+    return _shipped(name)
+
+
+def _shipped(name: str) -> Effect:
     return read_effect(SHIPPED / f"{name}.py")
 
 

@@ -7,7 +7,7 @@ well. Other threads go on while one runs. No operations are fused: the numbers a
 
 import hashlib
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from ctypes import CFUNCTYPE, addressof, byref, c_double, c_int32, c_ssize_t, c_void_p, cast
 from functools import cache
 from itertools import count
@@ -27,6 +27,8 @@ FLOAT64 = np.dtype(np.float64)
 INTRINSIC = "llvm."
 UNREACHED = ("NRT_MemInfo_call_dtor", "NRT_Free")
 """What is named of numba's run time and never comes to: the arrays are numpy's, nothing is freed."""
+NOWHERE = (byref(c_void_p()), byref(c_void_p()))
+"""Where a result and an exception go, that nobody reads."""
 Arguments = TypeVarTuple("Arguments")
 _nothing = CFUNCTYPE(None, c_void_p)(lambda _: None)
 _libraries = count()
@@ -50,19 +52,17 @@ class Entry(Generic[*Arguments]):
 
     def __call__(self, *values: *Arguments) -> None:
         """Call it once."""
-        self.bound(*values)()
+        if self._function(*NOWHERE, *self._words(values)):
+            raise self._failed()
 
     def bound(self, *values: *Arguments) -> Callable[[], None]:
         """Return the call with these values, to be made many times: of arrays, with what is in them then."""
-        each: tuple[Any, ...] = values
-        words = [word for kind, value in zip(self._kinds, each, strict=True) for word in self._words(kind, value)]
-        result, exception = c_void_p(), c_void_p()
-        given = (byref(result), byref(exception), *words)
+        given = (*NOWHERE, *self._words(values))
         function = self._function
 
         def call(_kept: object = values) -> None:
             if function(*given):
-                raise RuntimeError(f"an effect failed in {self._name}")
+                raise self._failed()
 
         return call
 
@@ -70,20 +70,24 @@ class Entry(Generic[*Arguments]):
         """Return itself: nothing in it changes."""
         return self
 
-    def _words(self, kind: int, value: Any) -> tuple[Any, ...]:
-        if kind == NUMBER:
-            return (value,)
-        if value.dtype != FLOAT64 or value.ndim != kind or not value.flags.c_contiguous:
-            raise TypeError(f"{self._name} takes contiguous float64, not {value.dtype} of shape {value.shape}")
-        return (_begin(value), *value.shape)
+    def _words(self, values: Iterable[Any]) -> list[Any]:
+        words: list[Any] = []
+        for kind, value in zip(self._kinds, values, strict=True):
+            if kind == NUMBER:
+                words.append(value)
+                continue
+            try:  # numpy's own way to where an array begins takes five times as long, and a search asks for it often
+                begin = addressof(c_double.from_buffer(value))
+            except (TypeError, ValueError):  # it is not contiguous, may not be written to, or is empty
+                begin = int(value.ctypes.data) if value.flags.c_contiguous else 0
+            if not begin or value.dtype != FLOAT64 or value.ndim != kind:
+                raise TypeError(f"{self._name} takes contiguous float64, not {value.dtype} of shape {value.shape}")
+            words.append(begin)
+            words += value.shape
+        return words
 
-
-def _begin(array: Any) -> int:
-    """Return where an array begins; numpy's own way takes five times as long, and a search asks for it often."""
-    try:
-        return addressof(c_double.from_buffer(array))
-    except (TypeError, ValueError):  # it may not be written to, or is empty
-        return int(array.ctypes.data)
+    def _failed(self) -> RuntimeError:
+        return RuntimeError(f"an effect failed in {self._name}")
 
 
 def processor() -> str:

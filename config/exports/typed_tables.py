@@ -30,9 +30,13 @@ def workbook(path: Path, sheet: str | None = None) -> list[RawTable]:
     """
     if not zipfile.is_zipfile(path):
         raise InputError(str(path), "begins as a workbook and is not whole: copy it again")
-    with zipfile.ZipFile(path) as archive:
-        if "xl/workbook.xml" not in archive.namelist():
-            raise InputError(str(path), "is an archive and no Excel workbook: unpack it, or save it as .xlsx or CSV")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except Exception as error:  # its table of contents may be damaged in any way
+        raise InputError(str(path), f"is a damaged workbook: {first_line(error)}") from None
+    if "xl/workbook.xml" not in names:
+        raise InputError(str(path), "is an archive and no Excel workbook: unpack it, or save it as .xlsx or CSV")
     openpyxl = needed("openpyxl", str(path))
     try:
         with warnings.catch_warnings(action="ignore"):

@@ -13,12 +13,10 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-import can
-from can.typechecking import CanFilter
-
 from config.canopen_device import CanopenDevice
 from drivers.boundary import DriverError, NoConnection
 from drivers.canopen.events import NodeEvent
+from fieldbus.canopen.python_can import can
 
 log = logging.getLogger(__package__)
 
@@ -135,5 +133,5 @@ class NodeBus:
         return self.closing_fault(NoConnection, NodeEvent.BUS_OFF, " ".join(said.split()))
 
 
-def _filters(identities: Iterable[int]) -> list[CanFilter]:
+def _filters(identities: Iterable[int]) -> list[can.typechecking.CanFilter]:
     return [{"can_id": each, "can_mask": WHOLE_ID, "extended": False} for each in identities]

@@ -16,7 +16,6 @@ import struct
 import time
 from collections.abc import Mapping, Sequence
 
-import can
 from canopen.objectdictionary import ObjectDictionary, ODVariable
 
 from config.canopen_device import CanopenDevice, Entry
@@ -37,6 +36,7 @@ from drivers.canopen.node_bus import NodeBus
 from drivers.canopen.sdo import REALS, SdoTransfers, Setting, sheet_variable
 from drivers.canopen.watcher import NodeWatcher
 from fieldbus.canopen.objects import MOST_PDOS, Control, first_fit
+from fieldbus.canopen.python_can import can
 
 RPDO, TPDO = 0x1400, 0x1800
 """First communication records."""

@@ -12,12 +12,11 @@ import math
 import struct
 import time
 
-import can
-
 from config.canopen_device import CanopenDevice
 from drivers.boundary import NoConnection, NoReply
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import EMERGENCY, HEARTBEAT, NodeBus
+from fieldbus.canopen.python_can import can
 
 OPERATIONAL, PRE_OPERATIONAL, BOOT_UP = 5, 127, 0
 NMT_STATES = {0: "booting", 4: "STOPPED", 5: "OPERATIONAL", 127: "PRE-OPERATIONAL"}

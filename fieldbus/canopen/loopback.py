@@ -34,7 +34,7 @@ from contextlib import suppress
 from threading import Event, Lock, RLock
 from typing import Any
 
-import can
+from fieldbus.canopen.python_can import can
 
 log = logging.getLogger(__name__)
 

@@ -15,9 +15,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run until SIGTERM or Ctrl-C, which leave each valve in its configured safe state."""
     from config.daemon_file import load_valves
+
+    files = load_valves(
+        arguments.config
+    )  # before the daemon is loaded, which takes longer: most mistakes are in a file
     from positioner.cli.parts.extended_valves import extended_valve_of
     from positioner.daemon.service import serve
 
-    files = load_valves(arguments.config)
     source = str(arguments.config)
     return serve(files, arguments.config, [extended_valve_of(file, source) for file in files])

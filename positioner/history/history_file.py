@@ -34,6 +34,7 @@ WAL_PAGES = 128
 WAL_BYTES = 1 << 20
 """What it may come to with the largest change."""
 SECONDS_A_DAY = 86_400.0
+NO_TEXT = "what it calls its tables is no text"
 
 
 class HistoryFull(OSError):
@@ -208,8 +209,12 @@ def require_tables(connection: sqlite3.Connection, path: Path) -> None:
         InputError: there are others.
         DatabaseError: it is damaged.
     """
-    there = {said for (said,) in connection.execute("SELECT sql FROM sqlite_master WHERE type = 'table'")}
-    if there != set(schema()):
+    try:
+        # As bytes: in a damaged file they, and what is said of them, may be no text.
+        rows = connection.execute("SELECT CAST(sql AS BLOB) FROM sqlite_master WHERE type = 'table'").fetchall()
+    except UnicodeDecodeError:
+        raise sqlite3.DatabaseError(NO_TEXT) from None
+    if {said for (said,) in rows} != {each.encode() for each in schema()}:
         raise InputError(str(path), f"has other tables than a history of version {VERSION} has; move it away")
 
 
@@ -230,6 +235,9 @@ def _connected(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute(f"PRAGMA wal_autocheckpoint = {WAL_PAGES}").fetchall()
         connection.execute(f"PRAGMA journal_size_limit = {WAL_BYTES // 2}").fetchall()
+    except UnicodeDecodeError:
+        connection.close()
+        raise sqlite3.DatabaseError(NO_TEXT) from None
     except BaseException:
         connection.close()
         raise

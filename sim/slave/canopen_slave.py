@@ -5,13 +5,12 @@ from contextlib import suppress
 from pathlib import Path
 from threading import Event, Lock, Thread
 
-import can
-
 from config.canopen_device import SHIPPED_EDS, CanBus
 from config.errors import InputError
 from config.slave_file import CanopenBus, load_slave, valve_path
 from fieldbus.canopen.eds import read_eds
 from fieldbus.canopen.loopback import free_channel
+from fieldbus.canopen.python_can import can
 from sim.slave.canopen_node import CanopenNode
 from sim.slave.clocks import Clock, clock_of
 from sim.slave.modbus_slave import device_of

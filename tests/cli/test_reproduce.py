@@ -1,4 +1,7 @@
-"""The seed's scenario at a tenth of its sample rate: every printed form fails, the corrected ones do not."""
+"""The seed's scenario at a tenth of its sample rate: every printed form fails, the corrected ones do not.
+
+What of it asks for no fine samples, as what noise is and what the command writes, is seen at a fiftieth.
+"""
 
 import json
 import math
@@ -16,7 +19,7 @@ from positioner.paper.findings import CLAIMS, SeedFindings, findings
 from positioner.paper.formulas import Erratum, errata, largest_sample_pu, refusal_of_printed_static_friction
 from positioner.paper.scenario import HONEST_SINE, LITERAL, NONE, WHITE, Noise, ScenarioRun, run_scenario
 
-PERIOD_S = 1e-4
+PERIOD_S, COARSE_S = 1e-4, 5e-4
 FILE = load_valve(shipped_valve("seed"))
 STROKE_M = FILE.valve.stroke_m
 
@@ -105,13 +108,13 @@ def test_static_friction_as_printed_is_refused_in_a_valve_file() -> None:
 def test_a_sine_of_its_own_sample_rate_vanishes_and_one_in_rad_per_s_does_not(quiet: ScenarioRun) -> None:
     assert largest_sample_pu(LITERAL, quiet) < 1e-10
     assert largest_sample_pu(HONEST_SINE, quiet) == pytest.approx(0.01, rel=1e-3)
-    literal = run(LITERAL, PERIOD_S)
-    np.testing.assert_allclose(literal.measured_m, quiet.measured_m, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(literal.command_pa, quiet.command_pa, rtol=1e-6)
+    literal, none = run(LITERAL, COARSE_S), run(NONE, COARSE_S)
+    np.testing.assert_allclose(literal.measured_m, none.measured_m, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(literal.command_pa, none.command_pa, rtol=1e-6)
 
 
 def test_the_sine_is_measured_and_not_true(quiet: ScenarioRun) -> None:
-    noisy = run(HONEST_SINE, PERIOD_S)
+    noisy = run(HONEST_SINE, COARSE_S)
     sine_m = 0.01 * STROKE_M * np.sin(1e5 * noisy.time_s)
     np.testing.assert_allclose(noisy.measured_m - noisy.true_m, sine_m, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(quiet.measured_m, quiet.true_m)
@@ -147,25 +150,25 @@ def test_the_worst_reading_of_a_single_friction_value_is_no_better_than_the_last
 def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At a tenth of the seed's sample rate its trapezoidal solve misses a, b, c by 2 %, and the command says so."""
+    """At a fiftieth of the seed's sample rate its trapezoidal solve misses a, b, c, and the command says so."""
 
     def run_of(file: ValveFile, noise: Noise, period_s: float) -> ScenarioRun:
         assert file == FILE
         return run(noise, period_s)
 
     monkeypatch.setattr(scenario, "run_scenario", run_of)
-    monkeypatch.setattr(scenario, "SEED_PERIOD_S", PERIOD_S)
+    monkeypatch.setattr(scenario, "SEED_PERIOD_S", COARSE_S)
     monkeypatch.setattr(noise_table, "PERIODS_S", (1e-3,))
     words = ["reproduce", "--out", str(tmp_path / "figures"), "--json", str(tmp_path / "numbers.json"), "--seeds", "3"]
     assert main(words) == 1
-    assert "DOES NOT HOLD: claim a, noise none: 0.019, limit 0.01" in capsys.readouterr().out
+    assert "DOES NOT HOLD: claim a, noise none: 0.13, limit 0.01" in capsys.readouterr().out
     names = {f"seed-{name}.png" for name in ("fig3", "fig4", "fig5", "fig6", "fig7", "derivatives")}
     assert {path.name for path in (tmp_path / "figures").iterdir()} == names | {"noise-table.txt"}
     numbers = json.loads((tmp_path / "numbers.json").read_text())
     assert {"errata", "printed_static_friction_refused", "cases", "noise_table", "seconds"} == set(numbers)
     assert {"where", "quantity", "unit", "printed", "corrected", "true"} == set(numbers["errata"][0])
     said = [(case["noise"], case["period_s"]) for case in numbers["cases"]]
-    assert said == [(noise.name, PERIOD_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE.name, 1e-3)]
+    assert said == [(noise.name, COARSE_S) for noise in (NONE, LITERAL, HONEST_SINE, WHITE)] + [(WHITE.name, 1e-3)]
     for case in numbers["cases"]:
         assert [claim["claim"] for claim in case["claims"]] == list(CLAIMS)
         assert {"noise", "solved", "k", "k_over_c", "kept", "identified", "steps"} < set(case)

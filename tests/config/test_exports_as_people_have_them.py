@@ -7,6 +7,7 @@ import csv
 import datetime
 import io
 import re
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -334,6 +335,15 @@ OPEN = rows(";", time=[str(i) for i in range(N)], pv=[f"{x:.3f}" for x in PV + 0
 STANDSTILL = rows(time=[f"12:00:{int(t):02d}" for t in T])
 OVERLAP = shuffled(rows(time=[f"{t + (0 if i < 30 else -7.27):.2f}" for i, t in enumerate(T)]), list(range(N)))
 
+
+def archived(name: str) -> bytes:
+    """An archive of one empty file."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        archive.writestr(name, "")
+    return made.getvalue()
+
+
 REFUSED = {
     "nothing": Bad(b"", "holds no samples: it is empty"),
     "blank lines": Bad(b"\n \n\n", "holds no samples"),
@@ -484,6 +494,9 @@ REFUSED = {
         ("time_s=t", "position_m=PV", "command_pa=OUT"),
     ),
     "a truncated workbook": Bad(b"PK\x03\x04" + b"\x00" * 100, "begins as a workbook and is not whole"),
+    "a workbook whose contents are damaged": Bad(
+        archived("xl/workbook.xml").replace(b"PK\x01\x02", b"PK\x01\x00", 1), "is a damaged workbook"
+    ),
     "a truncated Parquet file": Bad(b"PAR1" + b"\x15" * 100, "is a damaged Parquet file"),
     "a truncated MATLAB file": Bad(
         b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM\x0e\x00\x00", "damaged MATLAB file|no vectors"

@@ -1,7 +1,9 @@
 """The law for small moves: on the seed's valve in virtual time, and on stems that do what valves must not."""
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -39,6 +41,8 @@ class Late:
         self.device, self.command_pa = device, device.command_pa
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # of a copy that is being made
+            raise AttributeError(name)
         return getattr(self.device, name)
 
     def tick(self, command_pa: float) -> None:
@@ -102,8 +106,30 @@ def made(loop: Loop, steps_pu: tuple[float, ...], seconds: float = 0.5) -> tuple
     return np.array(errors), np.array(overshoots)
 
 
+@cache
+def _identified(noise_pu: float) -> Loop:
+    return Loop("breakaway", noise_pu)
+
+
+def identified(noise_pu: float) -> Loop:
+    """Return a loop of the ordinary valve, identified once."""
+    return deepcopy(_identified(noise_pu))
+
+
+@cache
+def _stepped(noise_pu: float) -> Loop:
+    loop = identified(noise_pu)
+    made(loop, STEPS_PU[:3])
+    return loop
+
+
+def stepped(noise_pu: float) -> Loop:
+    """Return one that has made three steps."""
+    return deepcopy(_stepped(noise_pu))
+
+
 def test_small_steps_end_where_they_should() -> None:
-    errors, overshoots = made(Loop("breakaway", 1e-4), STEPS_PU, 0.4)
+    errors, overshoots = made(identified(1e-4), STEPS_PU, 0.4)
     assert np.mean(errors <= 1e-3) >= 0.95
     assert errors.max() <= 3e-3
     assert overshoots.max() < 3e-3
@@ -116,14 +142,13 @@ def test_the_seeds_law_does_not_make_them() -> None:
 
 
 def test_small_steps_under_ten_times_the_noise() -> None:
-    errors, _ = made(Loop("breakaway", 1e-3), STEPS_PU[:12])
+    errors, _ = made(identified(1e-3), STEPS_PU[:12])
     assert np.mean(errors <= 2.5e-3) >= 0.95
 
 
 @pytest.mark.parametrize("noise_pu", [1e-4, 1e-3])
 def test_at_rest_nothing_happens(noise_pu: float) -> None:
-    loop = Loop("breakaway", noise_pu)
-    made(loop, STEPS_PU[:3])
+    loop = stepped(noise_pu)
     loop.run(1.0)
     position_pu, command_pa = loop.run(2.0)
     assert np.ptp(command_pa) == 0.0
@@ -149,8 +174,7 @@ def test_effects_that_the_law_does_not_know_leave_it_stable(effect: dict[str, ob
 
 def test_a_reference_that_moves_on_is_followed() -> None:
     """A ramp in steps shorter than a move takes: the last one counts."""
-    loop = Loop("breakaway", 1e-4)
-    made(loop, STEPS_PU[:3])
+    loop = stepped(1e-4)
     for index in range(60):
         loop.step_to(0.6 + 5e-4 * index)
         loop.run(0.01)
@@ -160,8 +184,7 @@ def test_a_reference_that_moves_on_is_followed() -> None:
 
 
 def test_a_stem_that_something_else_moves_is_brought_back() -> None:
-    loop = Loop("breakaway", 1e-4)
-    made(loop, STEPS_PU[:3])
+    loop = stepped(1e-4)
     at = loop.decision.reference_m
     loop.valve.rest_at(at + 0.01 * STROKE_M, loop.valve.pressure_pa)
     loop.run(0.5)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import pytest
 
@@ -73,21 +73,33 @@ def wrong_name(name: str) -> str | None:
     return None if is_there(name) else "no such module or name in it"
 
 
+class Source(NamedTuple):
+    """A Python file: its name without the ending, the words in it and the classes that it defines."""
+
+    name: str
+    words: frozenset[str]
+    classes: frozenset[str]
+
+
 @cache
-def sources() -> list[tuple[str, str]]:
-    """Return the text of every Python file but the tests' of documents, each with its name without the ending."""
+def sources() -> list[Source]:
+    """Return every Python file but the tests' of documents."""
     files = [path for room in ROOMS for path in (ROOT / room).rglob("*.py") if path.parent != Path(__file__).parent]
-    return [(path.stem, path.read_text(encoding="utf-8")) for path in files]
+    texts = {path: path.read_text(encoding="utf-8") for path in files}
+    return [
+        Source(path.stem, frozenset(re.findall(r"\w+", text)), frozenset(re.findall(r"^class (\w+)", text, re.M)))
+        for path, text in texts.items()
+    ]
 
 
 def wrong_member(holder: str, member: str) -> str | None:
     """Say whether a class, or a module, of ours has no such member; what is not ours may be anything."""
-    own = [text for name, text in sources() if name == holder or re.search(rf"^class {holder}\b", text, re.M)]
-    return None if not own or any(re.search(rf"\b{member}\b", text) for text in own) else f"{holder} has none"
+    own = [each for each in sources() if holder == each.name or holder in each.classes]
+    return None if not own or any(member in each.words for each in own) else f"{holder} has none"
 
 
 def wrong_constant(name: str) -> str | None:
-    return None if any(re.search(rf"\b{name}\b", text) for _, text in sources()) else "no such constant"
+    return None if any(name in each.words for each in sources()) else "no such constant"
 
 
 def is_there(name: str) -> bool:

@@ -114,12 +114,16 @@ def test_a_bus_that_nobody_offers_is_named_with_those_there_are(site: Path) -> N
         ),
     ],
 )
-def test_a_broken_package_fails_where_it_is_used_and_nowhere_else(site: Path, broken: str, said: str) -> None:
+def test_a_broken_package_fails_where_it_is_used(site: Path, broken: str, said: str) -> None:
     (site / "acme_device.py").write_text(broken)
     done = positioner(site, "run", daemon_file(site))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert f"package acme-positioner: {said}" in done.stderr
+
+
+def test_a_broken_package_fails_nowhere_else(site: Path) -> None:
+    (site / "acme_device.py").write_text("raise OSError('no licence')\n")
     modbus = positioner(site, "run", daemon_file(site, ('"acme"', '"modbus"'), ("4001", "1")))
     assert "127.0.0.1:1" in modbus.stderr, "another bus is read, and its device not found"
 

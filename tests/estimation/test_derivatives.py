@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import sympy as sp
 
 from positioner.estimation.derivatives import Derivatives, weights
 from tests.estimation.stem import Array, grid
@@ -45,6 +44,8 @@ def test_kernels_are_the_printed_ones_run_backwards_in_the_limit() -> None:
 
 
 def test_printed_19_and_21_give_the_derivatives_at_the_start_of_the_window() -> None:
+    import sympy as sp  # half a second: not in every worker that only collects this
+
     T, tau = sp.symbols("T tau", positive=True)
     x0, x1, x2, x3 = sp.symbols("x0:4")
     parabola = x0 + x1 * tau + x2 * tau**2 / 2

@@ -1,45 +1,28 @@
-"""The integral identity (8)-(12), symbolically, on a general motion."""
+"""The integral identity (8)-(12), symbolically, on a general motion.
 
-from functools import cache
-
-import sympy as sp
-
-t, a, b, c, k = sp.symbols("t a b c k")
-COEFFICIENTS = sp.symbols("x0:6")
-x = sum(coefficient * t**i for i, coefficient in enumerate(COEFFICIENTS))
-u = sp.expand((sp.diff(x, t, 2) - a * sp.diff(x, t) - b * x - k) / c)
-
-
-def P(f: sp.Expr, n: int) -> sp.Expr:  # noqa: N802 - the paper's name
-    for _ in range(n):
-        f = sp.integrate(sp.expand(f), (t, 0, t))
-    return f
-
-
-@cache
-def terms() -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
-    """Q1, P11, P12, P13."""
-    return (
-        P(-(t**3) * x, 1) + 9 * P(t**2 * x, 2) + 18 * P(-t * x, 3) + 6 * P(x, 4),
-        P(-(t**3) * x, 2) + 6 * P(t**2 * x, 3) + 6 * P(-t * x, 4),
-        P(-(t**3) * x, 3) + 3 * P(t**2 * x, 4),
-        P(-(t**3) * u, 3) + 3 * P(t**2 * u, 4),
-    )
+What computes with symbols takes half a second to load: by the tests, not by every worker that only collects them.
+"""
 
 
 def test_corrected_identity_holds_for_any_start_and_any_friction() -> None:
+    from tests.estimation.identity import a, b, c, terms
+
     q1, p11, p12, p13 = terms()
-    assert sp.expand(q1 - a * p11 - b * p12 - c * p13) == 0
+    assert (q1 - a * p11 - b * p12 - c * p13).expand() == 0
 
 
 def test_identity_as_printed_in_10_does_not_hold() -> None:
+    from tests.estimation.identity import P, a, b, c, t, terms, x
+
     q1, _, p12, p13 = terms()
     printed = P(-(t**3) * x, 2) + 6 * P(-(t**2) * x, 3) + 6 * P(-t * x, 4)
-    assert sp.expand(q1 - a * printed - b * p12 - c * p13) != 0
+    assert (q1 - a * printed - b * p12 - c * p13).expand() != 0
 
 
 def test_identity_with_the_coefficient_printed_in_7_does_not_hold() -> None:
+    from tests.estimation.identity import P, a, b, c, t, terms, u, x
+
     q1, p11, _, _ = terms()
     p12 = P(-(t**3) * x, 3) + P(t**2 * x, 4)
     p13 = P(-(t**3) * u, 3) + P(t**2 * u, 4)
-    assert sp.expand(q1 - a * p11 - b * p12 - c * p13) != 0
+    assert (q1 - a * p11 - b * p12 - c * p13).expand() != 0

@@ -152,8 +152,8 @@ def received_now(bus: can.BusABC) -> list[can.Message]:
 def test_processes_share_a_bus(monkeypatch: pytest.MonkeyPatch) -> None:
     channel = free_channel()
     code = (
-        "import can\n"
-        "import fieldbus.canopen.loopback\nfieldbus.canopen.loopback.DEAF_S = 5.0\n"
+        "import fieldbus.canopen.loopback\n"
+        "import can\nfieldbus.canopen.loopback.DEAF_S = 5.0\n"
         f"bus = can.Bus(interface='loopback', channel='{channel}', ignore_config=True)\n"
         "print('there', flush=True)\n"
         f"for _ in range({BURST}):\n"
@@ -170,6 +170,15 @@ def test_processes_share_a_bus(monkeypatch: pytest.MonkeyPatch) -> None:
         assert received(bus, BURST) == [n % 2000 + 1 for n in range(BURST)]
         thread.join()
         assert other.wait(10) == 0
+
+
+def test_what_reads_log_files_is_not_loaded_with_it_and_there_for_others() -> None:
+    code = (
+        "import sys\nimport fieldbus.canopen.loopback\n"
+        "from importlib.util import find_spec\nprint('asammdf' in sys.modules, find_spec('asammdf') is not None)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
 
 
 def test_garbage_strangers_and_torn_datagrams_are_dropped(join: Join) -> None:

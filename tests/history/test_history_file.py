@@ -294,6 +294,18 @@ def test_a_damaged_file_is_set_aside_whole_and_begun_anew(tmp_path: Path) -> Non
     assert (tmp_path / f"{FILE_NAME}.unreadable").read_bytes() == content
 
 
+def test_a_file_whose_columns_names_are_no_text_is_refused(tmp_path: Path) -> None:
+    with opened(tmp_path) as file:
+        file.append([event(1)])
+    path = tmp_path / FILE_NAME
+    content = path.read_bytes()
+    assert b"over_c_std" in content
+    path.write_bytes(content.replace(b"over_c_std", b"\xffver_c_std", 1))
+    with pytest.raises(InputError, match="has other tables"), HistoryReader(path):
+        pass
+    assert "has other tables" in said(tmp_path)
+
+
 def test_a_crash_while_the_file_is_made_leaves_none(tmp_path: Path) -> None:
     (tmp_path / f"{FILE_NAME}.new").write_bytes(b"SQLite format 3\0 and no more")
     with opened(tmp_path) as file:

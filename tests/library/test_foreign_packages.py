@@ -21,15 +21,32 @@ EXECUTED = "from pathlib import Path\nPath(__file__).with_name('executed').touch
 PATH = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
 
 
-@pytest.fixture(params=["config.py", "sim/__init__.py"])
+FOREIGN = ("config.py", "sim/__init__.py")
+
+
+@pytest.fixture(params=FOREIGN)
 def foreign(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Stand in a folder with a foreign module; it must not be executed."""
-    file = tmp_path / str(request.param)
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(EXECUTED)
+    file = left(tmp_path, str(request.param))
     monkeypatch.chdir(tmp_path)
     yield file
     assert not file.with_name("executed").exists(), "a foreign module was executed"
+
+
+@pytest.fixture
+def _foreigners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Stand in a folder with both; neither must be executed."""
+    files = [left(tmp_path, each) for each in FOREIGN]
+    monkeypatch.chdir(tmp_path)
+    yield
+    assert not any(each.with_name("executed").exists() for each in files), "a foreign module was executed"
+
+
+def left(folder: Path, name: str) -> Path:
+    file = folder / name
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(EXECUTED)
+    return file
 
 
 def run(*words: str) -> "subprocess.CompletedProcess[str]":
@@ -41,7 +58,8 @@ def told(foreign: Path) -> str:
     return f"{foreign.resolve()} is in the way of positioner's own package {name}: start from another folder"
 
 
-def test_the_command_does_not_see_it(foreign: Path) -> None:
+@pytest.mark.usefixtures("_foreigners")
+def test_the_command_does_not_see_it() -> None:
     assert run("positioner", "map").returncode == 0
     Recording({"time_s": np.arange(9.0), "command_pa": np.zeros(9), "position_m": np.zeros(9)}).write("rec.csv")
     estimated = run("positioner", "estimate", "rec.csv")
@@ -64,13 +82,15 @@ def test_the_library_says_what_is_in_the_way(foreign: Path) -> None:
     assert done.stderr.splitlines()[-1].startswith(f"ImportError: positioner.valve: {told(foreign)}")
 
 
-def test_a_child_does_not_see_it(foreign: Path) -> None:
+@pytest.mark.usefixtures("_foreigners")
+def test_a_child_does_not_see_it() -> None:
     Path("slave.toml").write_text('valve = "seed"\n')
     with running("sim", Path("slave.toml"), "--port", "0") as ready:
         assert "127.0.0.1:" in ready
 
 
-def test_the_refinement_process_does_not_see_it(foreign: Path) -> None:
+@pytest.mark.usefixtures("_foreigners")
+def test_the_refinement_process_does_not_see_it() -> None:
     process = RefinementProcess()
     refiner = process.refiner(blocking=True)
     time_s = np.arange(0.0, 0.2, 1e-3)

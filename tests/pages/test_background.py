@@ -1,14 +1,13 @@
 import os
-import time
 from threading import Event
 
 import pytest
 
 from config.errors import InputError
 from positioner.pages.workbench_page.background import Failed, News, Progressed, Tell, Work
+from tests.cli.test_daemon_process import until
 
 pytestmark = pytest.mark.patient
-LONGEST_S = 60.0
 
 
 def ends(tell: Tell, how: str) -> str:
@@ -23,11 +22,14 @@ def ends(tell: Tell, how: str) -> str:
     return "done"
 
 
-def told(work: Work, *, until: type) -> list[News]:
-    due_s = time.monotonic() + LONGEST_S
+def told(work: Work, *, last: type) -> list[News]:
     news: list[News] = []
-    while time.monotonic() < due_s and not any(isinstance(each, until) for each in news):
-        news += work.news()
+
+    def came() -> bool:
+        news.extend(work.news())
+        return any(isinstance(each, last) for each in news)
+
+    until(came, last.__name__)
     return news
 
 
@@ -39,12 +41,12 @@ def told(work: Work, *, until: type) -> list[News]:
     ],
 )
 def test_work_tells_how_far_it_is_and_how_it_ended(how: str, last: News) -> None:
-    assert told(Work(ends, how), until=type(last)) == [Progressed(how, 0.5), last]
+    assert told(Work(ends, how), last=type(last)) == [Progressed(how, 0.5), last]
 
 
 def test_what_is_cancelled_is_gone_at_once() -> None:
     work = Work(ends, "never")
-    told(work, until=Progressed)
+    told(work, last=Progressed)
     work.cancel()
     assert work.is_over
     assert not work.is_alive

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,20 +17,31 @@ from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve
 from positioner.pages.workbench_page.notebook import notebook
 from positioner.pages.workbench_page.opening import ColumnChoice, Opened, opened_like
-from workbench.blind.hiding import hide
+from tests.pages.laid_out import hidden
 from workbench.select.extension import extend
 
-HIDDEN = hide(7, duration_s=5.0)
-FIRST, OTHER = Opened.of("fit.csv", Path("fit.csv"), HIDDEN.fit), Opened.of("other.csv", Path("other.csv"), HIDDEN.test)
-VALVE = NamedValve("valve.toml", Path("valve.toml"), HIDDEN.base)
+
+@cache
+def first() -> Opened:
+    return Opened.of("fit.csv", Path("fit.csv"), hidden().fit)
+
+
+@cache
+def other() -> Opened:
+    return Opened.of("other.csv", Path("other.csv"), hidden().test)
+
+
+@cache
+def valve() -> NamedValve:
+    return NamedValve("valve.toml", Path("valve.toml"), hidden().base)
 
 
 @pytest.fixture
 def desk(tmp_path: Path) -> Iterator[Desk]:
     desk = Desk(folder=tmp_path / "desk")
     desk.folder.mkdir()
-    desk.take_valve(VALVE)
-    desk.take_recording(FIRST)
+    desk.take_valve(valve())
+    desk.take_recording(first())
     yield desk
     desk.clear()
 
@@ -40,33 +52,33 @@ def test_step_by_step_all_of_it_is_undone(desk: Desk) -> None:
     given_m = live.curve().rms_m
     live.keep()
     live.move(live.parameters["spring_n_per_m"], 0.7)
-    desk.take_recording(OTHER)
+    desk.take_recording(other())
     assert desk.undo()
-    assert desk.opened == FIRST
+    assert desk.opened == first()
     assert desk.live is not None
     assert desk.live.curve().rms_m != given_m
     assert desk.undo()
     assert desk.compared is not None
     assert desk.compared.rms_m == pytest.approx(given_m)
     assert desk.undo()
-    assert desk.valve == VALVE
+    assert desk.valve == valve()
     assert list(command_lines(desk)) == []
     assert desk.undo()
     assert not desk.undo()
 
 
 def test_what_is_held_out_and_how_long_it_may_take_stands_on_the_command_line(desk: Desk) -> None:
-    desk.hold_out(OTHER)
+    desk.hold_out(other())
     desk.budget_s = 90.0
     compare, diagnose = command_lines(desk)
     assert compare == "positioner compare fit.csv --valve valve.toml"
     assert diagnose == "positioner diagnose fit.csv --valve valve.toml --test other.csv --budget-s 90"
-    desk.take_recording(FIRST)
+    desk.take_recording(first())
     assert desk.held_out is None
 
 
 def test_a_recording_that_cannot_be_held_out_is_refused_and_nothing_changes(desk: Desk) -> None:
-    in_percent = {**HIDDEN.fit.columns, "position_m": 1000.0 * HIDDEN.fit.columns["position_m"]}
+    in_percent = {**hidden().fit.columns, "position_m": 1000.0 * hidden().fit.columns["position_m"]}
     with pytest.raises(InputError, match="it looks like per cent"):
         desk.hold_out(Opened.of("percent.csv", Path("percent.csv"), Recording(in_percent)))
     assert desk.held_out is None
@@ -75,37 +87,37 @@ def test_a_recording_that_cannot_be_held_out_is_refused_and_nothing_changes(desk
 def test_an_export_is_held_out_as_the_first_was_read(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text("t;PV;OUT\n" + "".join(f"{i / 100};{i};{100 * i}\n" for i in range(500)))
     choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:Pa"})
-    found = opened_like(tmp_path / "b.csv", "b.csv", replace(FIRST, choice=choice))
+    found = opened_like(tmp_path / "b.csv", "b.csv", replace(first(), choice=choice))
     assert found.recording.columns["position_m"][100] == pytest.approx(0.1)
     with pytest.raises(InputError, match="their columns differ"):
-        opened_like(tmp_path / "b.csv", "b.csv", FIRST)
+        opened_like(tmp_path / "b.csv", "b.csv", first())
 
 
 def test_a_kept_curve_stays_when_the_valve_gets_better_and_goes_with_another_recording(desk: Desk) -> None:
     desk.keep_variant()
     kept_m = desk.variants[SAVED]
-    desk._go_on(VALVE, {})
+    desk._go_on(valve(), {})
     assert desk.variants[SAVED] is kept_m
-    desk.take_recording(OTHER)
+    desk.take_recording(other())
     assert SAVED not in desk.variants
 
 
 def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:
     told: list[News] = []
     with pytest.raises(CommandFailed, match="nothing is known"):
-        diagnosed(told.append, HIDDEN.fit, HIDDEN.base, Limits(HIDDEN.test, 0.0), ["backlash"])
+        diagnosed(told.append, hidden().fit, hidden().base, Limits(hidden().test, 0.0), ["backlash"])
     assert not any(isinstance(each, Raced) for each in told)
 
 
 def test_the_notebook_run_from_top_to_bottom_comes_to_the_same(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    desk.valve = replace(VALVE, path=tmp_path / "valve.toml")
-    write_valve(tmp_path / "valve.toml", HIDDEN.base)
-    desk.add(extend(HIDDEN.fit, HIDDEN.base, ["preload"]))
+    desk.valve = replace(valve(), path=tmp_path / "valve.toml")
+    write_valve(tmp_path / "valve.toml", hidden().base)
+    desk.add(extend(hidden().fit, hidden().base, ["preload"]))
     written = json.loads(notebook(desk))
     cells = ["".join(each["source"]) for each in written["cells"] if each["cell_type"] == "code"]
-    write_recording(tmp_path / "fit.csv", HIDDEN.fit)
+    write_recording(tmp_path / "fit.csv", hidden().fit)
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for cell in cells:
@@ -121,7 +133,7 @@ def test_the_notebook_run_from_top_to_bottom_comes_to_the_same(
 def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
     choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:%", "command_pa": "OUT:Pa"}, 0.04, "", ",")
     assert desk.opened is not None
-    desk.opened = replace(FIRST, choice=choice)
+    desk.opened = replace(first(), choice=choice)
     text = notebook(desk)
     assert "from config.historian_export import read_export" in text
     assert "'position_m=PV:%', 'command_pa=OUT:Pa']), 0.04, (20000.0, 100000.0), Exp" in text

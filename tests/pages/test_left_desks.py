@@ -1,40 +1,35 @@
-"""A tab that is closed stops its work and leaves nothing; one that is loaded again finds it."""
+"""A tab that is closed stops its work and leaves nothing; one that is loaded again finds it.
+
+The page's library takes a second to load: it is loaded by the tests, not in every worker that only collects them.
+"""
 
 import asyncio
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Event
 from types import SimpleNamespace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import pytest
-from nicegui import Client, ui
 
-from positioner.pages.workbench_page.background import Progressed, Tell, Work
+from positioner.pages.workbench_page.background import Work
 from positioner.pages.workbench_page.desk import Desk, NamedValve
 from positioner.pages.workbench_page.opening import Opened
-from positioner.pages.workbench_page.page import MOST_LEFT, Workbench
-from positioner.pages.workbench_page.search_panel import SearchPanel
-from workbench.blind.hiding import hide
+from tests.cli.test_daemon_process import until
+from tests.pages.laid_out import ends, hidden, never_ends
+
+if TYPE_CHECKING:
+    from positioner.pages.workbench_page.page import Workbench
 
 pytestmark = pytest.mark.patient
-HIDDEN = hide(7, duration_s=5.0)
-
-
-def never_ends(tell: Tell, *_: object) -> None:
-    tell(Progressed("begun", 0.0))
-    Event().wait()
 
 
 @pytest.fixture
-def workbench() -> Iterator[Workbench]:
+def workbench() -> "Iterator[Workbench]":
+    from positioner.pages.workbench_page.page import Workbench
+
     workbench = Workbench((), None, only_here=True)
     yield workbench
     workbench.clear()
-
-
-def ends(*_: object) -> str:
-    return "found"
 
 
 def goes_on(work: Work) -> bool:
@@ -42,19 +37,18 @@ def goes_on(work: Work) -> bool:
 
 
 def laid(desk: Desk) -> Desk:
-    desk.take_valve(NamedValve("valve.toml", Path("valve.toml"), HIDDEN.base))
-    desk.take_recording(Opened.of("fit.csv", Path("fit.csv"), HIDDEN.fit))
+    desk.take_valve(NamedValve("valve.toml", Path("valve.toml"), hidden().base))
+    desk.take_recording(Opened.of("fit.csv", Path("fit.csv"), hidden().fit))
     return desk
 
 
 def busy(desk: Desk) -> Desk:
     search = laid(desk).begin("diagnose", never_ends)
-    while not search.doing:
-        search.look()
+    until(lambda: search.look() and bool(search.doing), "the first word of the search")
     return desk
 
 
-def test_a_diagnosis_goes_on_while_its_page_is_loaded_again_and_stops_when_it_is_closed(workbench: Workbench) -> None:
+def test_a_diagnosis_goes_on_while_its_page_is_loaded_again_and_stops_when_it_is_closed(workbench: "Workbench") -> None:
     desk = busy(workbench.desk("a"))
     assert desk.search is not None
     work = desk.search.work
@@ -69,11 +63,14 @@ def test_a_diagnosis_goes_on_while_its_page_is_loaded_again_and_stops_when_it_is
     assert desk.folder.exists()
 
 
-def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbench: Workbench) -> None:
+def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbench: "Workbench") -> None:
+    from nicegui import Client, ui
+
+    from positioner.pages.workbench_page.search_panel import SearchPanel
+
     desk = laid(workbench.desk("a"))
     search = desk.begin("diagnose", ends)
-    while search.work.is_alive:
-        pass
+    until(lambda: not search.work.is_alive, "the end of the search")
 
     async def looks() -> None:
         with Client(ui.page("/")):  # no browser shows it
@@ -84,7 +81,9 @@ def test_what_a_search_comes_to_is_not_for_the_page_that_was_loaded_again(workbe
     assert (search.result, search.failed) == ("found", "")
 
 
-def test_of_many_closed_tabs_the_oldest_leave_nothing(workbench: Workbench) -> None:
+def test_of_many_closed_tabs_the_oldest_leave_nothing(workbench: "Workbench") -> None:
+    from positioner.pages.workbench_page.page import MOST_LEFT
+
     desks = [workbench.desk(f"tab {i}") for i in range(MOST_LEFT + 3)]
     for desk in desks:
         workbench.came(desk)

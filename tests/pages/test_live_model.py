@@ -1,3 +1,4 @@
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +12,25 @@ from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Opened
 from positioner.pages.workbench_page.time_figure import LINES, TimeFigure, Window, window_of
-from workbench.blind.hiding import hide
+from tests.pages.laid_out import hidden
 from workbench.compare.comparison import compare
-from workbench.data.record import ready
+from workbench.data.record import Record, ready
 
-HIDDEN = hide(7, duration_s=10.0)
-RECORD = ready(HIDDEN.fit)
-PRELOADED = ValveFile(
-    valve=HIDDEN.base.valve, effect=(EffectTable.model_validate({"name": "preload", "force_n": 100.0}),)
-)
+
+@cache
+def record() -> Record:
+    return ready(hidden().fit)
+
+
+@cache
+def preloaded() -> ValveFile:
+    table = EffectTable.model_validate({"name": "preload", "force_n": 100.0})
+    return ValveFile(valve=hidden().base.valve, effect=(table,))
 
 
 def test_it_says_what_compare_says() -> None:
-    live = LiveModel(RECORD, HIDDEN.base)
-    assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-12)
+    live = LiveModel(record(), hidden().base)
+    assert live.curve().rms_m == pytest.approx(compare(hidden().fit, hidden().base).rms_m, rel=1e-12)
 
 
 def test_ten_million_samples_are_refused_at_once_as_for_a_fit() -> None:
@@ -35,13 +41,13 @@ def test_ten_million_samples_are_refused_at_once_as_for_a_fit() -> None:
 
 
 def test_a_move_is_a_parameter_of_the_valve_file_and_is_undone() -> None:
-    live = LiveModel(RECORD, HIDDEN.base)
+    live = LiveModel(record(), hidden().base)
     given = live.curve().rms_m
     spring = live.parameters["spring_n_per_m"]
     live.keep()
     live.move(spring, live.share_of(spring, 50_000.0))
     assert live.valve.valve.spring_n_per_m == pytest.approx(50_000.0)
-    assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, live.valve).rms_m, rel=1e-12)
+    assert live.curve().rms_m == pytest.approx(compare(hidden().fit, live.valve).rms_m, rel=1e-12)
     assert live.undo()
     assert live.curve().rms_m == given
     assert not live.undo()
@@ -49,7 +55,7 @@ def test_a_move_is_a_parameter_of_the_valve_file_and_is_undone() -> None:
 
 @pytest.mark.parametrize("name", ["coulomb_n", "static_n", "preload.force_n", "mass_kg"])
 def test_a_slider_goes_over_the_whole_range_and_static_friction_never_falls_below_sliding(name: str) -> None:
-    live = LiveModel(RECORD, PRELOADED)
+    live = LiveModel(record(), preloaded())
     moved = live.parameters[name]
     for share in (0.0, 0.3, 1.0):
         live.move(moved, share)
@@ -58,12 +64,12 @@ def test_a_slider_goes_over_the_whole_range_and_static_friction_never_falls_belo
 
 
 def test_an_effect_switched_off_is_the_valve_without_it() -> None:
-    live = LiveModel(RECORD, PRELOADED)
+    live = LiveModel(record(), preloaded())
     live.switch("preload", False)
     assert live.valve.effect == ()
-    assert live.curve().rms_m == pytest.approx(compare(HIDDEN.fit, HIDDEN.base).rms_m, rel=1e-9)
+    assert live.curve().rms_m == pytest.approx(compare(hidden().fit, hidden().base).rms_m, rel=1e-9)
     live.switch("preload", True)
-    assert live.valve == PRELOADED
+    assert live.valve == preloaded()
 
 
 def test_the_figure_keeps_extremes_and_every_sample_when_it_is_looked_at_closely() -> None:

@@ -14,18 +14,18 @@ from positioner.pages.workbench_page.desk import Desk, NamedValve
 from positioner.pages.workbench_page.opening import Opened
 from sim.effect import FOLDERS_ALLOWED, find_effect
 from sim.own_effect import EXAMPLE, checked
-from workbench.blind.hiding import hide
+from tests.cli.test_daemon_process import until
+from tests.pages.laid_out import hidden
 
 TEXT = EXAMPLE.read_text(encoding="utf-8")
 
 
 @pytest.fixture
 def desk(tmp_path: Path) -> Iterator[Desk]:
-    hidden = hide(7, duration_s=5.0)
     desk = Desk(folder=tmp_path / "desk", may_write_effects=True)
     desk.folder.mkdir()
-    desk.take_valve(NamedValve("valve.toml", tmp_path / "valve.toml", hidden.base))
-    desk.take_recording(Opened.of("fit.csv", tmp_path / "fit.csv", hidden.fit))
+    desk.take_valve(NamedValve("valve.toml", tmp_path / "valve.toml", hidden().base))
+    desk.take_recording(Opened.of("fit.csv", tmp_path / "fit.csv", hidden().fit))
     yield desk
     desk.clear()
 
@@ -60,10 +60,14 @@ def test_a_shipped_effects_name_is_taken(tmp_path: Path) -> None:
 
 
 def end_of(work: Work) -> News:
-    while True:
-        for each in work.news():
-            if not isinstance(each, Progressed):
-                return each
+    ends: list[News] = []
+
+    def came() -> bool:
+        ends.extend(each for each in work.news() if not isinstance(each, Progressed))
+        return bool(ends)
+
+    until(came, "the end")
+    return ends[0]
 
 
 @pytest.mark.patient
@@ -93,8 +97,8 @@ def test_an_effect_that_never_ends_is_stopped_with_its_tab(desk: Desk) -> None:
     desk.check_effect(desk.write_effect("endless", "while True: pass\n"))
     work = desk.checking
     assert work is not None
-    while not work.news():
-        assert work.is_alive
+    until(lambda: bool(work.news()), "the first word")
+    assert work.is_alive
     desk.stop()
     assert not work.is_alive
 

@@ -1,9 +1,11 @@
 """A kernel is compiled once for all processes, and never taken for another."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -43,20 +45,43 @@ def probed(cache: Path, count: int = 1) -> list[tuple[str, str]]:
     return [(numba, position) for numba, position in said]
 
 
-def test_a_kernel_is_compiled_by_one_process_and_translated_again_for_another_processor(tmp_path: Path) -> None:
-    at_once = probed(tmp_path, 3)
-    assert sorted(numba for numba, _ in at_once) == ["False", "False", "True"], "the others do not even start it"
+class AtOnce(NamedTuple):
+    """What processes say that were the first to need a kernel, all at once, and the cache that they left."""
+
+    said: list[tuple[str, str]]
+    cache: Path
+
+
+@pytest.fixture(scope="module")
+def at_once(tmp_path_factory: pytest.TempPathFactory) -> AtOnce:
+    """To compile the laws takes some seconds: once."""
+    cache = tmp_path_factory.mktemp("cache")
+    return AtOnce(probed(cache, 3), cache)
+
+
+@pytest.fixture
+def filled(at_once: AtOnce, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of this test's own in which the seed's kernel lies, compiled by another process."""
+    cache = tmp_path / "filled"
+    shutil.copytree(at_once.cache, cache)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+    compiled._compiled.cache_clear()
+    return cache
+
+
+def test_a_kernel_is_compiled_by_one_process_and_translated_again_for_another_processor(
+    at_once: AtOnce, tmp_path: Path
+) -> None:
+    assert sorted(numba for numba, _ in at_once.said) == ["False", "False", "True"], "the others do not even start it"
+    shutil.copytree(at_once.cache, tmp_path, dirs_exist_ok=True)
     (code,) = tmp_path.rglob("*.o")
     code.rename(code.with_suffix(".another.o"))
     ((numba, position),) = probed(tmp_path)
     assert numba == "False", "the bitcode is there"
-    assert {position} == {each for _, each in at_once}
+    assert {position} == {each for _, each in at_once.said}
 
 
-def test_the_laws_are_compiled_once_for_all_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    compiled._compiled.cache_clear()
-    Valve(Composition.from_file(SEED))
+def test_the_laws_are_compiled_once_for_all_kernels(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(kernel_compiler, "laws")
     valve = Valve(Composition.from_file(ASYMMETRIC))
     valve.advance(1.1 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
@@ -99,8 +124,7 @@ def test_edited_physics_is_another_kernel(tmp_path: Path, monkeypatch: pytest.Mo
     assert valve.position_m == 0.0
 
 
-def test_a_torn_kernel_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+def test_a_torn_kernel_is_compiled_anew(filled: Path) -> None:
     digest = Composition.from_file(SEED).kernel.digest
     torn = compiled.kernel_file(digest, "another text").parent / f"{digest}.{processor()}.o"
     torn.write_bytes(b"torn")

@@ -203,7 +203,7 @@ def test_the_command_tells_a_lag_from_a_dead_time(
     config, out = tmp_path / "site.toml", tmp_path / "told"
     config.write_text(
         f"[valve]\nstroke_m = {BARE.valve.stroke_m}\n[pressure]\nmaximum_pa = 80e3\n"
-        "[experiment]\ntravel_window = [0.0, 1.0]\nrate_limit_pa_per_s = 400e3\nlimit_s = 10.0\n"
+        "[experiment]\ntravel_window = [0.0, 1.0]\nrate_limit_pa_per_s = 400e3\nlimit_s = 6.0\n"
     )
     recording.write(tmp_path / "rec.csv")
     words = ["discriminate", str(config), "--rec", str(tmp_path / "rec.csv"), "--valve", "seed", "--out", str(out)]

@@ -81,7 +81,7 @@ def hide(
         "effects": [{"name": each.name, **each.parameters} for each in truth.effect],
         "valve": valve.model_dump(exclude={"kind"}),
         "floor_m": {"fit": fit[1], "test": test[1]},
-        "visible": {each.name: _visible(trials, truth, each, fit[1]) for each in truth.effect},
+        "visible": {each.name: _visible(trials, answers, truth, each, fit[1]) for each in truth.effect},
     }
     return Hidden(ValveFile(valve=known), fit[0], test[0], truth, answer)
 
@@ -107,9 +107,11 @@ def _recorded(trial: Trial, truth: ValveFile, clean_m: Column, dirty: bool, gene
     return recording, float(np.sqrt(np.mean((recording.position_m - clean_m) ** 2)))
 
 
-def _visible(trials: Sequence[Trial], truth: ValveFile, effect: EffectTable, floor_m: float) -> dict[str, Any]:
+def _visible(
+    trials: Sequence[Trial], answers: Sequence[Column], truth: ValveFile, effect: EffectTable, floor_m: float
+) -> dict[str, Any]:
     others = tuple(each for each in truth.effect if each is not effect)
-    fit_m, test_m = refitted_rmse_m(trials, truth, ValveFile(valve=truth.valve, effect=others))
+    fit_m, test_m = refitted_rmse_m(trials, answers, ValveFile(valve=truth.valve, effect=others))
     return {"fit_m": fit_m, "test_m": test_m, "is_visible": fit_m > VISIBLE * floor_m}
 
 

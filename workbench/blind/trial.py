@@ -19,8 +19,8 @@ from config.recording import Column, Recording
 from config.slave_file import Sensor
 from config.valve_file import ValveFile
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS, Composition
-from sim.karnopp import Vector, read
-from sim.open_loop import STEP_S, at_rest, follow
+from sim.karnopp import TOLERANCE, Vector, read
+from sim.open_loop import INDICATED, PATH_ROWS, STEP_S, at_rest, follow
 from sim.transmitter import Transmitter
 from workbench.blind.input_signal import lead_in
 
@@ -60,14 +60,18 @@ class Trial:
         commands += _pressure_noise(generator, commands.size, h)
         theta = composition.theta.copy()
         state = self._before(composition, theta)
+        command_pa, path = np.empty(1), np.empty((PATH_ROWS, 2))
+        go_on = composition.kernel.respond.bound(theta, state, command_pa, np.array([h]), STEP_S, TOLERANCE, path)
         indicated_m, moved = [read(state).indicated], True
-        for command in commands:
+        for command in commands.tolist():
             rests = read(state).v == 0.0
             if moved and rests:
                 varied = 1.0 + BREAK_AWAY_JITTER * generator.standard_normal()
                 theta[STATIC] = max(theta[COULOMB], composition.theta[STATIC] * varied)
             moved = not rests
-            indicated_m.append(follow(composition, theta, state, command, h, STEP_S).indicated_m[-1])
+            command_pa[0] = command
+            go_on()
+            indicated_m.append(path[INDICATED, -1])
         return np.array(indicated_m[self.lead_in_pa.size * parts :: parts])
 
     def recording(self, indicated_m: Column, sensor: Sensor) -> Recording:
@@ -101,11 +105,9 @@ def _pressure_noise(generator: np.random.Generator, count: int, period_s: float)
     return noise
 
 
-def refitted_rmse_m(trials: Sequence[Trial], truth: ValveFile, without: ValveFile) -> list[float]:
-    """Return the rms distance, m, of a valve refitted to the first trial from the true valve, trial by trial."""
-    true = Composition.from_file(truth)
+def refitted_rmse_m(trials: Sequence[Trial], answers: Sequence[Column], without: ValveFile) -> list[float]:
+    """Return the rms distance, m, of a valve refitted to what the true one answers in the first trial, by trial."""
     known = Composition.from_file(without)
-    answers = [trial.answer_m(true, true.theta) for trial in trials]
     first = trials[0]
 
     def error(z: Vector) -> Column:

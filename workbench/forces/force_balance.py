@@ -315,14 +315,17 @@ def _folds(rows: Rows, *, tested: bool) -> NDArray[np.int64]:
 
 def _yielding(rows: Rows, yield_m: float) -> Column:
     """Return z of a packing that yields over a distance; each recording begins slipping."""
-    z = np.empty(len(rows))
-    position, recording = rows.position_m.tolist(), rows.recording.tolist()
-    here = 0.0
-    for i, place in enumerate(position):
-        begins = i == 0 or recording[i] != recording[i - 1]
-        here = float(rows.direction[i]) if begins else min(1.0, max(-1.0, here + (place - position[i - 1]) / yield_m))
-        z[i] = here
-    return z
+    steps = (np.diff(rows.position_m, prepend=rows.position_m[:1]) / yield_m).tolist()
+    begins = (np.diff(rows.recording, prepend=-1) != 0).tolist()
+    z, here = [], 0.0
+    for step, begin, direction in zip(steps, begins, rows.direction.tolist(), strict=True):
+        here = direction if begin else here + step
+        if here > 1.0:
+            here = 1.0
+        elif here < -1.0:
+            here = -1.0
+        z.append(here)
+    return np.array(z, dtype=np.float64)
 
 
 def _rms(error_n: Column) -> float:
