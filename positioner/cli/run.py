@@ -16,9 +16,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Run until SIGTERM or Ctrl-C, which leave each valve in its configured safe state."""
     from config.daemon_file import load_valves
 
-    files = load_valves(
-        arguments.config
-    )  # before the daemon is loaded, which takes longer: most mistakes are in a file
+    # Before the daemon is loaded, which takes longer: most mistakes are in a file.
+    files = load_valves(arguments.config)
     from positioner.cli.parts.extended_valves import extended_valve_of
     from positioner.daemon.service import serve
 

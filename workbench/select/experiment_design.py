@@ -27,7 +27,6 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from config.errors import InputError
 from config.recording import Recording
@@ -367,6 +366,8 @@ class Rivalry:
 
 def _autoregression(generator: np.random.Generator, count: int, period_s: float) -> Vector:
     """Return noise of variance 1 that forgets itself over `CORRELATION_S`, (count,)."""
+    from scipy.signal import lfilter  # takes half a second to load, and most who load this file never ask for it
+
     kept = float(np.exp(-period_s / CORRELATION_S))
     fresh = generator.standard_normal(count)
     fresh[1:] *= np.sqrt(1.0 - kept**2)
