@@ -10,6 +10,7 @@ numba is untyped: its types stop here.
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from inspect import signature
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -110,9 +111,7 @@ def filled(
     module = ModuleType(f"valve_kernel_{file.stem}")
     exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
     for i, (path, source) in enumerate(sources):
-        part = ModuleType(f"{module.__name__}_{i}")
-        execute(source, path, part.__dict__)
-        _inlined(part)
+        part = _part(path, source)
         module.__dict__.update({f"{name}_{i}": value for name, value in part.__dict__.items() if name[0] != "_"})
     _inlined(module)
     whole = binding.parse_bitcode(laws)
@@ -126,6 +125,15 @@ def filled(
     for each in places:
         whole.link_in(binding.parse_assembly(each))
     return _optimized(whole, entries)
+
+
+@cache
+def _part(path: Path, source: str) -> ModuleType:
+    """Return an effect's functions, compiled ones: as often as a kernel has it among others, they are the same."""
+    part = ModuleType(f"valve_effect_{path.stem}")
+    execute(source, path, part.__dict__)
+    _inlined(part)
+    return part
 
 
 def _optimized(whole: Any, entries: Mapping[str, Sequence[int]]) -> bytes:

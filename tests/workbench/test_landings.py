@@ -83,3 +83,17 @@ def test_too_few_landings_say_nothing() -> None:
     parameters = free_parameters(composition, BASE[2:4])
     error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
     assert Landings(error, rests(record)[:3]).solved(composition.theta) is None
+
+
+def test_what_acts_in_time_is_no_matter_of_rests() -> None:
+    """A sensor that lags has caught up where the stem rests; however far off spring and friction are, its lag stays."""
+    truth = with_effect(VALVE, "sensor_lag", time_constant_s=0.06)
+    record = ready(record_of(truth, 1, command_pa=slow_moves()))
+    composition = Composition.from_file(with_effect(SEED, "sensor_lag", time_constant_s=0.03))
+    fitted = "sensor_lag.time_constant_s"
+    parameters = free_parameters(composition, [*DEFAULT, fitted])
+    error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+    solved = Landings(error, rests(record)).solved(composition.theta)
+    assert solved is not None
+    assert solved.theta[composition.names.index(fitted)] == pytest.approx(0.03)
+    assert solved.theta[SPRING] == pytest.approx(VALVE.valve.spring_n_per_m, rel=2e-3)

@@ -203,6 +203,8 @@ class Landings:
     def solved(self, theta: Vector, kept: Collection[int] = ()) -> Solved | None:
         """Solve the landings for the free parameters that stand in them, from theta on; None if there are too few.
 
+        What follows in time what enters it has come to its end where the stem rests: its parameters stay.
+
         Args:
             theta: parameter vector.
             kept: indices of theta that stay besides those of motion.
@@ -210,7 +212,12 @@ class Landings:
         if self.count < FEWEST:
             return None
         pressure_pa = self._error.run.run(theta).pressure_pa
-        free = [i for i, each in enumerate(self._error.parameters) if each.index not in (*NOT_IN_LANDINGS, *kept)]
+        moving = {each.name for each in self._error.composition.effects if each.in_time}
+        free = [
+            i
+            for i, each in enumerate(self._error.parameters)
+            if each.index not in (*NOT_IN_LANDINGS, *kept) and each.name.partition(".")[0] not in moving
+        ]
         z, left = self._gauss_newton(self._error.coordinates(theta), pressure_pa, free)
         found = self._error.theta(z)
         if any(each.index == STATIC for each in self._error.parameters):
