@@ -1,8 +1,11 @@
 """The control core on the simulated valve, in virtual time: identification, steps, and what spoils them."""
 
 import math
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -134,3 +137,23 @@ def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) ->
     assert ratios.k_over_c == pytest.approx(K_OVER_C, rel=0.01)
     singly = {decisions[-1].estimates.a.reason, decisions[-1].estimates.k.reason}
     assert singly == {Refusal.COMMANDS_MISSED if spoil is interrupted else Refusal.VALID}
+
+
+NOTHING_LOADED = """
+import sys
+from tests.control.test_closed_loop import Plant
+plant = Plant(1)
+plant.run(0.1)
+before = set(sys.modules)
+plant.identify()
+plant.step_to(0.6)
+plant.run(0.5)
+print(*sorted(set(sys.modules) - before))
+"""
+
+
+def test_no_cycle_loads_a_module() -> None:
+    """As `np.median` does when it is first called: the cycle in which a stem first moved came 20 ms late."""
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", NOTHING_LOADED], cwd=root, capture_output=True, text=True, check=True)
+    assert not done.stdout.split()
