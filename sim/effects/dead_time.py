@@ -52,10 +52,10 @@ def straight(u: float, h: float, t: float, q: Parameters, z: Memory) -> float:
     if T <= NO_TIME_S:
         return h
     k = stretch_at(t - T + NO_TIME_S, z)
-    lasts = h
+    here, lasts = k % STRETCHES, h
     if k < int(z[COUNT]) - 1:
         lasts = z[TIME + (k + 1) % STRETCHES] - (t - T)
-    elif u != z[VALUE + k % STRETCHES] + z[SLOPE + k % STRETCHES] * (t - z[TIME + k % STRETCHES]):
+    elif u != z[VALUE + here] + z[SLOPE + here] * (t - z[TIME + here]):
         lasts = T
     return float(lasts) if lasts < h - NO_TIME_S else h
 

@@ -23,7 +23,7 @@ ROWS_A_SLIDE = 6
 CLOSE_S = 0.01
 """Rows farther apart than this cost less than the slips between them."""
 JUMP = 0.25
-"""Change of the pressure force from one row to the next, in F_c, that is one of a moment."""
+"""Change of the pressure force from one row to the next, in F_c, from which the command jumps."""
 ROUNDING = 1e-3
 """Of a period: what may be missing of a whole number of them."""
 
