@@ -60,6 +60,13 @@ def test_searches_of_one_origin_count_once() -> None:
     assert agreeing(error, [Place(BEST, "base fit 1"), Place(BEST, "odd landings"), Place(BEST, "base fit 1")]) == 2
 
 
+def test_a_search_by_all_slips_is_none_beside_those_by_halves_of_them() -> None:
+    error = made_up()
+    assert agreeing(error, [Place(BEST, "slips"), Place(BEST, "odd slips")]) == 1
+    assert agreeing(error, [Place(BEST, "slips"), Place(BEST, "odd slips"), Place(BEST, "even slips")]) == 2
+    assert agreeing(error, [Place(BEST, "slips"), Place(BEST, "base fit 1")]) == 2
+
+
 def test_the_same_cost_elsewhere_is_no_agreement() -> None:
     error = made_up(second=0.8)
     elsewhere = BEST + np.array([0.8, 0.0, 0.0])

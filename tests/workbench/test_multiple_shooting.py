@@ -1,5 +1,7 @@
 """Multiple shooting: each slip answers for itself, and a valley is there where the free run has stairs."""
 
+from itertools import chain
+
 import numpy as np
 import pytest
 
@@ -69,11 +71,11 @@ def test_it_leads_where_the_free_run_shows_no_way() -> None:
     off = np.array([0.0, *composition.theta[BASE_PARAMETERS + 1 :]])
     seed = np.concatenate([base.seeds[0], off])
     starts = effect_starts(error, parameters[len(DEFAULT) :], [seed, seed, seed], landed=False)
-    found = shooting_starts(error, starts.grid, error.coordinates(seed))
-    assert {each.origin for each in found} == {"even slips", "odd slips"}
+    found = shooting_starts(error, starts.strengths, error.coordinates(seed))
+    assert {each.origin for each in found} == {"slips", "even slips", "odd slips"}
     true_cost = error.cost(error.coordinates(Composition.from_file(hidden.truth).theta))
     assert min(error.cost(each.z) for each in found) < 1.2 * true_cost
-    free = error.rough.least(starts.grid, MIDDLE)
+    free = error.rough.least(chain.from_iterable(starts.strengths), MIDDLE)
     assert error.cost(descended_through(error, free)) > 3.0 * true_cost
 
 
@@ -82,4 +84,4 @@ def test_nothing_is_begun_where_nothing_is_left(record: Record) -> None:
     parameters = free_parameters(composition, DEFAULT)
     error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
     there = error.coordinates(composition.theta)
-    assert not shooting_starts(error, [there + 0.02], there)
+    assert not shooting_starts(error, [[there + 0.02]], there)

@@ -102,6 +102,21 @@ def test_a_repeated_command_gives_the_repeatability_and_another_does_not() -> No
     assert repeatability_m(recording.command_pa, recording.position_m) is None
 
 
+def _two_laps(shift_m: float, scatter_m: float) -> tuple[Column, Column]:
+    """Twenty-four rests a lap, up and down by turns, each off by what the friction has changed, and by a scatter."""
+    generator = np.random.default_rng(7)
+    levels = np.tile(np.column_stack([generator.uniform(0.0, 0.04, 12), generator.uniform(0.05, 0.09, 12)]).ravel(), 2)
+    changed = np.repeat([0.0, shift_m], 24) * np.tile([1.0, -1.0], 24)
+    rests = np.repeat(levels + changed + scatter_m * generator.standard_normal(48), 20)
+    return np.repeat(1e6 * levels, 20), rests + 1e-5 * generator.standard_normal(960)
+
+
+def test_friction_that_changed_between_laps_is_no_scatter() -> None:
+    assert repeatability_m(*_two_laps(0.0, 2e-4)) == pytest.approx(2e-4, rel=0.3)
+    assert repeatability_m(*_two_laps(3e-3, 2e-4)) == pytest.approx(2e-4, rel=0.3)
+    assert repeatability_m(*_two_laps(2e-4, 2e-4)) == pytest.approx(2.5e-4, rel=0.3), "as much as scatter may by chance"
+
+
 @pytest.mark.parametrize(("noise", "quantum"), [(3e-5, 0.0), (3e-5, 7e-5)])
 def test_what_repeats_is_no_noise_but_for_the_last_rounding(noise: float, quantum: float) -> None:
     """A stem that goes evenly through a rounding of 0.3 mm before the noise, never at rest: 0.09 mm rms if taken so."""

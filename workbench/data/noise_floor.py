@@ -3,6 +3,15 @@
 The noise is found at rest (`config.noise`), never in motion. A record whose command repeats after a lag L shows the
 position twice: repeatability = rms(x(t + L) - x(t)) / sqrt 2; and where nothing rests, what rests in the difference of
 the two tells the noise. What repeats is no noise, but for the last rounding, q: noise^2 <= repeatability^2 + q^2 / 12.
+
+Friction that has changed in the meantime is no scatter either: it moves every rest by as much, against the direction s
+of the slide that ended there. Of the difference d = x(t + L) - x(t), at m rests, that part is taken out,
+
+    c = mean of s d,    r = d - c s        where F = (m - 1) (sum d^2 - sum r^2) / sum r^2 has p < 1e-4
+
+with F of 1 and m - 1 degrees of freedom; on the way from rest to rest it is anything up to that, |d - r| <= |c|. Then
+repeatability^2 = m / (m - 1) mean r^2 / 2.
+
 Where nothing tells it, it is what the recording says of itself (`# noise_m: 5e-5`, or the option `--noise-m`), or it is
 unknown.
 """
@@ -15,6 +24,7 @@ from config.drive import Scale
 from config.errors import InputError
 from config.noise import position_noise_m
 from config.recording import Column, Recording
+from workbench.data.motion import directions
 
 NOISE = "noise_m"
 """Key under which a recording says its noise."""
@@ -22,6 +32,8 @@ REPEATS = 1e-3
 """A command repeats if its rms difference over the lag is below this part of its rms deviation."""
 AGREED, WITHIN = 10, 4.0
 """Samples, and deviations of the noise, in which two laps are seen to agree."""
+BY_CHANCE = 1e-4
+"""Chance of what laps have in common in direction of motion, below which it is a change of friction and no scatter."""
 UNKNOWN = (
     "the noise of the sensor is unknown, so that no verdict rests on it: the stem rests nowhere long enough, and no "
     "command repeats. Say it, --noise-m M, or record the stem at rest, the command held for 40 samples"
@@ -122,24 +134,60 @@ def _ranges(x: Column) -> Column:
 def repeatability_m(command_pa: Column, position_m: Column) -> float | None:
     """Return the repeatability in m of an evenly sampled stretch, None if its command does not repeat itself.
 
-    A first lap of three or more is left out: it begins elsewhere. Of two, what comes before they first agree: until
-    then they differ by where they began, and not by what the valve does not repeat.
+    A first lap of three or more is left out: it begins elsewhere. Of two, what comes before they first agree, or rest
+    after a move that both made: until then they differ by where they began, and not by what the valve does not repeat.
     """
     lag = repeat_lag(command_pa)
     if lag is None:
         return None
+    noise_m = noise_std_m(position_m, command_pa)
     first = lag if position_m.size > 2.5 * lag else 0
-    difference = position_m[first + lag :] - position_m[first:-lag]
-    if not first:
-        difference = difference[_agreed(difference, noise_std_m(position_m, command_pa)) :]
-    finite = difference[np.isfinite(difference)]
-    return float(np.sqrt(np.mean(finite**2) / 2.0)) if finite.size else None
+    before_m, after_m = position_m[first:-lag], position_m[first + lag :]
+    agreed = 0 if first or noise_m is None else _agreed(before_m, after_m, noise_m)
+    before_m, after_m = before_m[agreed:], after_m[agreed:]
+    finite = np.isfinite(after_m - before_m)
+    if not finite.any():
+        return None
+    return _scatter_m(before_m[finite], after_m[finite], noise_m)
 
 
-def _agreed(difference_m: Column, noise_m: float | None) -> int:
-    """Return from where on two laps have agreed within the noise, over so many samples; 0 if they never do."""
+def _scatter_m(before_m: Column, after_m: Column, noise_m: float | None) -> float:
+    """Return the scatter of two laps, m, without a change of friction between them, where that is beyond chance."""
+    difference_m = after_m - before_m
+    scatter_m = float(np.sqrt(np.mean(difference_m**2) / 2.0))
     if noise_m is None:
-        return 0
-    near = np.abs(difference_m) <= WITHIN * 2.0**0.5 * noise_m
+        return scatter_m
+    way = directions(0.5 * (before_m + after_m), noise_m)
+    rests = int(np.count_nonzero((way[:-1] != 0) & (way[1:] == 0)))
+    if rests < 2:
+        return scatter_m
+    moves = int(np.argmax(way != 0))
+    way, difference_m = way[moves:], difference_m[moves:]
+    ended = way[np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))]
+    at_rest = way == 0
+    shift_m = float(np.mean((ended * difference_m)[at_rest]))
+    on_the_way_m = np.clip(difference_m, -abs(shift_m), abs(shift_m))
+    left_m = difference_m - np.where(at_rest, shift_m * ended, on_the_way_m)
+    if not _is_beyond_chance(difference_m[at_rest], left_m[at_rest], rests):
+        return scatter_m
+    return float(np.sqrt(np.mean(left_m**2) / 2.0 * rests / (rests - 1)))
+
+
+def _is_beyond_chance(whole_m: Column, left_m: Column, count: int) -> bool:
+    """Whether so many differences, of which one common part was taken out, left so little that it was there."""
+    from scipy.special import fdtrc
+
+    whole, left = float(np.sum(whole_m**2)), float(np.sum(left_m**2))
+    ratio = (count - 1) * (whole - left) / max(left, np.finfo(float).tiny)
+    return bool(fdtrc(1, count - 1, ratio) < BY_CHANCE)
+
+
+def _agreed(before_m: Column, after_m: Column, noise_m: float) -> int:
+    """Return from where on two laps have agreed, or rested after a move of both; 0 if they never do."""
+    near = np.abs(after_m - before_m) <= WITHIN * 2.0**0.5 * noise_m
     together = np.convolve(near, np.ones(AGREED), "valid") == AGREED
-    return int(np.argmax(together)) if together.size else 0
+    agreed = int(np.argmax(together)) if together.size else 0
+    moving = np.array([directions(each, noise_m) != 0 for each in (before_m, after_m)])
+    rested = np.logical_or.accumulate(moving.all(axis=0)) & ~moving.any(axis=0)
+    landed = int(np.argmax(rested))
+    return min(agreed, landed) if agreed and landed else agreed

@@ -9,7 +9,7 @@ A coordinate whose standard deviation s_i exceeds a factor of e is not determine
 together with others: searches may leave it anywhere, and agree by their cost.
 
 Where a search began is its origin. Searches of one origin, strengths of an effect added to the same base fit, say,
-share what may be wrong in it: they count as one.
+share what may be wrong in it: they count as one. So does a search by all slips beside those by halves of them.
 """
 
 from collections.abc import Sequence
@@ -21,6 +21,9 @@ from sim.karnopp import Vector
 from workbench.fit.objective import SimulationError
 from workbench.fit.uncertainty import deviations
 
+SHARED = "slips"
+"""Origin of a search by all slips, whose measurements those by halves share."""
+HALVES = frozenset({"even slips", "odd slips"})
 WITHIN = 1.01
 DEVIATIONS, NEAR = 2.0, 0.01
 DETERMINED = 1.0
@@ -51,4 +54,5 @@ def agreeing(error: SimulationError, ends: Sequence[Place]) -> int:
         near = np.abs(end.z - best.z)[compared] <= allowed
         return error.cost(end.z) <= WITHIN * error.cost(best.z) and bool(near.all())
 
-    return len({end.origin for end in ends if agrees(end)})
+    origins = {end.origin for end in ends if agrees(end)}
+    return len(origins - {SHARED} if origins & HALVES else origins)

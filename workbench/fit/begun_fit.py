@@ -63,8 +63,8 @@ class BegunFit:
     """The parameters of what is added."""
     waiting: Sequence[Place] = ()
     """Starts from landings that no search has begun at."""
-    grid: Sequence[Vector] = ()
-    """Coordinates of strengths of what is added, from which multiple shooting chooses."""
+    strengths: Sequence[Sequence[Vector]] = ()
+    """Coordinates of each strength of what is added, from which multiple shooting begins."""
     through: bool = False
     """Whether the searches have come through the middling scale."""
 
@@ -143,7 +143,7 @@ class BegunFit:
         """Search from starts by multiple shooting too, where the best end leaves something to explain."""
         if self.cost <= LEAVES * self.error.count:
             return self
-        begins = shooting_starts(self.error, self.grid, self.ends[0].z)
+        begins = shooting_starts(self.error, self.strengths, self.ends[0].z)
         found = _each(self._ended, begins, self.workers, lambda done: self.tell(0.9 + 0.05 * done))
         return replace(self, ends=self._ordered([*self.ends, *found]))
 

@@ -257,7 +257,7 @@ def _begun(
         weakest=weakest,
         waiting=starts.at_landings[1:],
         added=added,
-        grid=starts.grid,
+        strengths=starts.strengths,
     )
     # Viscous friction stands in no landing: where it is far off, a start from there is far off until it is moved.
     return widely(begun, [*starts.begins, *moved_starts(error, starts.at_landings[:1], added)])

@@ -2,8 +2,10 @@
 
 Where slips follow each other closely, the free run's error is too rough for a descent to follow a valley: all that
 friction does over velocity is lost between its stairs. With the run put back at each rest (`multiple_shooting`) the
-valley is there to go down. The grid of strengths is screened by that error, and the best goes down by it: by every
-other slip, and by those between, two starts without a common measurement. Then the free run goes on from there.
+valley is there to go down. The base fit has taken for friction what the effect does, so that of the strengths tried
+there the least error leads astray: from each of them, viscous friction scanned, a search goes down, and where that of
+all slips comes to the least it goes on, and others begin: by every other slip, and by those between, two without a
+common measurement. Then the free run goes on from there.
 
 What the free run's own search came to is judged by the same error: where the descent comes not clearly below that, it
 ends early.
@@ -11,9 +13,12 @@ ends early.
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from sim.composition import VISCOUS
 from sim.karnopp import Vector
-from workbench.fit.agreement import Place
-from workbench.fit.descent import COARSE, MIDDLING, WIDE, Stage, descended
+from workbench.fit.agreement import SHARED, Place
+from workbench.fit.descent import COARSE, MIDDLING, WIDE, descended
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.model.free_run import FINE, ROUGH
 from workbench.model.multiple_shooting import slips_from_rest
@@ -23,34 +28,60 @@ ENOUGH_SLIPS = 12
 FEWEST_SLIPS = 4
 GAINS = 0.9
 """Factor on the error of what is there already, below which a descent is worth while."""
+VISCOUS_FACTORS = (0.1, 0.3, 1.0)
+"""Of the base fit's, which has taken a lag for friction."""
+
+Strength = Sequence[Vector]
+"""Coordinates of an effect's strength at a base fit, of which the best is begun at."""
 
 
-def shooting_starts(error: SimulationError, grid: Sequence[Vector], best: Vector) -> list[Place]:
-    """Return where multiple shooting comes to from the best of a grid; nothing where that is no better.
+def shooting_starts(error: SimulationError, strengths: Sequence[Strength], best: Vector) -> list[Place]:
+    """Return where multiple shooting comes to from the strengths; nothing where that is no better.
 
     Args:
         error: of the free run.
-        grid: coordinates to choose from.
+        strengths: what is tried of an effect.
         best: coordinates of what the searches of the free run have come to.
     """
-    if error.run.by.slow or not grid:
+    if error.run.by.slow or not strengths:
         return []
     slips = slips_from_rest(error.run.record)
     if slips < FEWEST_SLIPS:
         return []
-    halves = {"even slips": 0, "odd slips": 1} if slips >= ENOUGH_SLIPS else {"slips": None}
-    found = ((origin, _shot(error, grid, best, part)) for origin, part in halves.items())
-    return [Place(z, origin) for origin, z in found if z is not None]
+    tried = [_with_less_viscosity(error, each) for each in strengths]
+    rough = error.by_slips(ROUGH)
+    ends = [_down(rough, rough.least(each, MIDDLE)) for each in tried]
+    costs = [rough.cost(z, MIDDLE) for z in ends]
+    first = int(np.argmin(costs))
+    if costs[first] > GAINS * rough.cost(best, MIDDLE):
+        return []
+    halves = {"even slips": 0, "odd slips": 1} if slips >= ENOUGH_SLIPS else {}
+    found = {SHARED: _shot(error, ends[first], best, None)} | {
+        origin: _shot(error, error.by_slips(ROUGH, part).least(tried[first], MIDDLE), best, part)
+        for origin, part in halves.items()
+    }
+    return [Place(z, origin) for origin, z in found.items() if z is not None]
 
 
-def _shot(error: SimulationError, grid: Sequence[Vector], best: Vector, part: int | None) -> Vector | None:
-    """Return where the best of the grid goes down to, by the slips of one part; None where that gains nothing."""
+def _down(rough: SimulationError, z: Vector) -> Vector:
+    return descended(smoothed(rough, z), z, WIDE)
+
+
+def _with_less_viscosity(error: SimulationError, places: Strength) -> list[Vector]:
+    found = []
+    for z in places:
+        for factor in VISCOUS_FACTORS:
+            theta = error.theta(z)
+            theta[VISCOUS] *= factor
+            found.append(error.coordinates(theta))
+    return found
+
+
+def _shot(error: SimulationError, z: Vector, best: Vector, part: int | None) -> Vector | None:
+    """Return where a start goes down to, by the slips of one part; None where that gains nothing."""
     rough, fine = (error.by_slips(accuracy, part) for accuracy in (ROUGH, FINE))
-    stages: Sequence[tuple[SimulationError, Stage]] = ((rough, WIDE), (rough, MIDDLING), (fine, COARSE))
-    z = rough.least(grid, MIDDLE)
-    for by, stage in stages:
-        smooth = smoothed(by, z)
-        z = descended(smooth, z, stage)
+    for by, stage in ((rough, WIDE), (rough, MIDDLING), (fine, COARSE)):
+        z = descended(smoothed(by, z), z, stage)
         if by.cost(z, MIDDLE) > GAINS * by.cost(best, MIDDLE):
             return None
     return z

@@ -67,8 +67,8 @@ class EffectStarts(NamedTuple):
     begins: list[Place]
     at_landings: list[Place]
     """For `moved_starts` to finish."""
-    grid: list[Vector]
-    """Coordinates of all strengths at the best base fit, from which the first of `begins` were chosen."""
+    strengths: list[list[Vector]]
+    """Coordinates of each strength at the best base fit, from which the first of `begins` were chosen."""
 
 
 def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, count: int) -> list[Place]:
@@ -127,7 +127,7 @@ def effect_starts(
         starts += [Place(z, f"base fit {number}") for z in error.screened(grid, EACH_SEED if number > 1 else AT_BEST)]
     for band in with_plays(seeds[0], added):
         starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
-    return EffectStarts(starts, at_landings, grids[0])
+    return EffectStarts(starts, at_landings, [grids[0][i :: len(points)] for i in range(len(points))])
 
 
 def _slower(parameter: Parameter, value: float) -> float:
