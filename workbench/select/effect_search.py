@@ -9,7 +9,7 @@ parameters of the best of those with: an optimiser's failure must not look like 
 model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
 two steps leave something to explain, the first is tried with its runner-up added, too, and taken back if that leads
 farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
-several explain all, an earlier step's rivals are asked again beside what was added later.
+several explain all, what had evidence in an earlier step is asked again beside what was added later.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -35,6 +35,7 @@ from workbench.model.parameters import free_parameters
 from workbench.select.block_errors import block_errors, indistinguishable
 from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
 from workbench.select.effect_candidates import (
+    EffectCandidate,
     EffectStep,
     EvaluatedModel,
     judged_step,
@@ -177,15 +178,16 @@ class EffectSearch:
         return step, following
 
     def _asked_beside(self, step: EffectStep, later: Sequence[EffectStep]) -> EffectStep:
-        """Return a step with those of its rivals that do as well beside what later steps have added, too.
+        """Return a step with what does as well as the added one beside what later steps have added, too.
 
-        While an effect is missing its error is in most blocks, and hides what acts in few.
+        While an effect is missing its error is in most blocks: it hides what acts in few, and rivals that are worse
+        only because they do nothing for what is missing. So all that had evidence are asked.
         """
         added, last = step.added, _best(later[-1] if later else step)
         if added is None or all(each.added is None for each in later) or not last.explained:
             return step
         own = algebraic_class(added.name, self._library)
-        asked = [each.name for each in step.indistinguishable if each.name not in own]
+        asked = [each.name for each in step.candidates if _may_stand(each) and each.name not in own | {*last.effects}]
         if not asked:
             return step
         valve = last.fit.valve
@@ -197,7 +199,8 @@ class EffectSearch:
             if isinstance(each, EvaluatedModel) and indistinguishable(last.errors.all_logs, each.errors.all_logs)
             for member in algebraic_class(name, self._library)
         }
-        rivals = tuple(each for each in step.indistinguishable if each.name in own | as_good)
+        own_rivals = {each.name for each in step.indistinguishable if each.name in own}
+        rivals = tuple(each for each in step.candidates if each.name in own_rivals | as_good and each.physical)
         return replace(step, indistinguishable=rivals)
 
     def with_intervals(self, models: Sequence[EvaluatedModel]) -> tuple[EvaluatedModel, ...]:
@@ -425,6 +428,11 @@ def _rms_so_far_m(found: BegunFit | EvaluatedModel | str) -> float | None:
 
 def _best(step: EffectStep) -> EvaluatedModel:
     return step.added.model if step.added and step.added.model else step.before
+
+
+def _may_stand(candidate: EffectCandidate) -> bool:
+    """Whether an effect that was tried may be what is missing, better beside others than alone."""
+    return candidate.model is not None and candidate.physical and candidate.evidence > LEAST_BIC
 
 
 def _cost(model: EvaluatedModel | str) -> float:
