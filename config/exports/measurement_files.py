@@ -1,5 +1,5 @@
-"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), older MATLAB (`matlab_reader`),
-MDF4 (`mdf4_reader`).
+"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), older MATLAB
+(`matlab_reader`), MDF4 (`mdf4_reader`).
 
 Each group of channels of one length is a table. A channel is named by its path, joined by points, with its unit behind
 it in brackets where the file says it; a time that is not stored as numbers (TDMS' waveforms, MDF's masters) is
