@@ -24,6 +24,8 @@ TIME, VALUE, SLOPE = 2, 2 + STRETCHES, 2 + 2 * STRETCHES
 LONG_AGO_S = -1e9
 NO_TIME_S = 1e-9
 """A stretch that lasts no longer is over."""
+NONE_S = 1e-6
+"""A dead time that is none: steps behind a lag end after one dead time each, and a search may go towards none."""
 LOOKS = "Everything is late by the same time: after each change of the command nothing happens for T, then all of it."
 CONFOUNDED = {
     "ip_lag": "the first moments after a step: the dead time answers not at all, the lag at once",
@@ -49,7 +51,7 @@ def start(t: float, signal: float, z: Memory) -> None:
 def straight(u: float, h: float, t: float, q: Parameters, z: Memory) -> float:
     """Until the stretch that comes out ends; the newest one's successor begins now if u does not go on with it."""
     T = q.dead_time_s
-    if T <= NO_TIME_S:
+    if T <= NONE_S:
         return h
     k = stretch_at(t - T + NO_TIME_S, z)
     here, lasts = k % STRETCHES, h
@@ -63,7 +65,7 @@ def straight(u: float, h: float, t: float, q: Parameters, z: Memory) -> float:
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
     """Return p, of the stretch that comes out amid the step; u where that is not written down yet."""
     T = q.dead_time_s
-    if max(NO_TIME_S, abs(middle - t)) >= T:
+    if max(NONE_S, abs(middle - t)) >= T:
         return u
     k = stretch_at(middle - T, z) % STRETCHES
     return float(z[VALUE + k] + z[SLOPE + k] * (t - T - z[TIME + k]))

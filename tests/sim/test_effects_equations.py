@@ -224,6 +224,14 @@ def test_a_step_ends_where_a_delayed_jump_comes_out(dead_time_s: float) -> None:
         assert t == pytest.approx((i + 1) * h, abs=1e-12)
 
 
+def test_a_dead_time_too_short_for_any_record_cuts_no_steps() -> None:
+    """Behind a lag each step ended after one dead time: a search that went towards none took hours for a record."""
+    q, z, h = dead_time.Parameters(1e-7), np.zeros(dead_time.MEMORY), 1e-3
+    dead_time.start(0.0, 0.0, z)
+    assert dead_time.straight(5e4, h, 0.0, q, z) == h
+    assert dead_time.pressure(5e4, 0.0, 0.5 * h, q, z) == 5e4
+
+
 def test_a_limited_rate_that_ends_inside_a_step_comes_out_right() -> None:
     composition = library()
     limits = {"rate_limit.filling_pa_per_s": 713e3, "rate_limit.venting_pa_per_s": 1.9e6}
