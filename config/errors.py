@@ -1,5 +1,7 @@
 """Errors for people: each is a single line, of bounded length, whatever it quotes of a file or a library."""
 
+from collections.abc import Mapping
+
 LONGEST = 2000
 """Characters of a problem; what stands in its middle beyond that is left out."""
 
@@ -26,6 +28,15 @@ class InputError(Exception):
         self.source = one_line(source)
         self.problem = one_line(problem)
         super().__init__(f"{self.source}: {self.problem}")
+
+    def named(self, names: Mapping[str, str]) -> "InputError":
+        """Return the same of a source, or of a place in it, that a person knows by another name.
+
+        >>> str(InputError("valve file: effect preload", "none").named({"valve file": "v.toml"}))
+        'v.toml: effect preload: none'
+        """
+        kind, colon, place = self.source.partition(": ")
+        return type(self)(f"{names.get(kind, kind)}{colon}{place}", self.problem)
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[str, str]]:
         """Pass between processes, as what a worker could not do is told by another."""

@@ -315,6 +315,8 @@ def _table(
             break
         key, _, value = header.lstrip("# ").partition(":")
         metadata[key.strip()] = value.strip()
+    if not number:
+        raise InputError(str(path), f"is empty; its first line should name the columns: {', '.join(required)}")
     names = [name.strip() for name in header.split(",")]
     _require(path, required, names, f"line {number} names", or_required)
     whole = _Whole(lines, len(names))

@@ -58,7 +58,7 @@ class Notebook:
         done = subprocess.run(
             words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, env=_environment()
         )
-        if done.returncode > HOLDS_NOT:
+        if done.returncode not in (0, HOLDS_NOT):  # below 0 a signal has ended it
             raise SystemExit(f"`{command}` ends with {done.returncode}:\n{done.stdout}")
         printed = PROGRESS.sub("", done.stdout)
         return printed + (f"[exit status {done.returncode}]\n" if done.returncode else "")

@@ -11,6 +11,7 @@ from typing import Any, Self, TypeVar
 
 import numpy as np
 
+from config.drive import Kind
 from config.errors import InputError
 from config.loading import validated
 from config.valve_file import ValveFile, ValveParameters
@@ -145,7 +146,7 @@ class Composition:
         validated(ValveParameters, base, self.source)
         for effect in self.effects:
             written = {key: values[f"{effect.name}.{key}"] for key in effect.parameters}
-            effect.values(written, f"{self.source}: effect {effect.name}")
+            _values(effect, written, f"{self.source}: effect {effect.name}", self.valve.own)
         return np.array([float(values[name]) for name in self.names])
 
     def file(self, theta: Vector) -> ValveFile:
@@ -161,6 +162,18 @@ class Composition:
             for each in self.effects
         ]
         return validated(ValveFile, {"valve": base, "effect": tables}, self.source)
+
+
+def _values(effect: Effect, written: Mapping[str, Any], source: str, kind: Kind) -> tuple[float, ...]:
+    """Return an effect's parameters; what is wrong with them is said in the kind's own names.
+
+    Raises:
+        InputError: a parameter unknown, missing or out of its range.
+    """
+    try:
+        return effect.values(written, source)
+    except InputError as error:
+        raise InputError(source, kind.text(error.problem)) from None
 
 
 def parameter_vector(file: ValveFile, effects: Sequence[Effect], source: str) -> Vector:
@@ -182,7 +195,7 @@ def parameter_vector(file: ValveFile, effects: Sequence[Effect], source: str) ->
         written = table.parameters
         if by_force:
             written = {effect.declared(key): value for key, value in written.items()}
-        theta += effect.values(written, f"{source}: effect {table.name}")
+        theta += _values(effect, written, f"{source}: effect {table.name}", file.valve.own)
     vector = np.array(theta)
     vector.flags.writeable = False
     return vector

@@ -299,7 +299,10 @@ def find_effect(text: str, source: str) -> Effect:
     if not any(path.resolve().is_relative_to(folder) for folder in allowed_folders()):
         said = f"names {text}, a program, which lies in no folder allowed: put it beside your work, or allow its folder"
         raise InputError(source, f"{said}, {FOLDERS_ALLOWED}={path.resolve().parent}")
-    _say_aloud(path.resolve(), source)
+    shown = path.resolve()
+    if shown not in _SAID:
+        _SAID.add(shown)
+        _say_aloud(shown, source)
     return read_effect(path)
 
 
@@ -323,7 +326,10 @@ def allowed_folders() -> list[Path]:
     return [Path(each).resolve() for each in (said.split(os.pathsep) if said else ["."])]
 
 
-@cache
+_SAID: set[Path] = set()
+"""Of which it was said that they are run, whoever named them."""
+
+
 def _say_aloud(path: Path, source: str) -> None:
     here = Path.cwd()
     shown = path.relative_to(here) if path.is_relative_to(here) else path

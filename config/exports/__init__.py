@@ -4,9 +4,10 @@ From the file to the recording:
 
     raw_table                               rows of cells before anything is understood; which kind of file it is
     text_table                              encodings, separators, quotation marks
-    typed_tables                            Excel workbooks, MATLAB files, Parquet
-    measurement_files                       HDF5, MATLAB 7.3, TDMS, MDF4
-    mdf4_reader                             MDF4, in a process of its own
+    typed_tables                            Excel workbooks, Parquet
+    measurement_files                       MATLAB, HDF5, TDMS, MDF4
+    matlab_reader, mdf4_reader              MATLAB before 7.3 and MDF4, each in a process of its own
+    reader_process                          that process: it may break down or come to no end, and nothing else does
     line_protocol                           InfluxDB's line protocol
     export_units                            units, by all the names people give them
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read

@@ -1,16 +1,9 @@
-"""MDF files of version 4, as loggers of test rigs write them: read by asammdf, in a process of its own.
+"""MDF files of version 4, as loggers of test rigs write them: read by asammdf in a process of its own.
 
-A damaged file may end its reader by a signal, or keep it for ever (channels that follow one another in a circle): that
-ends that process alone, and the file is refused. What it read comes back as arrays, in a file that is then deleted.
-
-    python -P -m config.exports.mdf4_reader FILE READ.npz      is what it runs; it refuses by a line on standard error
+Channels of a damaged file may follow one another in a circle, over which asammdf comes to no end.
 """
 
-import json
-import os
-import subprocess
 import sys
-import tempfile
 import warnings
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
+from config.exports.reader_process import Groups, damaged, read_apart, write_read
 from config.exports.typed_tables import NUMBERS, Columns, first_line, with_unit
 from config.extras import needed
 from config.plain_file import require_moderate
 
-REFUSED = 2
-LONGEST_S, BYTES_A_S = 20.0, 1e6
-"""For which it may read; more of a large file. A megabyte takes it a tenth of a second."""
+KIND = "MDF"
 
 
-def mdf4_groups(path: Path) -> list[tuple[str, Columns]]:
+def mdf4_groups(path: Path) -> Groups:
     """Return the channels of numbers, float64, by their names with their units, of each group, by its name.
 
     Raises:
@@ -37,29 +29,10 @@ def mdf4_groups(path: Path) -> list[tuple[str, Columns]]:
     """
     if find_spec("asammdf") is None:
         needed("asammdf", str(path))
-    with tempfile.TemporaryDirectory(prefix="mdf4-") as folder:
-        into = Path(folder) / "read.npz"
-        words = [sys.executable, "-P", "-m", "config.exports.mdf4_reader", str(path.absolute()), str(into)]
-        limit_s = LONGEST_S + path.stat().st_size / BYTES_A_S
-        try:
-            ended = subprocess.run(words, capture_output=True, text=True, timeout=limit_s, check=False)
-        except subprocess.TimeoutExpired:
-            raise _damaged(path, f"its reader comes to no end in {limit_s:.0f} s") from None
-        if ended.returncode == REFUSED:
-            raise InputError(str(path), ended.stderr.strip().rpartition("\n")[2])
-        if ended.returncode:
-            raise _damaged(path, f"its reader breaks down, status {ended.returncode}")
-        with np.load(into) as read:
-            names, *arrays = (read[each] for each in read.files)
-    each = iter(arrays)
-    return [(group, {name: next(each) for name in channels}) for group, channels in json.loads(str(names))]
+    return read_apart(path, "config.exports.mdf4_reader", KIND)
 
 
-def _damaged(path: Path, why: str) -> InputError:
-    return InputError(str(path), f"is a damaged MDF file: {why}")
-
-
-def _read(path: Path) -> list[tuple[str, Columns]]:
+def _read(path: Path) -> Groups:
     """Read a file, here and now.
 
     Raises:
@@ -74,7 +47,7 @@ def _read(path: Path) -> list[tuple[str, Columns]]:
     except InputError:
         raise
     except Exception as error:  # a damaged file fails anywhere in its reader
-        raise _damaged(path, first_line(error)) from None
+        raise damaged(path, KIND, first_line(error)) from None
 
 
 def _group(path: Path, file: Any, index: int) -> Columns:
@@ -91,16 +64,5 @@ def _group(path: Path, file: Any, index: int) -> Columns:
     return columns
 
 
-def main(path: str, into: str) -> None:
-    """Read a file into another, or say why not and end."""
-    try:
-        groups = _read(Path(path))
-    except InputError as error:
-        print(error.problem, file=sys.stderr, flush=True)
-        os._exit(REFUSED)  # at once: objects of asammdf that were not made complain of that when they go
-    names = json.dumps([(name, list(group)) for name, group in groups])
-    np.savez(into, np.array(names), *(each for _, group in groups for each in group.values()))
-
-
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    write_read(_read, *sys.argv[1:])

@@ -1,4 +1,5 @@
-"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), MDF4 (`mdf4_reader`).
+"""Files of measurement systems: HDF5 and MATLAB 7.3, which is HDF5 (h5py), TDMS (nptdms), older MATLAB
+(`matlab_reader`), MDF4 (`mdf4_reader`).
 
 Each group of channels of one length is a table. A channel is named by its path, joined by points, with its unit behind
 it in brackets where the file says it; a time that is not stored as numbers (TDMS' waveforms, MDF's masters) is
@@ -16,11 +17,22 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
+from config.exports.matlab_reader import matlab_columns
 from config.exports.mdf4_reader import mdf4_groups
 from config.exports.raw_table import RawTable
 from config.exports.typed_tables import NUMBERS, Columns, by_length, column_rows, first_line, no_vectors, with_unit
 from config.extras import needed
 from config.plain_file import require_moderate
+
+
+def matlab(path: Path) -> list[RawTable]:
+    """Return the tables that the vectors of a MATLAB file before version 7.3 make, those of one length each.
+
+    Raises:
+        InputError: it is damaged, or holds no vectors.
+        ModuleNotFoundError: scipy is not installed; names the extra.
+    """
+    return _required(path, _tables(matlab_columns(path), "vectors"))
 
 
 def hdf5(path: Path) -> list[RawTable]:

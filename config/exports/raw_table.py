@@ -60,10 +60,9 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
         return typed_tables.workbook(path, sheet)
     if sheet is not None:
         raise InputError("--sheet", f"goes with an Excel workbook, and {path} is none")
-    if begin.startswith(b"MATLAB 5.0 MAT-file"):
-        return typed_tables.matlab(path)
     for magic, read in (
         (b"PAR1", typed_tables.parquet),
+        (b"MATLAB 5.0 MAT-file", measurement_files.matlab),
         (b"MATLAB 7.3 MAT-file", measurement_files.hdf5),
         (b"\x89HDF", measurement_files.hdf5),
         (b"TDSm", measurement_files.tdms),

@@ -1,4 +1,4 @@
-"""Tables that know numbers from words: Excel workbooks (openpyxl), MATLAB files (scipy), Parquet (pyarrow)."""
+"""Tables that know numbers from words: Excel workbooks (openpyxl), Parquet (pyarrow)."""
 
 import datetime
 import warnings
@@ -82,27 +82,6 @@ def _cell(value: object) -> Cell:
     return str(value).strip()
 
 
-def matlab(path: Path) -> list[RawTable]:
-    """Return the table that the vectors of a MATLAB file make, those of one length; structs by `name.field`.
-
-    Raises:
-        InputError: it is damaged, or holds no vectors.
-        ModuleNotFoundError: scipy is not installed; names the extra.
-    """
-    io = needed("scipy.io", str(path))
-    try:
-        with warnings.catch_warnings(action="ignore"):
-            found = io.loadmat(path, simplify_cells=True)
-    except Exception as error:  # a damaged file fails anywhere in scipy's reader
-        raise InputError(str(path), f"is a damaged MATLAB file: {first_line(error)}") from None
-    columns = dict(_vectors({name: value for name, value in found.items() if not name.startswith("__")}))
-    if not columns:
-        raise no_vectors(path)
-    return [
-        RawTable(f"vectors of {length}", "row", partial(column_rows, chosen)) for length, chosen in by_length(columns)
-    ]
-
-
 def no_vectors(path: Path) -> InputError:
     """Return what to say of a file without vectors."""
     return InputError(str(path), "holds no vectors of numbers; save time, position and command as vectors")
@@ -112,18 +91,6 @@ def by_length(columns: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, Any]]
     """Yield the lengths of columns, the longest first, and the columns of each."""
     for length in sorted({len(each) for each in columns.values()}, reverse=True):
         yield length, {name: each for name, each in columns.items() if len(each) == length}
-
-
-def _vectors(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _vectors(value, f"{prefix}{name}.")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in NUMBERS and value.size > 1:
-            if value.ndim == 1:
-                yield prefix + name, value.astype(np.float64)
-            elif value.ndim == 2:
-                for index in range(value.shape[1]):
-                    yield f"{prefix}{name}(:,{index + 1})", value[:, index].astype(np.float64)
 
 
 def parquet(path: Path) -> list[RawTable]:

@@ -24,14 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare and print; 0 if the model is adequate, else 1."""
 
-    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import at_work
     from workbench.compare.comparison import as_json, compare
 
     writable(arguments.json, "--json")
     writable(arguments.report, "--report")
-    valve = load_valve(find_valve(arguments.valve))
+    valve = read_valve(arguments.valve)
     recording = noise_said(read_any(arguments.recording, arguments, valve.valve.stroke_m), arguments)
     named = {"recording": str(arguments.recording), "valve file": arguments.valve}
     with naming(named), at_work("compare", f"holding {arguments.valve} against {arguments.recording}"):

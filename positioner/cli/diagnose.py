@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     import time
     from math import inf
 
-    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.next_step import discover_command, extend_commands
     from positioner.cli.parts.progress import Progress
@@ -76,7 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.report is not None:
         require_plotly(arguments.report)
     began_s, budget_s = time.monotonic(), inf if arguments.budget_s is None else arguments.budget_s
-    valve = load_valve(find_valve(arguments.valve))
+    valve = read_valve(arguments.valve)
+    require_effects(arguments.effects, "--effects")
     stroke_m = valve.valve.stroke_m
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None

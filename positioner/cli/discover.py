@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Discover and print; 0 if a form explains the recordings, or nothing is left to explain, else 1."""
     from config.extras import needed
-    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import at_work
     from workbench.discover.discovery import discover
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         writable(getattr(arguments, option), f"--{option}")
     if arguments.picture is not None:
         needed("matplotlib.pyplot", "--picture")
-    valve = load_valve(find_valve(arguments.valve))
+    valve = read_valve(arguments.valve)
     stroke_m = valve.valve.stroke_m
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None

@@ -42,8 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, play, print a line a round; 0 if nothing is left to be told apart, else 1."""
     from config.daemon_file import load_daemon
     from config.recording import Recording
-    from config.valve_file import find_valve, load_valve
     from positioner.cli.parts.experiment_player import player_on, require_ready
+    from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import Progress
     from sim.effect import find_effect, tried_effects
@@ -53,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     file = load_daemon(arguments.config, arguments.name)
     bounds = _bounds(file, arguments.config)
     require_ready(file, arguments)
-    valve = load_valve(find_valve(arguments.valve))
+    valve = read_valve(arguments.valve)
+    require_effects(arguments.effects, "--effects")
     recordings = [Recording.read(path) for path in arguments.rec]
     test = Recording.read(arguments.test) if arguments.test else None
     make_folder(arguments.out)

@@ -35,7 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Extend and write the new file with its journal; 0 if the held-out error falls, else 1."""
     import time
 
-    from config.valve_file import find_valve, load_valve
+    from config.valve_file import find_valve
+    from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import at_work
     from workbench.report import report_journal, require_plotly
@@ -50,7 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
         require_plotly(arguments.report)
     began_s = time.monotonic()
     path = find_valve(arguments.valve)
-    valve = load_valve(path)
+    valve = read_valve(arguments.valve)
+    require_effects(arguments.effect, "--effect")
     recordings = [noise_said(read_any(each, arguments, valve.valve.stroke_m), arguments) for each in arguments.fit]
     test = noise_said(read_any(arguments.test, arguments, valve.valve.stroke_m), arguments) if arguments.test else None
     Journal.beside(path)  # what is none is refused before the work begins

@@ -70,15 +70,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Play and write the recording; its time is the reference's, identification lies before it."""
     from config.errors import CommandFailed
     from config.recording import write_recording
-    from config.valve_file import find_valve, load_valve
+    from config.valve_file import find_valve
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.extended_valves import extended_valve_of
+    from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.output_files import writable
     from positioner.cli.parts.progress import at_work
 
     writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
-    valve = load_valve(path).valve
+    valve = read_valve(arguments.valve).valve
     time_s, reference_m = read_series(arguments.reference, "reference_m")
     _require_travel(arguments.reference, reference_m, valve.stroke_m)
     extended = None if arguments.extended is None else extended_valve_of(_files(arguments, valve)[0], "--extended")

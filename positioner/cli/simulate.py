@@ -24,8 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate from rest at position 0 without pressure, and write the recording."""
-    from config.valve_file import find_valve, load_valve
+    from config.valve_file import find_valve
     from positioner.cli.parts.csv_series import read_series
+    from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.output_files import writable
     from positioner.cli.parts.progress import at_work
@@ -34,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
-    valve = load_valve(path)
+    valve = read_valve(arguments.valve)
     by_setpoint = any(find_effect(each.name, str(path)).by_setpoint for each in valve.effect)
     asked = valve.valve.own.own("reference_m" if by_setpoint else "command_pa")
     time_s, command_pa = read_series(arguments.input, asked)

@@ -5,7 +5,7 @@
 T dead time, s; u entering pressure, p leaving pressure, Pa. What entered is kept as stretches of straight lines,
 (time, value, slope) each, in a ring of STRETCHES; a held command is one stretch. Stretches shorter than
 T / (STRETCHES - 1) are joined, so that the ring always reaches back to t - T: a command held for longer than that comes
-out exact. A step ends where one stretch follows another.
+out exact. A step ends where a jump comes out, and at bends that are not too near.
 """
 
 from math import inf
@@ -24,6 +24,11 @@ TIME, VALUE, SLOPE = 2, 2 + STRETCHES, 2 + 2 * STRETCHES
 LONG_AGO_S = -1e9
 NO_TIME_S = 1e-9
 """A stretch that lasts no longer is over."""
+JUMP = 1e-9
+"""Share of the pressure by which it has jumped, and is not merely rounded."""
+MOST_CUTS = 8
+"""Of what is left of a step a bend cuts off no less than this part. Behind a lag the end of a step is a bend, which
+comes out T later and would end another step there, and so on without end."""
 LOOKS = "Everything is late by the same time: after each change of the command nothing happens for T, then all of it."
 CONFOUNDED = {
     "ip_lag": "the first moments after a step: the dead time answers not at all, the lag at once",
@@ -47,25 +52,40 @@ def start(t: float, signal: float, z: Memory) -> None:
 
 
 def straight(u: float, h: float, t: float, q: Parameters, z: Memory) -> float:
-    """Until the stretch that comes out ends; the newest one's successor begins now if u does not go on with it."""
-    T = q.dead_time_s
+    """Until a jump comes out, or a bend, but for bends that would cut the step too finely."""
+    T, newest = q.dead_time_s, int(z[COUNT]) - 1
     if T <= NO_TIME_S:
         return h
     k = stretch_at(t - T + NO_TIME_S, z)
-    here, lasts = k % STRETCHES, h
-    if k < int(z[COUNT]) - 1:
-        lasts = z[TIME + (k + 1) % STRETCHES] - (t - T)
-    elif u != z[VALUE + here] + z[SLOPE + here] * (t - z[TIME + here]):
-        lasts = T
-    return float(lasts) if lasts < h - NO_TIME_S else h
+    while k < newest:
+        here, after = k % STRETCHES, (k + 1) % STRETCHES
+        lasts = z[TIME + after] - (t - T)
+        if lasts >= h - NO_TIME_S:
+            return h
+        if jumps(z[VALUE + after], z[TIME + after], here, z):
+            return float(lasts)
+        if z[SLOPE + after] != z[SLOPE + here] and lasts * MOST_CUTS >= h:
+            return float(lasts)
+        k += 1
+    here = k % STRETCHES
+    cuts = jumps(u, t, here, z) or (z[SLOPE + here] != 0.0 and h <= MOST_CUTS * T)
+    return T if cuts and h - NO_TIME_S > T else h
+
+
+def jumps(value: float, t: float, here: int, z: Memory) -> bool:
+    """Return whether a value is not that to which a stretch goes on."""
+    apart = abs(value - z[VALUE + here] - z[SLOPE + here] * (t - z[TIME + here]))
+    return bool(apart > JUMP * max(abs(value), abs(z[VALUE + here])))
 
 
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
-    """Return p, of the stretch that comes out amid the step; u where that is not written down yet."""
+    """Return p, on this side of a jump; u, back along the newest stretch, where that is not written yet."""
     T = q.dead_time_s
-    if max(NO_TIME_S, abs(middle - t)) >= T:
+    if T <= NO_TIME_S:
         return u
-    k = stretch_at(middle - T, z) % STRETCHES
+    if abs(middle - t) >= T:
+        return float(u - T * z[SLOPE + (int(z[COUNT]) - 1) % STRETCHES])
+    k = stretch_at(t - T + (NO_TIME_S if middle > t else -NO_TIME_S), z) % STRETCHES
     return float(z[VALUE + k] + z[SLOPE + k] * (t - T - z[TIME + k]))
 
 

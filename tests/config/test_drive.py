@@ -13,6 +13,7 @@ from config.historian_export import read_export
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
 from config.writing import write_valve
+from positioner.cli.main import main
 from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 
@@ -118,6 +119,28 @@ def test_what_is_wrong_is_one_line_in_the_drives_names(before: str, after: str, 
         load_valve(written(tmp_path, MOTOR.replace(before, after)))
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("force_nm = 0.01", 'force_nm = "x"', "effect preload: force_nm: must be a number from -1e+06 to 1e+06"),
+        ("exhaust_a = -0.5\n", "", "effect supply_limit: exhaust_a: is required by supply_limit and missing"),
+        (
+            "force_nm = 0.01",
+            "force_nm = 0.01\nwidth_m = 1.0",
+            "effect.width_m: a drive of kind rotary motor has width_rad",
+        ),
+        ("force_nm", "width", "effect preload: width: unknown parameter of preload; allowed: force_nm"),
+    ],
+)
+def test_what_is_wrong_with_an_effect_is_said_in_the_drives_names_and_with_the_file(
+    before: str, after: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before the recording is read, which is not there."""
+    path = written(tmp_path, MOTOR.replace(before, after))
+    assert main(["compare", str(tmp_path / "none.csv"), "--valve", str(path)]) == 2
+    assert f"{path}: {said}" in capsys.readouterr().err
 
 
 def csv(path: Path, header: str, *columns: object) -> Path:

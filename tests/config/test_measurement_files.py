@@ -1,4 +1,4 @@
-"""HDF5, MATLAB 7.3, TDMS and MDF4 as their own libraries write them: the same recording out of each."""
+"""MATLAB, HDF5, MATLAB 7.3, TDMS and MDF4 as their own libraries write them: the same recording out of each."""
 
 import shutil
 import struct
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports import mdf4_reader
+from config.exports import reader_process
 from config.exports.column_mapping import read_mapping
 from config.exports.export_preview import preview
 from config.historian_export import read_export
@@ -20,6 +20,8 @@ POSITION_MM = 20.0 + 10.0 * np.sin(TIME_S)
 COMMAND_BAR = 0.6 + 0.2 * np.cos(TIME_S)
 LINKS = 24
 """Where the links of a block of MDF 4 begin; the first is that to the next."""
+NAME_TYPE = 128 + 6 * 8
+"""Where a MATLAB file says of what type the name of its first matrix is: behind its head, and six times eight bytes."""
 
 
 def write_hdf5(path: Path) -> None:
@@ -33,6 +35,12 @@ def write_hdf5(path: Path) -> None:
         group["note"] = "by nobody"
         group["image"] = np.zeros((3, 4, 5))
         file["calibration"] = np.arange(7.0)
+
+
+def write_old_matlab(path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"t": TIME_S, "log": {"PV": POSITION_MM, "OUT": COMMAND_BAR}, "grid": np.zeros((3, 4, 5))})
 
 
 def write_matlab(path: Path) -> None:
@@ -81,6 +89,7 @@ def write_mdf(path: Path) -> None:
 
 FILES: dict[str, tuple[Callable[[Path], None], list[str]]] = {
     "run.h5": (write_hdf5, ["time_s=run 1.t", "position_m=run 1.PV", "command_pa=run 1.OUT"]),
+    "old.mat": (write_old_matlab, ["time_s=t:s", "position_m=log.PV:mm", "command_pa=log.OUT:bar"]),
     "run.mat": (write_matlab, ["time_s=log.t", "position_m=log.PV:mm", "command_pa=log.OUT:bar"]),
     "run.tdms": (write_tdms, ["time_s=time", "position_m=PV", "command_pa=OUT"]),
     "run.mf4": (write_mdf, ["time_s=time", "position_m=PV", "command_pa=OUT"]),
@@ -127,12 +136,22 @@ def test_a_file_that_ends_its_reader_or_keeps_it_for_ever_is_one_line(
     first, second = [at for at in range(len(content)) if content[at : at + 4] == b"##CN"][:2]
     content[second + LINKS : second + LINKS + 8] = struct.pack("<Q", first)
     (tmp_path / "run.mf4").write_bytes(content)
-    monkeypatch.setattr(mdf4_reader, "LONGEST_S", 3.0)
+    monkeypatch.setattr(reader_process, "LONGEST_S", 3.0)
     with pytest.raises(InputError, match="is a damaged MDF file: its reader comes to no end in 3 s"):
         preview(tmp_path / "run.mf4")
-    monkeypatch.setattr(mdf4_reader, "sys", SimpleNamespace(executable=shutil.which("false")))
+    monkeypatch.setattr(reader_process, "sys", SimpleNamespace(executable=shutil.which("false")))
     with pytest.raises(InputError, match="is a damaged MDF file: its reader breaks down, status 1"):
         preview(tmp_path / "run.mf4")
+
+
+def test_a_matlab_file_that_ends_its_reader_is_one_line(tmp_path: Path) -> None:
+    """A name of a type that there is none of ends scipy 1.17's reader by a signal."""
+    write_old_matlab(tmp_path / "old.mat")
+    content = bytearray((tmp_path / "old.mat").read_bytes())
+    content[NAME_TYPE] = 255
+    (tmp_path / "old.mat").write_bytes(content)
+    with pytest.raises(InputError, match=r"is a damaged MATLAB file: [^\n]*$"):
+        preview(tmp_path / "old.mat")
 
 
 def said_of(path: Path, words: list[str]) -> str:

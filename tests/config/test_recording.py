@@ -29,6 +29,12 @@ def test_every_bit_survives(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read.columns[name], column)
 
 
+def test_an_empty_file_is_said_to_be_empty(tmp_path: Path) -> None:
+    (tmp_path / "rec.csv").write_text("")
+    with pytest.raises(InputError, match=r"is empty; its first line should name the columns: time_s, command_pa"):
+        read_recording(tmp_path / "rec.csv")
+
+
 def test_an_empty_cell_is_not_a_number_and_stays(tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text(HEADER + "0,1,2\n1,,3\n")
     np.testing.assert_array_equal(read_recording(tmp_path / "r.csv").command_pa, [1.0, np.nan])

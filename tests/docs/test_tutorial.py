@@ -71,7 +71,7 @@ def test_a_page_holds_what_its_blocks_print_and_draw(tmp_path: Path) -> None:
     assert (tmp_path / "img" / "page-a-figure.png").read_bytes() == b"picture"
 
 
-@pytest.mark.parametrize("command", ["exit 2", "nothing-of-that-name", "false &"])
+@pytest.mark.parametrize("command", ["exit 2", "kill $$", "nothing-of-that-name", "false &"])
 def test_a_command_that_cannot_do_its_work_ends_the_run(command: str, tmp_path: Path) -> None:
     (tmp_path / "source.md").write_text(f"```sh\n{command}\n```\n")
     with pytest.raises(SystemExit, match=r"ends with|did not start"):

@@ -20,7 +20,6 @@ import numpy as np
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding
-from scipy.io import savemat
 
 from config.canopen_device import SHIPPED_EDS
 from config.daemon_file import load_valves
@@ -124,16 +123,6 @@ def pem(data: bytes) -> None:
 
 def _pem(label: bytes, data: bytes) -> bytes:
     return b"-----BEGIN %b-----\n%b-----END %b-----\n" % (label, encodebytes(data), label)
-
-
-def _matlab() -> tuple[bytes, ...]:
-    vectors = {"t": np.arange(4.0), "x": np.linspace(0.0, 1.0, 4)}
-    columns = {"log": vectors, "u": np.full((4, 1), 4e4), "note": "FV-1"}
-    return (
-        _saved(lambda path: savemat(path, columns), "good.mat"),
-        _saved(lambda path: savemat(path, columns, do_compression=True), "good.mat"),
-        _saved(lambda path: savemat(path, vectors, format="4"), "good.mat"),
-    )
 
 
 def _hdf5(path: Path) -> None:
@@ -272,7 +261,6 @@ def file_parsers() -> dict[str, Parser]:
         "recording": Parser(of_file("r.csv", read_recording, Recording.read), (CSV,), 8, True),
         "recording, Parquet": Parser(of_file("r.parquet", Recording.read, _preview), parquet, 2),
         "export": Parser(of_file("x.txt", _own, _preview, _import), (CSV, *EXPORTS), 2, True),
-        "export, MATLAB": Parser(of_file("x.mat", _preview, _import), _matlab(), 2),
         "export, HDF5": Parser(of_file("x.h5", _preview, _import), Later(lambda: _saved(_hdf5, "good.h5")), 0.3),
         "export, TDMS": Parser(of_file("x.tdms", _preview, _import), Later(lambda: _saved(_tdms, "good.tdms")), 0.3),
         "mapping file": Parser(of_file("m.toml", read_mapping_file), (MAPPING,), 4, True),

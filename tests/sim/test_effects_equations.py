@@ -9,6 +9,7 @@ import pytest
 
 from sim.effect import read_effect
 from sim.effects import dead_time, quadratic_drag, spring_hardening
+from sim.first_order_lag import lagged
 from sim.karnopp import Vector
 from sim.open_loop import respond
 from tests.sim.library import SEED, Series, library, plain, valve_with
@@ -222,6 +223,43 @@ def test_a_step_ends_where_a_delayed_jump_comes_out(dead_time_s: float) -> None:
             assert not t + 1e-9 < dead_time_s < t + s - 1e-9
             t += s
         assert t == pytest.approx((i + 1) * h, abs=1e-12)
+
+
+@pytest.mark.parametrize("dead_time_s", [1.3e-5, 5.637e-4, 7.3e-3])
+def test_behind_a_lag_no_step_is_cut_without_end(dead_time_s: float) -> None:
+    """Each step's end came out one dead time later and ended another there: a run through a record took minutes."""
+    q, z, h = dead_time.Parameters(dead_time_s), np.zeros(dead_time.MEMORY), 2e-3
+    dead_time.start(0.0, 0.0, z)
+    t, u = 0.0, 0.0
+    for i in range(300):
+        steps = 0
+        while (left := (i + 1) * h - t) > 1e-12:
+            s = dead_time.straight(u, left, t, q, z)
+            before, u = u, lagged(u, 5e4, 5e4, s, 0.1)
+            dead_time.advance(t, before, u, s, q, z)
+            t, steps = t + s, steps + 1
+        assert steps <= 12
+
+
+def test_a_dead_time_that_is_short_for_a_step_does_not_cut_a_ramp() -> None:
+    q, z, h = dead_time.Parameters(1e-6), np.zeros(dead_time.MEMORY), 1e-3
+    dead_time.start(0.0, 0.0, z)
+    dead_time.advance(0.0, 0.0, 30.0, h, q, z)
+    rounded = 30.0 * (1.0 + 1e-15)
+    assert dead_time.straight(rounded, h, h, q, z) == h
+    assert dead_time.pressure(rounded, h, 1.5 * h, q, z) == pytest.approx(30.0 - 30e3 * 1e-6)
+    assert dead_time.straight(31.0, h, h, q, z) == 1e-6
+
+
+@pytest.mark.parametrize("dead_time_s", [1e-7, 1e-5, 1.3e-4, 0.9e-3, 3.1e-3])
+def test_a_short_dead_time_behind_a_lag_is_the_lag_s_answer_later(dead_time_s: float) -> None:
+    composition = library()
+    lag = composition.changed(composition.theta, {"ip_lag.time_constant_s": 0.1})
+    late = composition.changed(lag, {"dead_time.dead_time_s": dead_time_s})
+    shown = respond(composition, late, STAIRS, 2e-3, step_s=2e-3).pressure_pa
+    prompt = respond(composition, lag, STAIRS, 2e-3)
+    expected = np.interp(prompt.time_s - dead_time_s, prompt.time_s, prompt.pressure_pa)
+    np.testing.assert_allclose(shown, expected, atol=3e-3 * np.ptp(expected))
 
 
 def test_a_limited_rate_that_ends_inside_a_step_comes_out_right() -> None:

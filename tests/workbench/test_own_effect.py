@@ -101,6 +101,6 @@ def test_an_effect_by_its_path_is_a_program_run_only_from_folders_allowed(
         find_effect("link.py", "valve.toml")
     assert not caplog.records
     monkeypatch.setenv(FOLDERS_ALLOWED, str(ran.parent))
-    for _ in range(2):
-        assert find_effect(str(ran), "valve.toml").name == "odd"
+    for source in ("valve.toml", "valve.toml", "valve file"):
+        assert find_effect(str(ran), source).name == "odd"
     assert caplog.messages == [f"valve.toml names an effect by its path: {ran} is run as a program"]

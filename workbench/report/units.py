@@ -36,6 +36,7 @@ BASE = {
     "coulomb": "sliding (Coulomb) friction",
     "static": "break-away (static) friction",
     "mass": "moving mass",
+    "stribeck_velocity": "Stribeck velocity",
 }
 """The bare valve's parameters, without their endings."""
 

@@ -8,7 +8,7 @@ def run_forces(arguments: argparse.Namespace) -> int:
     import time
 
     from config.errors import InputError
-    from config.valve_file import find_valve, load_valve
+    from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.output_files import write_json
     from workbench.data.imposed_motion import read_imposed
@@ -24,7 +24,7 @@ def run_forces(arguments: argparse.Namespace) -> int:
     if arguments.report is not None:
         require_plotly(arguments.report)
     began_s = time.monotonic()
-    valve = load_valve(find_valve(arguments.valve))
+    valve = read_valve(arguments.valve)
     recordings = [read_imposed(path) for path in arguments.recordings]
     test = read_imposed(arguments.test) if arguments.test else None
     with naming({"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}):

@@ -8,8 +8,8 @@ from config.errors import InputError
 
 @contextmanager
 def naming(names: Mapping[str, str]) -> Iterator[None]:
-    """Give errors that name a kind of file the name of the file."""
+    """Give errors that name a kind of file, or a place in it, the name of the file."""
     try:
         yield
     except InputError as error:
-        raise InputError(names.get(error.source, error.source), error.problem) from None
+        raise error.named(names) from None

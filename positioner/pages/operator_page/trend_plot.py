@@ -161,7 +161,8 @@ class TrendPlot:
             },
             "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
             "axisPointer": {"link": [{"xAxisIndex": "all"}]},
-            "grid": [{"left": 52, "right": 12, **place} for place in places],
+            # No room is made for labels at the right end: of a narrow page it would be the lower panel's alone.
+            "grid": [{"left": 52, "right": 24, "outerBoundsMode": "none", **place} for place in places],
             "dataset": changing["dataset"],
             "xAxis": [
                 {"type": "time", "gridIndex": number, "splitNumber": 4, **(quiet if number else hidden), **x}

@@ -19,7 +19,7 @@ def errors_told(names: Mapping[str, str] | None = None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        tell_error(f"{(names or {}).get(error.source, error.source)}: {error.problem}")
+        tell_error(str(error.named(names or {})))
     except CommandFailed as error:
         tell_error(str(error))
 

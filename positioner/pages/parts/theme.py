@@ -27,7 +27,7 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .quiet { opacity: 0.75; font-size: 0.875rem; }
 .said { margin: 0; padding-left: 1.2rem; }
 .said li { margin: 2px 0; }
-.steady { height: 15rem; overflow-y: auto; flex-wrap: nowrap; gap: 4px; width: 100%; }
+.steady { height: 17.5rem; overflow-y: auto; flex-wrap: nowrap; gap: 4px; width: 100%; }
 .jump { all: unset; vertical-align: top; cursor: pointer; text-align: left; }
 .jump { text-decoration: underline dotted; text-underline-offset: 3px; }
 .nicegui-error-popup { bottom: 5rem !important; }

@@ -90,7 +90,7 @@ class Sliders:
                 value = LiveText().classes("number").props(f'data-testid="value-{parameter.name}"')
             slider = Slider(self._live.share(parameter), parameter.name, words)
             low, high = (factor * self._live.value_at(parameter, share) for share in (0.0, 1.0))
-            told = f"{low:.3g} to {high:.3g} {unit}"
+            told = f"{low:.3g} to {high:.3g} {unit}".rstrip()
             if fitted is not None:
                 interval = " to ".join(f"{factor * each:.4g}" for each in (fitted.lower, fitted.upper))
                 told += f"; fitted {factor * fitted.value:.4g} ({interval})"
