@@ -2,10 +2,10 @@
 
 The laws, `karnopp.py` and what goes with it, are compiled once, with their places open, and so is each effect, as what
 fills its places; a kernel is these, linked in the order in which the effects are listed. All texts are written to a
-cache folder under their own SHA-256. Their heads hold the digests of the elements that effects share, of this file and
-of those that compile, and the numba version; a kernel's text is the digests of the laws and the effects. A change in
-any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text that
-was hashed.
+cache folder under their own SHA-256. The heads of laws and effects hold the digests of the elements that effects share,
+of this file and of those that compile, and the numba version; a kernel's text is the digests of its laws and effects,
+and which of them fill which place. A change in any of them is another name, so that an old kernel is never taken for a
+new one; what is compiled is the very text that was hashed.
 Beside it are kept what `kernel_compiler` or `kernel_linker` make of it and what `machine_code` makes of that for a
 processor: numba is started only where laws or effects are new, and LLVM translates only where a kernel is.
 
@@ -135,7 +135,8 @@ def _compiled(
     filled: tuple[tuple[str, tuple[Filling, ...]], ...],
     entries: tuple[tuple[str, tuple[int, ...]], ...],
 ) -> tuple[str, bytes, dict[str, Any]]:
-    text = f"# laws {_digest(laws)}, effects {[_digest(each) for *_, each in effects]}\n"
+    places = {place: [tuple(each) for each in filling] for place, filling in filled if filling}
+    text = f"# laws {_digest(laws)}, effects {[_digest(each) for *_, each in effects]}, places {places}\n"
     digest, kinds = _digest(text), dict(entries)
     file = kernel_file(digest, text)
     code = file.with_suffix(f".{processor()}.o")
