@@ -7,8 +7,9 @@ Its files:
     quasi_static                         the same without inertia, for samples farther apart than a slide lasts
     effect, effects                      how an effect is written; those that come along
     own_effect                           the example of one of a person's own, and whether a search may try it
-    kernel, kernel_source                the equations with effects in their places, compiled once; the text of that
-    kernel_compiler, machine_code        the texts to bitcode, by numba; that to this processor's code, without numba
+    kernel, kernel_source                the equations with effects in their places, compiled; how an effect fills them
+    kernel_compiler                      the laws and each effect to bitcode, by numba
+    kernel_linker, machine_code          these to a kernel's, and that to this processor's code, without numba
     interpreted                          the same uncompiled, for what asks a single place
     static_inverse                       what a controller must know of a valve file, worked out of its equations
     composition                          a valve file made ready: effects, parameters, kernel

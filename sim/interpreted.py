@@ -3,14 +3,14 @@
 What `sim.kernel` compiles for whole runs, for those who ask a single place a few times: the forces where a stem rests.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from sim import karnopp
 from sim.effect import Effect, execute
-from sim.kernel_source import kernel_source
+from sim.kernel_source import OWN, Filling, effect_source, fillings
 
 BASE = Path(karnopp.__file__)
 
@@ -18,13 +18,38 @@ BASE = Path(karnopp.__file__)
 def interpreted(effects: Sequence[Effect]) -> Any:
     """Return a module like `sim.karnopp` whose empty places are filled with these effects.
 
-    Its functions take what the kernel gives them: `q = parameters(theta)`, `z = memories(state)`, a `Stem`.
+    A place takes what the kernel's does: theta and the state as q and z.
     """
     module = ModuleType("interpreted_valve")
     exec(compile(BASE.read_text(encoding="utf-8"), str(BASE), "exec", dont_inherit=True), module.__dict__)
-    exec(compile(kernel_source(effects), "kernel source", "exec", dont_inherit=True), module.__dict__)
-    for i, effect in enumerate(effects):
-        part = ModuleType(effect.name)
-        execute(effect.source, effect.path, part.__dict__)
-        module.__dict__.update({f"{name}_{i}": value for name, value in part.__dict__.items() if name[0] != "_"})
+    parts = [_places(each) for each in effects]
+    for place, filled in fillings(effects).items():
+        if filled:
+            module.__dict__[place] = _one_after_the_other([(parts[each.effect][place], each) for each in filled])
     return module
+
+
+def _places(effect: Effect) -> dict[str, Any]:
+    """Return the functions by which an effect fills its places."""
+    own: dict[str, Any] = {"__name__": effect.name}
+    execute(effect.source, effect.path, own)
+    places: dict[str, Any] = {OWN.format(name): value for name, value in own.items()} | {"carray": _first}
+    exec(compile("\n".join(effect_source(effect).values()), "places", "exec", dont_inherit=True), places)
+    return places
+
+
+def _first(memory: Any, count: int) -> Any:
+    return memory[:count]
+
+
+def _one_after_the_other(parts: Sequence[tuple[Callable[..., Any], Filling]]) -> Callable[..., Any]:
+    def place(*given: Any) -> Any:
+        *values, q, z = given
+        left: Any = None
+        for function, at in parts:
+            left = function(*values, q[at.parameters :], z[at.memory :])
+            handed_on = left if isinstance(left, tuple) else () if left is None else (left,)
+            values[: len(handed_on)] = handed_on
+        return left
+
+    return place

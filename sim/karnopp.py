@@ -137,7 +137,7 @@ def stem_at(drive: Drive, tau: float, x: float, v: float) -> Stem:
 
 def external_force(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
     """F_e, N."""
-    return valve.A * stem.p - valve.k_s * stem.x + force(stem, q, z)
+    return valve.A * stem.p - valve.k_s * stem.x + force(0.0, stem, q, z)
 
 
 def excess(valve: Karnopp, stem: Stem, q: Any, z: Any) -> float:
@@ -412,16 +412,14 @@ def settle(valve: Karnopp, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
     ahead = external_force(valve, Stem(stem.t, stem.x + DIFFERENCE_M, stem.v, stem.p), q, z)
     behind = external_force(valve, Stem(stem.t, stem.x - DIFFERENCE_M, stem.v, stem.p), q, z)
     stiffness = (behind - ahead) / (2.0 * DIFFERENCE_M)
-    return motion(external_force(valve, stem, q, z), stiffness, stem, q, z)
+    return motion(stem.x, stem.v, external_force(valve, stem, q, z), stiffness, stem, q, z)
 
 
 def rest(theta: Vector, state: Vector, time: float, position: float, command: float) -> None:
     """Set the state: at rest at a position, the command held for so long that the pressure path has settled."""
-    q = parameters(theta)
-    z = memories(state)
-    p = start_pressure(command, Stem(time, position, 0.0, command), q, z)
+    p = start_pressure(command, Stem(time, position, 0.0, command), theta, state)
     stem = Stem(time, position, 0.0, p)
-    indicated = start_stem(external_force(karnopp(theta), stem, q, z), stem, q, z)
+    indicated = start_stem(position, external_force(karnopp(theta), stem, theta, state), stem, theta, state)
     write(state, Condition(time, position, 0.0, p, STUCK, 0.0, indicated))
 
 
@@ -472,8 +470,9 @@ def carry(
     for i in range(n):
         t0, left = t + i * h, h
         while left > 0.0:
-            s, x0 = straight(command, left, Stem(t0, x, v, p), q, z), x
-            p0, p = pressure(command, s, Stem(t0, x, v, p), q, z)
+            x0 = x
+            _, s = straight(command, left, Stem(t0, x, v, p), q, z)
+            p0, p = pressure(command, command, s, Stem(t0, x, v, p), q, z)
             x, v, mode, sigma = step(valve, Drive(t0, p0, (p - p0) / s), s, x, v, mode, sigma, tolerance, q, z)
             x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
             if v == 0.0:
@@ -482,7 +481,7 @@ def carry(
             left -= s
             stem = Stem(t0, x, v, p)
             remember(x0, s, stem, q, z)
-            indicated = sensor(x0, s, stem, q, z)
+            _, indicated = sensor(x0, x, s, stem, q, z)
     return Condition(t + duration, x, v, p, mode, sigma, indicated)
 
 
@@ -496,10 +495,10 @@ def respond(
     path: Vector,
 ) -> None:
     """Hold each command for its period in turn; write t, p, x, v, indicated into the rows of path, the start first."""
-    valve, now, q, z = karnopp(theta), read(state), parameters(theta), memories(state)
+    valve, now = karnopp(theta), read(state)
     for i in range(len(commands) + 1):
         if i > 0:
-            now = carry(valve, now, commands[i - 1], periods[i - 1], longest_step, tolerance, q, z)
+            now = carry(valve, now, commands[i - 1], periods[i - 1], longest_step, tolerance, theta, state)
         path[0, i] = now.t
         path[1, i] = now.p
         path[2, i] = now.x
@@ -514,15 +513,16 @@ def balance(theta: Vector, state: Vector, landings: Vector, arriving: float, spe
     A row of landings: t of the landing, t of the forces, position shown, that before the slide, p, direction of the
     slide, direction of (impending) motion. Speeds: `arriving` at which the slide ended, `speed` of the forces.
     """
-    valve, q, z = karnopp(theta), parameters(theta), memories(state)
+    valve, q, z = karnopp(theta), theta, state
     for i in range(len(landings)):
         t, shown, p, way = landings[i, 1], landings[i, 2], landings[i, 4], landings[i, 6]
         slide = shown - landings[i, 3]
         x = shown
         for _ in range(CORRECTIONS):
-            start_stem(0.0, Stem(t - LONG_S, x - slide, 0.0, p), q, z)
-            x += shown - sensor(x - slide, LONG_S, Stem(t, x, 0.0, p), q, z)
-        start_stem(0.0, Stem(landings[i, 0] - SLIDE_S, landings[i, 3], 0.0, p), q, z)
+            start_stem(x - slide, 0.0, Stem(t - LONG_S, x - slide, 0.0, p), q, z)
+            _, indicated = sensor(x - slide, x, LONG_S, Stem(t, x, 0.0, p), q, z)
+            x += shown - indicated
+        start_stem(landings[i, 3], 0.0, Stem(landings[i, 0] - SLIDE_S, landings[i, 3], 0.0, p), q, z)
         remember(landings[i, 3], SLIDE_S, Stem(landings[i, 0], x, arriving * landings[i, 5], p), q, z)
         stem = Stem(t, x, speed * way, p)
         forces[i, 0] = external_force(valve, stem, q, z)
@@ -539,17 +539,8 @@ def write(state: Vector, now: Condition) -> None:
     state[0], state[1], state[2], state[3], state[4], state[5], state[6] = now
 
 
-# The places, empty. q holds the parameters, z the memories of the effects, one entry each.
-
-
-def parameters(theta: Vector) -> Any:
-    """Read the effects' parameters from the parameter vector."""
-    return ()
-
-
-def memories(state: Vector) -> Any:
-    """Return the effects' memories, views into the state vector."""
-    return ()
+# The places, empty: each hands on what enters it first. Effects read their parameters from q, which is theta, and keep
+# their memories in z, the state.
 
 
 def start_pressure(u: float, stem: Stem, q: Any, z: Any) -> float:
@@ -557,24 +548,24 @@ def start_pressure(u: float, stem: Stem, q: Any, z: Any) -> float:
     return u
 
 
-def start_stem(F_e: float, stem: Stem, q: Any, z: Any) -> float:
+def start_stem(y: float, F_e: float, stem: Stem, q: Any, z: Any) -> float:
     """Set the memories at the stem and of the sensor for a stem at rest; return the indicated position."""
-    return stem.x
+    return y
 
 
-def straight(u: float, h: float, stem: Stem, q: Any, z: Any) -> float:
-    """Return for how long, at most h, the actuator pressure goes straight with the command held."""
-    return h
+def straight(u: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Return the actuator pressure, and for how long, at most h, it goes straight with the command held."""
+    return u, h
 
 
-def pressure(u: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
-    """Return the actuator pressure at the start and at the end of a step with the command held."""
-    return u, u
+def pressure(start: float, end: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Return the actuator pressure at the start and at the end of a step; the command is held."""
+    return start, end
 
 
-def force(stem: Stem, q: Any, z: Any) -> float:
-    """Extra force on the stem, N."""
-    return 0.0
+def force(F: float, stem: Stem, q: Any, z: Any) -> float:
+    """Add the extra forces on the stem, N."""
+    return F
 
 
 def friction(F_c: float, F_s: float, direction: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
@@ -582,16 +573,15 @@ def friction(F_c: float, F_s: float, direction: float, stem: Stem, q: Any, z: An
     return F_c, F_s
 
 
-def motion(F_e: float, stiffness: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+def motion(x: float, v: float, F_e: float, stiffness: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
     """Return where the stem is, and how fast, at the end of a step."""
-    return stem.x, stem.v
+    return x, v
 
 
 def remember(x0: float, h: float, stem: Stem, q: Any, z: Any) -> None:
-    """Carry the memories of force, friction and motion over a step from x0 to the stem's position."""
-    return
+    """Carry the memories at the stem over a step that began at x0."""
 
 
-def sensor(x0: float, h: float, stem: Stem, q: Any, z: Any) -> float:
-    """Return the indicated position at the end of a step from x0 to the stem's position."""
-    return stem.x
+def sensor(start: float, end: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+    """Return the indicated position at the start and at the end of a step."""
+    return start, end

@@ -1,15 +1,15 @@
 """Compiles the bare valve with a set of effects in their places into one kernel, cached across processes.
 
-The laws, `karnopp.py` and what goes with it, are compiled once, with their places open; a kernel's own text is what
-fills these: each effect's functions called in the order in which the effects are listed. Both texts are written to a
-cache folder under their own SHA-256. The laws' head holds the digests of the elements that effects share, of this file
-and of those that compile, and the numba version; a kernel's head those of the laws and of the effects' texts. A change
-in any of them is another name, so that an old kernel is never taken for a new one; what is compiled is the very text
-that was hashed.
-Beside it are kept what `kernel_compiler` makes of it and what `machine_code` makes of that for a processor, so that
-numba is started, and LLVM translates, only where a kernel is new.
+The laws, `karnopp.py` and what goes with it, are compiled once, with their places open, and so is each effect, as what
+fills its places; a kernel is these, linked in the order in which the effects are listed. All texts are written to a
+cache folder under their own SHA-256. The heads of laws and effects hold the digests of the elements that effects share,
+of this file and of those that compile, and the numba version; a kernel's text is the digests of its laws and effects,
+and which of them fill which place. A change in any of them is another name, so that an old kernel is never taken for a
+new one; what is compiled is the very text that was hashed.
+Beside it are kept what `kernel_compiler` or `kernel_linker` make of it and what `machine_code` makes of that for a
+processor: numba is started only where laws or effects are new, and LLVM translates only where a kernel is.
 
-Of several processes that need a kernel at once, one compiles and the others wait: a file beside it is locked meanwhile.
+Of several processes that need a part at once, one compiles and the others wait: a file beside it is locked meanwhile.
 """
 
 import atexit
@@ -26,10 +26,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sim import karnopp, machine_code, misfit, quasi_static
+from sim import karnopp, kernel_linker, machine_code, misfit, quasi_static
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
-from sim.kernel_source import SHARED, kernel_source
+from sim.kernel_source import SHARED, Filling, effect_source, fillings
 from sim.machine_code import MATRIX, NUMBER, VECTOR, Entry, is_bitcode, loaded, processor, translated
 
 BASE = Path(karnopp.__file__)
@@ -123,37 +123,59 @@ def _of(
     """
     texts = [KARNOPP_IMPORT.sub("", each.read_text(encoding="utf-8")) for each in files]
     laws = _with_head("\n".join(texts))
-    sources = tuple((each.path, each.source) for each in effects)
-    return _compiled(laws, _text(effects, laws), sources, _state_size(effects), tuple(entries.items()))
+    parts = tuple((each.path, each.source, _text(each)) for each in effects)
+    filled = tuple((place, tuple(each)) for place, each in fillings(effects).items())
+    return _compiled(laws, parts, filled, tuple(entries.items()))
 
 
 @cache
 def _compiled(
     laws: str,
-    text: str,
-    sources: tuple[tuple[Path, str], ...],
-    state_size: int,
+    effects: tuple[tuple[Path, str, str], ...],
+    filled: tuple[tuple[str, tuple[Filling, ...]], ...],
     entries: tuple[tuple[str, tuple[int, ...]], ...],
 ) -> tuple[str, bytes, dict[str, Any]]:
+    places = {place: [tuple(each) for each in filling] for place, filling in filled if filling}
+    text = f"# laws {_digest(laws)}, effects {[_digest(each) for *_, each in effects]}, places {places}\n"
     digest, kinds = _digest(text), dict(entries)
     file = kernel_file(digest, text)
     code = file.with_suffix(f".{processor()}.o")
 
-    def filled() -> bytes:
-        from sim import kernel_compiler  # numba takes half a second to begin
-
-        file_of_laws = kernel_file(_digest(laws), laws)
-        with _locked(file_of_laws):
-            of_laws = _bitcode(file_of_laws, lambda: kernel_compiler.laws(laws, file_of_laws, kinds))
-        return kernel_compiler.filled(of_laws, text, file, sources, state_size, kinds)
+    def linked() -> bytes:
+        return kernel_linker.linked(_laws(laws, kinds), [_effect(*each) for each in effects], dict(filled), kinds)
 
     with _locked(file):
-        bitcode = _bitcode(file, filled)
+        bitcode = _bitcode(file, linked)
         with suppress(OSError, RuntimeError):  # not there, or torn by a machine that went down
             return digest, bitcode, loaded(code.read_bytes(), kinds)
         machine_code = translated(bitcode)
         _keep(code, machine_code)
     return digest, bitcode, loaded(machine_code, kinds)
+
+
+def _laws(text: str, entries: Mapping[str, tuple[int, ...]]) -> bytes:
+    def compiled(file: Path) -> bytes:
+        from sim import kernel_compiler  # numba takes half a second to begin
+
+        return kernel_compiler.laws(text, file, entries)
+
+    return _part(text, compiled)
+
+
+def _effect(path: Path, source: str, text: str) -> bytes:
+    def compiled(file: Path) -> bytes:
+        from sim import kernel_compiler
+
+        return kernel_compiler.effect(source, path, text, file)
+
+    return _part(text, compiled)
+
+
+def _part(text: str, compiled: Callable[[Path], bytes]) -> bytes:
+    """Return the bitcode of a text that kernels share."""
+    file = kernel_file(_digest(text), text)
+    with _locked(file):
+        return _bitcode(file, lambda: compiled(file))
 
 
 def _bitcode(file: Path, compiled: Callable[[], bytes]) -> bytes:
@@ -232,17 +254,22 @@ def _temporary_folder() -> Path:
     return Path(folder.name)
 
 
-def _text(effects: Sequence[Effect], laws: str) -> str:
-    """Return a kernel's text: what it is made of, and the laws' places, filled."""
-    digests = {each.name: _digest(each.source) for each in effects}
-    return f"# laws {_digest(laws)}, effects {digests}\n{kernel_source(effects)}\n"
+def _text(effect: Effect) -> str:
+    """Return the text of the places that an effect fills, after a line of what it is compiled with."""
+    return _with_head(f"# {_digest(effect.source)}\n" + "\n\n".join(effect_source(effect).values()))
 
 
-def _with_head(laws: str) -> str:
-    """Return the laws after a line of what compiles them."""
-    files = (__file__, str(COMPILER), machine_code.__file__, *(str(each.__file__) for each in SHARED))
-    parts = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
-    return f"# numba {version('numba')}, {parts}\n{laws}\n"
+def _with_head(text: str) -> str:
+    """Return a text after a line of what compiles it."""
+    return f"# numba {version('numba')}, {_compilers()}\n{text}\n"
+
+
+@cache
+def _compilers() -> dict[str, str]:
+    """Return the digests of the files that compile, and of the elements that effects share."""
+    modules = (kernel_linker, machine_code, *SHARED)
+    files = (__file__, str(COMPILER), *(str(each.__file__) for each in modules))
+    return {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
 
 
 def _digest(text: str) -> str:

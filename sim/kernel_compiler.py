@@ -1,16 +1,14 @@
-"""The texts of a kernel to LLVM bitcode, by numba: the laws once, with their places open, and what fills these.
+"""The texts of a kernel to LLVM bitcode, by numba: the laws, with their places open, and each effect, once.
 
 The entries of the laws take arrays; what is compiled of them takes addresses and shapes, so that neither numba nor its
 run time is needed to call it. The laws hand on, as q and z, where the parameters and the state begin; a place reads its
-effects' from there. What is empty is a weak symbol: what fills it takes its place when the two are linked, and is then
-inlined wherever a law calls it. No fast-math: the order of operations is the text's.
+effect's from there. No fast-math: the order of operations is the text's.
 
 numba is untyped: its types stop here.
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Mapping, Sequence
 from inspect import signature
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -21,11 +19,11 @@ from llvmlite import binding, ir
 from numba.extending import intrinsic
 
 from config.errors import InputError
-from sim import karnopp, quasi_static
 from sim.effect import execute
-from sim.karnopp import MEMORY, Stem
-from sim.kernel_source import SHARED
-from sim.machine_code import MATRIX, NUMBER, VECTOR, features, nothing, target_machine
+from sim.karnopp import Stem
+from sim.kernel_linker import SYMBOL, optimized
+from sim.kernel_source import OWN, PLACES, SHARED
+from sim.machine_code import MATRIX, NUMBER, VECTOR, nothing
 
 OPTIONS: Mapping[str, Any] = {"error_model": "numpy", "fastmath": False}
 """numpy's error model: a division by zero gives infinity, as in the field's own tools, and costs no branch."""
@@ -34,21 +32,7 @@ INNER: Mapping[str, Any] = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wra
 NOT_INLINED = ("bogacki_shampine", "respond", "rest", "push", "balanced", "breaks", "landed", "passed")
 """Left to the compiler to inline: large, and called from several places."""
 NESTED = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)")
-PLACES: Mapping[str, Callable[..., Any]] = {
-    "start_pressure": karnopp.start_pressure,
-    "start_stem": karnopp.start_stem,
-    "straight": karnopp.straight,
-    "pressure": karnopp.pressure,
-    "pressure_ends": quasi_static.pressure_ends,
-    "force": karnopp.force,
-    "friction": karnopp.friction,
-    "motion": karnopp.motion,
-    "remember": karnopp.remember,
-    "sensor": karnopp.sensor,
-}
-"""Empty, as the laws' texts have them."""
 types: Any = numba.types
-SYMBOL = "place_{}"
 ADDRESS = types.CPointer(types.float64)
 IN_PLACES: Mapping[Any, Any] = {
     float: types.float64,
@@ -82,72 +66,28 @@ def laws(text: str, file: Path, entries: Mapping[str, Sequence[int]]) -> bytes:
     """Compile the laws of a text, which stands in a file; the places that they call stay open."""
     module = ModuleType(f"valve_laws_{file.stem}")
     exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
-    called = [name for name in PLACES if name in module.__dict__]
+    module.__dict__.update({name: _called(name) for name in PLACES if name in module.__dict__})
     _inlined(module)
-    places = [_place(module, name, MEMORY) for name in called]
-    same = numba.njit(_same)
-    module.__dict__.update({name: _called(name) for name in called}, parameters=same, memories=same)
-    whole = _linked([_entry(module, name, kinds) for name, kinds in entries.items()])
-    for each in places:
-        whole.link_in(binding.parse_assembly(each))
-    for name in called:
-        whole.get_function(SYMBOL.format(name)).linkage = "weak_any"
-    return bytes(whole.as_bitcode())
+    return optimized(_linked([_entry(module, name, kinds) for name, kinds in entries.items()]), entries)
 
 
-def filled(
-    laws: bytes,
-    text: str,
-    file: Path,
-    sources: Sequence[tuple[Path, str]],
-    state_size: int,
-    entries: Mapping[str, Sequence[int]],
-) -> bytes:
-    """Fill the places of compiled laws by a text that calls the effects' own; each stands in its file.
+def effect(source: str, path: Path, text: str, file: Path) -> bytes:
+    """Compile an effect: the source of its file, and the text of the places that it fills, which stands in another.
 
     Raises:
-        InputError: an effect's function is not what numba can compile; names its file.
+        InputError: a function is not what numba can compile; names the effect's file.
     """
-    module = ModuleType(f"valve_kernel_{file.stem}")
+    own, module = ModuleType(f"valve_effect_{file.stem}"), ModuleType(f"valve_places_{file.stem}")
+    execute(source, path, own.__dict__)
+    _inlined(own)
+    module.__dict__.update({OWN.format(name): value for name, value in own.__dict__.items()}, carray=numba.carray)  # type: ignore[attr-defined]
     exec(compile(text, file, "exec", dont_inherit=True), module.__dict__)
-    for i, (path, source) in enumerate(sources):
-        part = _part(path, source)
-        module.__dict__.update({f"{name}_{i}": value for name, value in part.__dict__.items() if name[0] != "_"})
-    _inlined(module)
-    whole = binding.parse_bitcode(laws)
-    called = {each.name for each in whole.functions}
-    names = [name for name in PLACES if name in module.__dict__ and SYMBOL.format(name) in called]
+    filled = [name for name in PLACES if name in module.__dict__]
     try:
-        places = [_place(module, name, state_size) for name in names]
+        places = [_llvm(module.__dict__[name], _signature(name), SYMBOL.format(name)) for name in filled]
     except Exception as error:
-        where = ", ".join(str(path) for path, _ in sources)
-        raise InputError(where, f"cannot be compiled: {_reason(error)}") from None
-    for each in places:
-        whole.link_in(binding.parse_assembly(each))
-    return _optimized(whole, entries)
-
-
-@cache
-def _part(path: Path, source: str) -> ModuleType:
-    """Return an effect's functions, compiled ones: as often as a kernel has it among others, they are the same."""
-    part = ModuleType(f"valve_effect_{path.stem}")
-    execute(source, path, part.__dict__)
-    _inlined(part)
-    return part
-
-
-def _optimized(whole: Any, entries: Mapping[str, Sequence[int]]) -> bytes:
-    """Inline what fills the places, and optimize what comes of it."""
-    for each in whole.functions:
-        if each.name in entries or each.is_declaration:
-            continue
-        each.linkage = "internal"
-        if each.name in map(SYMBOL.format, PLACES):
-            each.add_function_attribute("alwaysinline")
-    options = binding.create_pipeline_tuning_options(speed_level=3)
-    builder = binding.create_pass_builder(target_machine(*features()), options)
-    builder.getModulePassManager().run(whole, builder)
-    return bytes(whole.as_bitcode())
+        raise InputError(str(path), f"cannot be compiled: {_reason(error)}") from None
+    return optimized(_linked(places), [SYMBOL.format(name) for name in filled])
 
 
 def _entry(module: ModuleType, name: str, kinds: Sequence[int]) -> str:
@@ -158,23 +98,14 @@ def _entry(module: ModuleType, name: str, kinds: Sequence[int]) -> str:
         f"a{i}" if each in HANDED_ON else PASSED_ON[kind].format(i)
         for i, (each, kind) in enumerate(zip(given, kinds, strict=True))
     ]
-    of = types.void(*(each for kind in kinds for each in TYPES[kind]))
-    return _llvm(module, f"{name}({', '.join(passed_on)})", arguments, of, name)
-
-
-def _place(module: ModuleType, name: str, state_size: int) -> str:
-    """Return the LLVM text of what fills a place, as `_called` calls it."""
-    given = signature(PLACES[name]).parameters
-    read = {"q": "parameters(q)", "z": f"memories(carray(z, {state_size}))"}
-    passed_on = ", ".join(read.get(each, each) for each in given)
-    return _llvm(module, f"{name}({passed_on})", ", ".join(given), _signature(name), SYMBOL.format(name))
-
-
-def _llvm(module: ModuleType, call: str, arguments: str, of: Any, symbol: str) -> str:
-    """Return the LLVM text of a function that makes this call. No two of the arrays that it is given overlap."""
     there = {**module.__dict__, "carray": numba.carray}  # type: ignore[attr-defined]
-    exec(f"def pointed({arguments}):\n    return {call}", there)
-    dispatcher: Any = numba.njit(of, **INNER)(there["pointed"])
+    exec(f"def pointed({arguments}):\n    return {name}({', '.join(passed_on)})", there)
+    return _llvm(there["pointed"], types.void(*(each for kind in kinds for each in TYPES[kind])), name)
+
+
+def _llvm(function: Any, of: Any, symbol: str) -> str:
+    """Return the LLVM text of a function, under this name. No two of the arrays that it is given overlap."""
+    dispatcher: Any = numba.njit(of, **INNER)(function)
     (compiled,) = dispatcher.overloads.values()
     llvm: str = compiled.library.get_llvm_str().replace(compiled.fndesc.llvm_func_name, symbol)
     return DEFINITION.sub(lambda found: POINTER.sub("ptr noalias", found[0]), llvm)
@@ -205,10 +136,6 @@ def _signature(name: str) -> Any:
     hints = get_type_hints(PLACES[name])
     result = hints.pop("return")
     return IN_PLACES[result](*(IN_PLACES[each] for each in hints.values()))
-
-
-def _same(value: Any) -> Any:
-    return value
 
 
 def _linked(texts: Sequence[str]) -> Any:

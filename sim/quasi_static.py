@@ -37,8 +37,6 @@ from sim.karnopp import (
     friction,
     impulse,
     karnopp,
-    memories,
-    parameters,
     read,
     remember,
     sensor,
@@ -175,7 +173,8 @@ def passed(x0: float, h: float, stem: Stem, q: Any, z: Any, indicated: float) ->
     if h <= 0.0:
         return indicated
     remember(x0, h, stem, q, z)
-    return sensor(x0, h, stem, q, z)
+    _, indicated = sensor(x0, stem.x, h, stem, q, z)
+    return indicated
 
 
 def landed(
@@ -331,9 +330,9 @@ def way_of(command: float, h: float, stem: Stem, q: Any, z: Any) -> Way:
     """Carry the pressure path over a step with the command held."""
     moment = MOMENT * h
     t, x, v, _ = stem
-    p0, early = pressure_ends(command, moment, stem, q, z)
-    _, late = pressure_ends(command, h - 2.0 * moment, Stem(t + moment, x, v, early), q, z)
-    _, p1 = pressure_ends(command, moment, Stem(t + h - moment, x, v, late), q, z)
+    p0, early = pressure_ends(command, command, moment, stem, q, z)
+    _, late = pressure_ends(command, command, h - 2.0 * moment, Stem(t + moment, x, v, early), q, z)
+    _, p1 = pressure_ends(command, command, moment, Stem(t + h - moment, x, v, late), q, z)
     return Way(p0, (early - p0) / moment, p1, (p1 - late) / moment)
 
 
@@ -379,7 +378,7 @@ def glide(
     `told` says of each period whether the stem is free (FREE), or the direction in which it went. A period is cut into
     equal steps of at most longest_step, s: one, but where effects of the pressure path with a memory follow each other.
     """
-    valve, now, q, z = karnopp(theta), read(state), parameters(theta), memories(state)
+    valve, now, q, z = karnopp(theta), read(state), theta, state
     v_l = landing_speed(valve, now.t, now.x, now.p, q, z)
     slide_s = SLIDING_TIMES * valve.F_v / valve.k_s
     for i in range(len(commands) + 1):
@@ -398,6 +397,6 @@ def glide(
 # The place, empty.
 
 
-def pressure_ends(u: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
+def pressure_ends(start: float, end: float, h: float, stem: Stem, q: Any, z: Any) -> tuple[float, float]:
     """Return the actuator pressure of both instants, the start's and the end's, with the command held."""
-    return u, u
+    return start, end

@@ -24,7 +24,7 @@ from config.valve_file import ValveFile, valve_alone
 from sim.composition import SPRING, parameter_vector
 from sim.effect import BALANCE, Effect, find_effect
 from sim.interpreted import interpreted
-from sim.karnopp import MEMORY, Karnopp, Stem, karnopp
+from sim.karnopp import MEMORY, Karnopp, Stem, Vector, karnopp
 
 POINTS = 201
 """Of the grid."""
@@ -150,26 +150,25 @@ class _Rest:
     def indicated_m(self, x: float) -> float:
         """Return y."""
         stem = Stem(0.0, x, 0.0, 0.0)
-        q, z = self._parts()
-        return float(self.laws.start_stem(0.0, stem, q, z))
+        return float(self.laws.start_stem(x, 0.0, stem, self.theta, self._state()))
 
     def _stem(self, x: float, command_pa: float) -> Stem:
-        q, z = self._parts()
-        return Stem(0.0, x, 0.0, float(self.laws.start_pressure(command_pa, Stem(0.0, x, 0.0, command_pa), q, z)))
+        stem = Stem(0.0, x, 0.0, command_pa)
+        return stem._replace(p=float(self.laws.start_pressure(command_pa, stem, self.theta, self._state())))
 
     def _force_n(self, stem: Stem) -> float:
-        q, z = self._parts()
-        return float(self.laws.external_force(self.valve, stem, q, z))
+        return float(self.laws.external_force(self.valve, stem, self.theta, self._state()))
 
     def _levels_n(self, stem: Stem, s: int) -> tuple[float, float]:
-        q, z = self._parts()
-        self.laws.start_stem(self.laws.external_force(self.valve, stem, q, z), stem, q, z)
-        F_c, F_s = self.laws.friction(self.valve.F_c, self.valve.F_s, float(s), stem, q, z)
+        state = self._state()
+        F_e = self.laws.external_force(self.valve, stem, self.theta, state)
+        self.laws.start_stem(stem.x, F_e, stem, self.theta, state)
+        F_c, F_s = self.laws.friction(self.valve.F_c, self.valve.F_s, float(s), stem, self.theta, state)
         return float(F_c), float(F_s)
 
-    def _parts(self) -> tuple[Any, Any]:
-        """Return the parameters and fresh memories of the effects."""
-        return self.laws.parameters(self.theta), self.laws.memories(np.zeros(self.state_size))
+    def _state(self) -> Vector:
+        """Return a state with fresh memories of the effects."""
+        return np.zeros(self.state_size)
 
 
 def _root(f: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]) -> float:

@@ -19,7 +19,6 @@ from pymodbus.client import ModbusTcpClient, ModbusTlsClient
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, ReadWriteMultipleRegistersRequest
-from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 ROOT = Path(__file__).parents[2]
@@ -92,6 +91,8 @@ def test_function_23_may_write_more_than_121_registers() -> None:
 
 async def served(*bursts: bytes) -> list[bytes]:
     """Return the first reply of pymodbus's server, ten registers of 0 behind it, to each of some bursts of frames."""
+    from pymodbus.server import ModbusTcpServer  # takes half a second to load
+
     zeros = SimData(0, values=[0] * 10, datatype=DataType.REGISTERS)
     server: Any = ModbusTcpServer(SimDevice(1, simdata=[zeros]), address=("127.0.0.1", 0))
     await server.serve_forever(background=True)

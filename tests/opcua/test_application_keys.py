@@ -1,6 +1,7 @@
 """Which applications are trusted: by their own certificate, or by the authority that signed it, and none besides."""
 
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,17 +15,22 @@ from config.errors import InputError
 from positioner.opcua.application_keys import MOST_REJECTED, ApplicationKeys
 
 NOW = datetime.now(UTC)
-KEY, OTHER, SHORT = (rsa.generate_private_key(65537, bits) for bits in (2048, 2048, 1024))
+
+
+@cache
+def private_key(whose: str, bits: int = 2048) -> rsa.RSAPrivateKey:
+    return rsa.generate_private_key(65537, bits)
 
 
 def signed(
     name: str,
-    key: rsa.RSAPrivateKey = KEY,
+    key: rsa.RSAPrivateKey | None = None,
     by: tuple[str, rsa.RSAPrivateKey] | None = None,
     *,
     may_sign: bool = False,
     ends: timedelta = timedelta(days=9),
 ) -> x509.Certificate:
+    key = key or private_key("own")
     issuer, signer = by or (name, key)
     subject, other = (x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, each)]) for each in (name, issuer))
     made = x509.CertificateBuilder().subject_name(subject).issuer_name(other).public_key(key.public_key())
@@ -57,12 +63,13 @@ def test_one_that_lies_there_is_taken_without_a_restart(keys: ApplicationKeys, e
 
 
 def test_one_that_an_authority_signed_is_taken_and_one_that_a_client_signed_is_not(keys: ApplicationKeys) -> None:
-    by_it = signed("scada", OTHER, by=("plant", KEY))
+    other = private_key("other")
+    by_it = signed("scada", other, by=("plant", private_key("own")))
     trust(keys, signed("plant", may_sign=False))
     assert status(keys, by_it) == "BadCertificateUntrusted"
     trust(keys, signed("plant", may_sign=True))
     assert status(keys, by_it) == "taken"
-    assert status(keys, signed("scada", OTHER, by=("plant", OTHER))) == "BadCertificateUntrusted", "a forged signature"
+    assert status(keys, signed("scada", other, by=("plant", other))) == "BadCertificateUntrusted", "a forged signature"
     trust(keys, signed("plant", may_sign=True, ends=timedelta(days=-1)))
     assert status(keys, by_it) == "BadCertificateUntrusted", "an authority that is too old"
 
@@ -70,7 +77,7 @@ def test_one_that_an_authority_signed_is_taken_and_one_that_a_client_signed_is_n
 def test_one_that_is_too_old_or_of_a_short_key_is_refused_though_it_lies_there(keys: ApplicationKeys) -> None:
     for certificate, said in (
         (signed("scada", ends=timedelta(days=-1)), "BadCertificateTimeInvalid"),
-        (signed("scada", SHORT), "BadCertificatePolicyCheckFailed"),
+        (signed("scada", private_key("short", 1024)), "BadCertificatePolicyCheckFailed"),
     ):
         trust(keys, certificate)
         assert status(keys, certificate) == said
@@ -92,6 +99,6 @@ def test_its_own_is_made_once_and_only_its_owner_reads_the_key(keys: Application
     assert keys.key.stat().st_mode & 0o077 == 0
     again = ApplicationKeys(tmp_path, "urn:here:positioner", "localhost")
     assert (again.made, again.own) == (False, keys.own)
-    keys.key.write_bytes(OTHER.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
+    keys.key.write_bytes(private_key("other").private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
     with pytest.raises(InputError, match="is not the key of"):
         ApplicationKeys(tmp_path, "urn:here:positioner", "localhost")

@@ -7,7 +7,7 @@ import pytest
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile
-from positioner.pages.parts.theme import LIGHT
+from positioner.pages.parts.ink import LIGHT
 from positioner.pages.parts.units import Units
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Opened

@@ -18,7 +18,6 @@ from positioner.observer.freshness import Freshness
 from positioner.observer.trends import thinned
 from positioner.observer.valve_view import ValvePicture
 from positioner.pages.operator_page import facts
-from positioner.pages.operator_page.controls import SIGNED_IN_S, SignedIn
 from positioner.pages.parts.units import LENGTHS, Units
 
 STROKE_M = 0.1
@@ -107,6 +106,8 @@ def test_a_window_keeps_its_extremes_and_its_gaps() -> None:
 
 
 def test_a_role_ends_by_itself() -> None:
+    from positioner.pages.operator_page.controls import SIGNED_IN_S, SignedIn  # the page's library, with it
+
     signed = SignedIn()
     assert signed.at(0.0) is Role.OBSERVER
     signed.begin(Role.ENGINEER, 10.0)

@@ -1,11 +1,7 @@
 """A valve with every shipped effect in its place and switched off: one kernel for many tests. The text uncompiled."""
 
-import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +9,8 @@ import numpy.typing as npt
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim import karnopp
 from sim.composition import BASE, Composition
-from sim.effect import Effect, execute, shipped_effect, tried_effects
-from sim.kernel_source import kernel_source
+from sim.effect import Effect, shipped_effect, tried_effects
+from sim.interpreted import interpreted
 from sim.valve import Valve
 
 SEED = load_valve(shipped_valve("seed"))
@@ -48,24 +44,15 @@ def theta_with(effect: Effect, values: Sequence[float]) -> Series:
 
 def plain(effects: Sequence[Effect]) -> Callable[[Sequence[float], Series, float, float], Series]:
     """Return the model with its effects as plain Python: (effects' parameters, commands, period, step) -> path."""
-    module = ModuleType("plain_kernel")
-    sys.modules["plain_kernel"] = module
-    text = Path(karnopp.__file__).read_text() + (kernel_source(effects) if effects else "")
-    exec(compile(text, "plain_kernel", "exec", dont_inherit=True), module.__dict__)
-    for i, each in enumerate(effects):
-        part: dict[str, Any] = {"__name__": f"plain_{each.name}"}
-        execute(each.source, each.path, part)
-        module.__dict__.update({f"{name}_{i}": value for name, value in part.items() if name[0] != "_"})
+    laws = interpreted(effects)
     base = [getattr(SEED.valve, name) for name in BASE]
 
     def run(values: Sequence[float], commands: Series, period_s: float, step_s: float) -> Series:
         theta = np.array([*base, *values])
         state = np.zeros(karnopp.MEMORY + sum(each.memory for each in effects))
         path = np.empty((5, commands.size + 1))
-        module.__dict__["rest"](theta, state, 0.0, 0.0, 0.0)
-        module.__dict__["respond"](
-            theta, state, commands, np.full(commands.size, period_s), step_s, karnopp.TOLERANCE, path
-        )
+        laws.rest(theta, state, 0.0, 0.0, 0.0)
+        laws.respond(theta, state, commands, np.full(commands.size, period_s), step_s, karnopp.TOLERANCE, path)
         return path
 
     return run

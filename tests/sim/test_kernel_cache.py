@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
@@ -88,6 +89,21 @@ def test_the_laws_are_compiled_once_for_all_kernels(filled: Path, monkeypatch: p
     assert valve.position_m == 0.0, "opening is the harder direction"
     valve.advance(1.3 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2, 0.01)
     assert valve.position_m > 0.0
+
+
+def test_an_effect_is_compiled_once_wherever_it_stands(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parameters and memories of effects lie elsewhere in each set of them."""
+    asymmetric = {"name": "asymmetric_friction", "asymmetry": 0.2}
+    lag, sensor = {"name": "ip_lag", "time_constant_s": 0.05}, {"name": "sensor_lag", "time_constant_s": 0.02}
+
+    def answer_m(*tables: dict[str, object]) -> list[float]:
+        file = ValveFile(valve=SEED.valve, effect=tuple(map(EffectTable.model_validate, tables)))
+        return list(Valve(Composition.from_file(file)).run(np.full(50, 40e3), 0.01).position_m)
+
+    together = answer_m(asymmetric, lag, sensor)
+    monkeypatch.delattr(kernel_compiler, "effect")
+    assert answer_m(sensor, lag, asymmetric) == together
+    assert len({repr(each) for each in (together, answer_m(sensor, asymmetric), answer_m(lag, sensor))}) == 3
 
 
 def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
 
 from config.recording import Recording
 from config.slave_file import Sensor
@@ -91,6 +90,8 @@ def examined_here(patch: pytest.MonkeyPatch) -> None:
 
 def serve_cluster(said: Connection) -> None:
     """Be a scheduler with a worker in it, and say its address."""
+    from distributed import LocalCluster  # a second of every worker that only collects this file
+
     local: Any = LocalCluster
     with local(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None

@@ -45,10 +45,10 @@ def force_n(name: str, x: float, **values: float) -> tuple[float, float]:
     effect = effect_of(named(name))
     laws = interpreted((effect,))
     known = {each.key: each.starts[0] for each in named(name).quantities} | {"travel_m": 0.1} | values
-    q = laws.parameters([0.0] * 8 + [known[key] for key in effect.parameters])
+    theta, state = [0.0] * 8 + [known[key] for key in effect.parameters], np.zeros(7 + effect.memory)
     stem = laws.Stem(3.0, x, 2.0, 5e4)
-    z = laws.memories(np.zeros(7 + effect.memory))
-    return laws.force(stem, q, z), laws.friction(100.0, 120.0, 1.0, stem, q, z)[0] - 100.0
+    level_n, _ = laws.friction(100.0, 120.0, 1.0, stem, theta, state)
+    return laws.force(0.0, stem, theta, state), level_n - 100.0
 
 
 def effect_of(form: Form) -> Effect:
@@ -67,12 +67,12 @@ def test_every_form_is_an_effect_that_vanishes_where_its_strength_is_nothing(for
     strengths = effect.strengths(SEED.valve)
     assert 1 <= len(strengths) <= 48
     laws = interpreted((effect,))
-    q, z = laws.parameters([0.0] * 8 + list(effect.off(SEED.valve))), laws.memories(np.zeros(7 + effect.memory))
+    theta, state = [0.0] * 8 + list(effect.off(SEED.valve)), np.zeros(7 + effect.memory)
     stem = laws.Stem(1.0, 0.05, 0.3, 4e4)
-    assert laws.force(stem, q, z) == 0.0
-    assert laws.friction(100.0, 120.0, 1.0, stem, q, z) == (100.0, 120.0)
+    assert laws.force(0.0, stem, theta, state) == 0.0
+    assert laws.friction(100.0, 120.0, 1.0, stem, theta, state) == (100.0, 120.0)
     if "sensor" in effect.functions:
-        assert laws.sensor(0.05, 0.01, stem, q, z) == stem.x
+        assert laws.sensor(0.04, stem.x, 0.01, stem, theta, state) == (0.04, stem.x)
 
 
 def test_names_are_not_given_twice() -> None:
@@ -182,8 +182,8 @@ def test_a_curve_goes_through_its_heights_and_stays_level_beyond(tmp_path: Path)
     laws = interpreted((effect,))
 
     def added_n(s: float, **changed: float) -> float:
-        q = laws.parameters([0.0] * 8 + [{**found, **changed}[key] for key in effect.parameters])
-        return float(laws.force(laws.Stem(0.0, 0.1 * s, 0.0, 0.0), q, ()))
+        theta = [0.0] * 8 + [{**found, **changed}[key] for key in effect.parameters]
+        return float(laws.force(0.0, laws.Stem(0.0, 0.1 * s, 0.0, 0.0), theta, ()))
 
     for s in np.linspace(0.1, 0.9, 33):
         assert added_n(s) == pytest.approx(force_n("force_over_position_bump", 0.1 * s, **values)[0], abs=0.6)

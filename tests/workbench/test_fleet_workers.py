@@ -8,8 +8,6 @@ from typing import Any
 
 import psutil
 import pytest
-from distributed import KilledWorker
-from distributed.comm.core import CommClosedError
 
 from config.errors import CommandFailed
 from positioner.cli.main import main
@@ -42,10 +40,14 @@ class Future:
         return self._error
 
     def result(self) -> None:
+        from distributed.comm.core import CommClosedError
+
         raise CommClosedError
 
 
 def test_a_recording_that_kills_its_workers_is_listed_and_a_scheduler_that_is_gone_said() -> None:
+    from distributed import KilledWorker
+
     died: Any = KilledWorker
     killed = engine._answer(Future("error", died("examine-1", None, 3)), set(), 1.0)
     assert killed.outcome == "unreadable"

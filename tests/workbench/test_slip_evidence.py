@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import t
 
 from config.recording import Recording
 from config.slave_file import Sensor
@@ -132,6 +131,8 @@ def test_the_slope_is_that_of_the_loss(fits: dict[str, Fit], record: Record) -> 
 
 
 def test_likelihoods_are_students() -> None:
+    from scipy.stats import t  # takes as long to load as all else of the file
+
     off = np.array([-30.0, -1.0, 0.0, 2.0, 3e3])
     assert _log_density(off) == pytest.approx(t.logpdf(off, 4))
     assert _log_between(off - 0.5, off + 0.5) == pytest.approx(

@@ -59,8 +59,8 @@ def landings(fit: Fit, split: Split) -> list[Landing]:
     run = FreeRun(composition, record, from_pressure=fit.from_pressure, by=fit.by)
     pressure_pa = run.run(composition.theta).pressure_pa
     laws = interpreted(composition.effects)
-    values = composition.theta.tolist()
-    valve, q = laws.karnopp(values), laws.parameters(values)
+    theta = composition.theta.tolist()
+    valve = laws.karnopp(theta)
     state = np.zeros(composition.state_size)
     found = []
     for rest in rests(record):
@@ -69,9 +69,8 @@ def landings(fit: Fit, split: Split) -> list[Landing]:
             continue
         direction, p = float(rest.direction), float(stretch[-1])
         stem = laws.Stem(float(record.time_s[rest.first]), rest.position_m, 0.0, p)
-        z = laws.memories(state)
-        level_n, _ = laws.friction(valve.F_c, valve.F_s, direction, stem, q, z)
-        missing_n = direction * level_n - laws.external_force(valve, stem, q, z)
+        level_n, _ = laws.friction(valve.F_c, valve.F_s, direction, stem, theta, state)
+        missing_n = direction * level_n - laws.external_force(valve, stem, theta, state)
         found.append(Landing(stem.t, rest.position_m, p, direction, float(missing_n)))
     return found
 

@@ -154,12 +154,12 @@ def _left_n(base: Fit, found: Sequence[Landing], effect: Effect, points: Sequenc
     position_m, direction, missing_n = np.array([[each.position_m, each.direction, each.missing_n] for each in found]).T
     left = []
     for values in points:
-        q = laws.parameters([*bare, *values])
+        theta = [*bare, *values]
         column = np.empty(len(found))
         for i, each in enumerate(found):
             stem = laws.Stem(each.time_s, each.position_m, 0.0, each.pressure_pa)
-            level_n, _ = laws.friction(coulomb_n, coulomb_n, each.direction, stem, q, ())
-            column[i] = laws.force(stem, q, ()) - each.direction * (level_n - coulomb_n)
+            level_n, _ = laws.friction(coulomb_n, coulomb_n, each.direction, stem, theta, ())
+            column[i] = laws.force(0.0, stem, theta, ()) - each.direction * (level_n - coulomb_n)
         left.append(_robust_left_n(np.column_stack([position_m, direction, column]), missing_n))
     return left
 

@@ -169,9 +169,9 @@ def unseen_without_spring(effect: Effect, valve: ValveParameters) -> str:
     if valve.spring_n_per_m or effect.places != ("sensor",) or effect.memory:
         return ""
     laws = interpreted((effect,))
-    q = laws.parameters([*([0.0] * len(BASE)), *effect.strengths(valve)[0]])
+    theta = [*([0.0] * len(BASE)), *effect.strengths(valve)[0]]
     places_m = [part * valve.stroke_m for part in PLACES]
-    off_m = [laws.sensor(x, 0.0, laws.Stem(0.0, x, 0.0, 0.0), q, ()) - x for x in places_m]
+    off_m = [laws.sensor(x, x, 0.0, laws.Stem(0.0, x, 0.0, 0.0), theta, ())[1] - x for x in places_m]
     return "shifts the indication, and a drive without a spring stands anywhere" if _all_same(off_m, valve) else ""
 
 

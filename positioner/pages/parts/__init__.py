@@ -5,7 +5,7 @@ Its files:
     server               listens and serves one page, everything of it from this machine
     gate                 who comes in: by the key in the address or by a password; how much at once
     sessions             who came in
-    theme                light and dark, colours of page and plots
+    theme, ink           light and dark; colours of plots
     telling              errors and sentences, shown
     units, unit_choice   the units that a person reads in, and where they are chosen
     live_text            a text that changes many times a second

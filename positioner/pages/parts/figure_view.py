@@ -9,7 +9,8 @@ from typing import Any
 
 from nicegui import ui
 
-from positioner.pages.parts.theme import LIGHT, Ink, Theme
+from positioner.pages.parts.ink import LIGHT, Ink
+from positioner.pages.parts.theme import Theme
 
 Figure = dict[str, Any]
 AT_ONCE = {"mode": "immediate", "transition": {"duration": 0}, "frame": {"duration": 0, "redraw": False}}

@@ -1,12 +1,10 @@
-"""Light and dark: colours of page and plots, told apart without red and green.
-
-What is measured is ink, a model orange, a better one teal, as in the reports.
-"""
+"""Light and dark: colours of the page, and which of the plots'."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from nicegui import ui
+
+from positioner.pages.parts.ink import DARK, LIGHT, Ink
 
 STYLE = """
 body { font-family: system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
@@ -64,23 +62,6 @@ addEventListener("unhandledrejection", (event) => {
 """A plot that is hidden or taken away is told its new size all the same, and complains; it needs none."""
 # `ui.dark_mode` would do the same, but anew at each update of anything, and each time all styles are worked out anew.
 DARK_QUERY = 'matchMedia("(prefers-color-scheme: dark)").matches'
-
-
-@dataclass(frozen=True, slots=True)
-class Ink:
-    """Colours of plots."""
-
-    text: str
-    quiet: str
-    grid: str
-    paper: str
-    measured: str
-    model: str
-    better: str
-
-
-LIGHT = Ink("#1f2a37", "#5b6675", "#e3e7ec", "#ffffff", "#1f2a37", "#d9622b", "#1b7f79")
-DARK = Ink("#e6eaf0", "#a3adba", "#333b46", "#12161b", "#e6eaf0", "#ff9a5c", "#4fc3b8")
 
 
 class Theme:

@@ -1,7 +1,7 @@
 """A recording before it is taken: position and command over time, small, as the chosen columns and units make it."""
 
 from config.recording import Column, Recording
-from positioner.pages.parts.theme import Ink
+from positioner.pages.parts.ink import Ink
 from positioner.pages.parts.units import Unit, Units
 from workbench.report.charts import Figure, axis, layout
 from workbench.report.plot_series import extremes, rounded, running_s

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.recording import Column
-from positioner.pages.parts.theme import Ink
+from positioner.pages.parts.ink import Ink
 from positioner.pages.parts.units import Unit
 from positioner.pages.workbench_page.time_figure import Window
 from workbench.compare.friction_balance import Forces
