@@ -187,7 +187,7 @@ def test_a_still_stems_noise_holds_no_spikes() -> None:
 
 HEADER = "time_s,command_pa,position_m\n"
 FILES: dict[str, tuple[bytes, str]] = {
-    "no bytes": (b"", "column time_s is missing"),
+    "no bytes": (b"", "is empty; its first line should name the columns: time_s"),
     "header only": (HEADER.encode(), "holds no samples"),
     "backwards": (f"{HEADER}2,4e4,0.01\n1,4e4,0.01\n0,4e4,0.01\n".encode(), "time_s must increase strictly: sample 2"),
     "words": (f"{HEADER}0,4e4,open\n".encode(), "line 2: 'open' is not a number"),
