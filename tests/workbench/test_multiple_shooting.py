@@ -85,3 +85,16 @@ def test_nothing_is_begun_where_nothing_is_left(record: Record) -> None:
     error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
     there = error.coordinates(composition.theta)
     assert not shooting_starts(error, [[there + 0.02]], there)
+
+
+def test_a_lag_that_the_base_fit_took_for_viscous_friction_is_found() -> None:
+    """Ten times the friction: of the strengths the least error is at the weakest, and leads to 240 times the noise."""
+    hidden = hide(41039)
+    base = fit(hidden.fit, hidden.base, workers=1, profile=False)
+    assert base.parameters["viscous_ns_per_m"].value > 5.0 * hidden.truth.valve.viscous_ns_per_m
+    found = fit(hidden.fit, hidden.base, effects=["sensor_lag"], base=base, workers=1, profile=False)
+    (lag,) = hidden.truth.effect
+    assert found.parameters["sensor_lag.time_constant_s"].value == pytest.approx(
+        lag.parameters["time_constant_s"], rel=0.01
+    )
+    assert found.trusted
