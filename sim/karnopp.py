@@ -76,6 +76,8 @@ LONG_S = 100.0
 """and for a sensor: it shows the position itself."""
 CORRECTIONS = 3
 """Corrections of a position until the sensor shows it where it was measured."""
+BALANCINGS = 6
+"""The same, and of a pressure until it balances forces that depend on it."""
 
 MEMORY = 7
 """Where the effects' memories begin in the state vector, after the Condition."""
@@ -426,14 +428,17 @@ def rest(theta: Vector, state: Vector, time: float, position: float, command: fl
 def begin(theta: Vector, state: Vector, time: float, shown: float, velocity: float, command: float) -> None:
     """Set the state: a sensor shows this position, at this velocity.
 
-    The pressure is the nearest to the command, long held, with which the forces of the bare valve are in balance.
+    The pressure is the nearest to the command, long held, with which the forces are in balance.
     """
-    valve = karnopp(theta)
-    x = shown
-    for _ in range(CORRECTIONS):
-        rest(theta, state, time, x, equilibrium(valve, x, velocity, command))
+    valve, x = karnopp(theta), shown
+    p = valve.k_s * x / valve.A
+    rest(theta, state, time, x, p)
+    for _ in range(BALANCINGS):
+        before = p
+        p = equilibrium(valve, command, Stem(time, x, velocity, p), theta, state)
+        rest(theta, state, time, x, p)
         off = shown - read(state).indicated
-        if off == 0.0:
+        if off == 0.0 and p == before:
             break
         x += off
     if velocity != 0.0:
@@ -442,15 +447,19 @@ def begin(theta: Vector, state: Vector, time: float, shown: float, velocity: flo
         write(state, Condition(now.t, now.x, velocity, now.p, SLIP, sigma, now.indicated))
 
 
-def equilibrium(valve: Karnopp, x: float, v: float, command: float) -> float:
-    """Return the pressure, Pa, nearest to a command with which the forces are in balance.
+def equilibrium(valve: Karnopp, command: float, stem: Stem, q: Any, z: Any) -> float:
+    """Return the pressure, Pa, nearest to a command with which the forces are in balance, those of effects as at p.
 
-    At rest |A p - k_s x| <= F_s; in motion A p = k_s x + F_v v + F_c sign v.
+    At rest |A p - k_s x + F| <= F_s; in motion A p = k_s x - F + F_v v + F_c sign v.
     """
-    middle = valve.k_s * x + valve.F_v * v
-    if v != 0.0:
-        return (middle + (valve.F_c if v > 0.0 else -valve.F_c)) / valve.A
-    return min(max(command, (middle - valve.F_s) / valve.A), (middle + valve.F_s) / valve.A)
+    middle = valve.k_s * stem.x + valve.F_v * stem.v - force(0.0, stem, q, z)
+    if stem.v != 0.0:
+        sigma = 1.0 if stem.v > 0.0 else -1.0
+        F_c, _ = friction(valve.F_c, valve.F_s, sigma, stem, q, z)
+        return (middle + sigma * F_c) / valve.A
+    _, closing = friction(valve.F_c, valve.F_s, -1.0, stem, q, z)
+    _, opening = friction(valve.F_c, valve.F_s, 1.0, stem, q, z)
+    return min(max(command, (middle - closing) / valve.A), (middle + opening) / valve.A)
 
 
 def carry(

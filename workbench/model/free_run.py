@@ -5,8 +5,8 @@ velocity. The place is the median of the first still samples, corrected by what 
 the model indicates it. What was commanded before is not known. A pressure path that remembers it, a lag or a limited
 rate, begins with the pressure nearest to the first command of those that balance the forces:
 
-    at rest      |A p - k_s x| <= F_s
-    in motion    A p = k_s x + F_v v + F_c sign v
+    at rest      |A p - k_s x + F| <= F_s
+    in motion    A p = k_s x - F + F_v v + F_c sign v       F, F_c, F_s with all effects
 
 Of a recording that begins in motion, and is judged from a rest on, the commands before are known: the pressure path
 begins with the recording and follows them, with the stem held where it comes to rest.
@@ -36,7 +36,7 @@ from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, Composition
-from sim.karnopp import Vector, equilibrium, karnopp, read, write
+from sim.karnopp import Vector, read, write
 from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
 from sim.quasi_static import FREE
@@ -71,6 +71,8 @@ FINE = Accuracy(1.0, 3e-4)
 """Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
 ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
+BEYOND_PA = 1e12
+"""More than holds any stem: nearest to it is what breaks it loose."""
 CASCADE = 16
 """Steps to a sample where effects of the pressure path with a memory follow each other, without inertia."""
 JUDGED = 10
@@ -271,18 +273,20 @@ class FreeRun:
 
         A path without a dead band reaches then what is a straight line in what it begins with: two show it.
         """
-        begin = lead.begin
-        valve = karnopp(theta)
-        nearest_pa = equilibrium(valve, begin.position_m, begin.velocity_m_per_s, float(lead.drive_pa[0]))
-        if not lead.before.leaves or begin.velocity_m_per_s:
+        nearest_pa = self._balanced_pa(theta, lead, float(lead.drive_pa[0]))
+        if not lead.before.leaves or lead.begin.velocity_m_per_s:
             return nearest_pa
-        middle_pa = landed_pa(theta, begin.position_m, 0)
+        loosest_pa = [self._balanced_pa(theta, lead, way * BEYOND_PA) for way in (-1.0, 1.0)]
+        middle_pa = 0.5 * sum(loosest_pa)
         reached_pa = [self._led(theta, lead, each, lead.before.rests, step_s)[1] for each in (middle_pa, nearest_pa)]
         if reached_pa[1] == reached_pa[0]:
             return nearest_pa
-        loose_pa = broke_loose_pa(theta, begin.position_m, lead.before.leaves, 0.0)
-        share = (loose_pa - reached_pa[0]) / (reached_pa[1] - reached_pa[0])
-        return equilibrium(valve, begin.position_m, 0.0, middle_pa + share * (nearest_pa - middle_pa))
+        share = (loosest_pa[lead.before.leaves > 0] - reached_pa[0]) / (reached_pa[1] - reached_pa[0])
+        return self._balanced_pa(theta, lead, middle_pa + share * (nearest_pa - middle_pa))
+
+    def _balanced_pa(self, theta: Vector, lead: Lead, wanted_pa: float) -> float:
+        """Return the pressure, Pa, nearest to the one wanted with which the stem is as a lead begins."""
+        return read(self._begin(theta, lead.begin, lead.time_s, wanted_pa)).p
 
     def _led(self, theta: Vector, lead: Lead, begin_pa: float, periods: int, step_s: float) -> tuple[Vector, float]:
         """Return the state after so many periods of a lead, the stem held, and the pressure amid the last one, Pa."""
