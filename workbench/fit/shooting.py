@@ -19,6 +19,7 @@ from sim.karnopp import Vector
 from workbench.fit.agreement import SHARED, Place
 from workbench.fit.descent import COARSE, MIDDLING, WIDE, descended
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
+from workbench.fit.starts import scaled
 from workbench.model.free_run import FINE, ROUGH
 from workbench.model.multiple_shooting import slips_from_rest
 
@@ -29,7 +30,7 @@ GAINS = 0.9
 """Factor on the error of what is there already, below which a descent is worth while."""
 HOPELESS = 5.0
 """Factor on the least error of all strengths, above which no search begins at one."""
-VISCOUS_FACTORS = (0.1, 0.3, 1.0)
+LESS_VISCOUS = (0.1, 0.3, 1.0)
 """Of the base fit's, which has taken a lag for friction."""
 
 Strength = Sequence[Vector]
@@ -71,13 +72,7 @@ def _best_strength(rough: SimulationError, strengths: Sequence[Strength]) -> tup
 
 
 def _with_less_viscosity(error: SimulationError, places: Strength) -> list[Vector]:
-    found = []
-    for z in places:
-        for factor in VISCOUS_FACTORS:
-            theta = error.theta(z)
-            theta[VISCOUS] *= factor
-            found.append(error.coordinates(theta))
-    return found
+    return [error.coordinates(scaled(error.theta(z), VISCOUS, factor)) for z in places for factor in LESS_VISCOUS]
 
 
 def _shot(error: SimulationError, z: Vector, best: Vector, part: int | None) -> Vector | None:

@@ -224,7 +224,7 @@ def told_starts(
             begin = there.coordinates(_changed(theta, added, values))
             solved.append(there.theta(descended(there, descended(there, begin, WIDE), MIDDLING)))
     static = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
-    ratios = [_scaled(theta, STATIC, factor) for theta in solved for factor in STATIC_FACTORS]
+    ratios = [scaled(theta, STATIC, factor) for theta in solved for factor in STATIC_FACTORS]
     return [
         Place(_in_motion(error, z, static), "landings") for z in error.screened(map(error.coordinates, ratios), count)
     ]
@@ -259,7 +259,7 @@ def _landed(
             begin[[each.index for each in added]] = values
             solved = landings.solved(begin, kept)
             if solved:
-                viscous = [_scaled(solved.theta, VISCOUS, factor) for factor in VISCOUS_FACTORS]
+                viscous = [scaled(solved.theta, VISCOUS, factor) for factor in VISCOUS_FACTORS]
                 found += [_smoothed(error, z) for z in error.screened(map(error.coordinates, viscous), 1)]
     return found
 
@@ -281,7 +281,8 @@ def _in_motion(error: SimulationError, z: Vector, moving: Sequence[int]) -> Vect
     return z
 
 
-def _scaled(theta: Vector, index: int, factor: float) -> Vector:
+def scaled(theta: Vector, index: int, factor: float) -> Vector:
+    """Return a parameter vector with one of its parameters multiplied."""
     changed = theta.copy()
     changed[index] *= factor
     return changed
