@@ -11,6 +11,7 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.simulation import simulate
 from tests.sim.test_positioner import PA_PER_M, valve_file
+from tests.workbench.valves import with_effect
 from workbench import compare, fit
 from workbench.report import Subject, report_comparison
 from workbench.select.effect_acceptance import Gain
@@ -81,6 +82,15 @@ def test_the_first_slip_comes_when_it_came_though_no_pressure_was_recorded(seed:
     found = compare(recorded(TRUTH, seed), TRUTH)
     assert "the stem is in motion at sample 1" in found.notes[0]
     assert found.rms_m < 1e-4, "the noise is 0.05 mm; begun in the middle of the band, 0.3 mm and more"
+
+
+@pytest.mark.parametrize(
+    ("effect", "strength"),
+    [("preload", {"force_n": 500.0}), ("asymmetric_friction", {"asymmetry": 0.3})],
+)
+def test_what_it_begins_with_balances_the_forces_of_all_effects(effect: str, strength: dict[str, float]) -> None:
+    both = ValveFile(valve=TRUTH.valve, effect=(*TRUTH.effect, *with_effect(TRUTH, effect, **strength).effect))
+    assert compare(recorded(both, 1), both).rms_m < 1e-4
 
 
 @pytest.mark.parametrize(("truth", "within_m"), [(TRUTH, 1e-4), (SLUGGISH, 4e-4)])

@@ -35,7 +35,7 @@ from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
-from sim.composition import AREA, Composition
+from sim.composition import AREA, COULOMB, STATIC, Composition
 from sim.karnopp import Vector, read, write
 from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
@@ -46,10 +46,8 @@ from workbench.model.initial_state import (
     BeforeStart,
     InitialState,
     before_start,
-    broke_loose_pa,
     held,
     initial_state,
-    landed_pa,
 )
 from workbench.model.lead import Lead, lead_of
 from workbench.model.sampling import Motion, Sampling, landings, sampling
@@ -253,17 +251,17 @@ class FreeRun:
             if segment.lead:
                 self._remember(theta, state, segment.lead, segment.step_s)
             return drive_pa, state
-        stem_m = segment.begin.position_m
-        state = self._begin(theta, segment.begin, time_s, landed_pa(theta, stem_m, segment.before.came))
+        landed_pa = self._held_pa(theta, segment.begin, time_s, segment.before.came * theta[COULOMB] / theta[STATIC])
+        state = self._begin(theta, segment.begin, time_s, landed_pa)
         if segment.before.leaves:
             risen_pa = self._risen_pa(theta, state, segment, segment.before.rests)
-            begin_pa = broke_loose_pa(theta, stem_m, segment.before.leaves, risen_pa)
-            state = self._begin(theta, segment.begin, time_s, begin_pa)
+            loose_pa = self._held_pa(theta, segment.begin, time_s, segment.before.leaves)
+            state = self._begin(theta, segment.begin, time_s, loose_pa - risen_pa)
         return drive_pa, state
 
     def _remember(self, theta: Vector, state: Vector, lead: Lead, step_s: float) -> None:
         """Let the pressure path of a state at rest remember what was commanded before; the stem held."""
-        led, _ = self._led(theta, lead, self._led_from_pa(theta, lead, step_s), lead.drive_pa.size, step_s)
+        led, _ = self._led(theta, lead, self._led_from_pa(theta, lead, step_s), lead.remembered, step_s)
         for memory in lead.memories:
             state[memory] = led[memory]
         write(state, read(state)._replace(p=read(led).p))
@@ -276,17 +274,26 @@ class FreeRun:
         nearest_pa = self._balanced_pa(theta, lead, float(lead.drive_pa[0]))
         if not lead.before.leaves or lead.begin.velocity_m_per_s:
             return nearest_pa
-        loosest_pa = [self._balanced_pa(theta, lead, way * BEYOND_PA) for way in (-1.0, 1.0)]
-        middle_pa = 0.5 * sum(loosest_pa)
+        middle_pa, loose_pa = (
+            self._held_pa(theta, lead.begin, lead.time_s, share) for share in (0.0, float(lead.before.leaves))
+        )
         reached_pa = [self._led(theta, lead, each, lead.before.rests, step_s)[1] for each in (middle_pa, nearest_pa)]
         if reached_pa[1] == reached_pa[0]:
             return nearest_pa
-        share = (loosest_pa[lead.before.leaves > 0] - reached_pa[0]) / (reached_pa[1] - reached_pa[0])
+        share = (loose_pa - reached_pa[0]) / (reached_pa[1] - reached_pa[0])
         return self._balanced_pa(theta, lead, middle_pa + share * (nearest_pa - middle_pa))
 
     def _balanced_pa(self, theta: Vector, lead: Lead, wanted_pa: float) -> float:
         """Return the pressure, Pa, nearest to the one wanted with which the stem is as a lead begins."""
         return read(self._begin(theta, lead.begin, lead.time_s, wanted_pa)).p
+
+    def _held_pa(self, theta: Vector, begin: InitialState, time_s: float, share: float) -> float:
+        """Return the pressure, Pa, that a share of static friction holds a stem at rest against.
+
+        -1: it is about to break loose closing, +1 opening, 0: the middle of all that hold it.
+        """
+        closing_pa, opening_pa = (read(self._begin(theta, begin, time_s, way * BEYOND_PA)).p for way in (-1.0, 1.0))
+        return 0.5 * (closing_pa + opening_pa) + 0.5 * share * (opening_pa - closing_pa)
 
     def _led(self, theta: Vector, lead: Lead, begin_pa: float, periods: int, step_s: float) -> tuple[Vector, float]:
         """Return the state after so many periods of a lead, the stem held, and the pressure amid the last one, Pa."""

@@ -1,7 +1,8 @@
-"""What was commanded before a segment of a record, and is remembered by the pressure path.
+"""What a pressure path that remembers begins a segment with: what was commanded before, and when the stem leaves.
 
 A record that begins in motion is judged from a rest on (`workbench.data.record`). Five time constants after a step a
-lag still holds 0.7 % of it: taken for settled, it shifts all forces that are fitted by that much.
+lag still holds 0.7 % of it: taken for settled, it shifts all forces that are fitted by that much. What was commanded
+before the record no sample says; a stem at rest leaves when the pressure has come to what breaks it loose.
 """
 
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from workbench.model.initial_state import BeforeStart, InitialState, before_star
 
 
 class Lead(NamedTuple):
-    """The commands between where a record begins and where a segment of it does."""
+    """From where a record, or a stretch of it after a gap, begins until the stem leaves, or its segment begins."""
 
     begin: InitialState
     """Of the stem as the record begins,"""
@@ -29,25 +30,28 @@ class Lead(NamedTuple):
     drive_pa: Vector
     """Held from each of its samples to the next, Pa."""
     periods_s: Vector
+    remembered: int
+    """Periods between where the record begins and where the segment does."""
     memories: tuple[slice, ...]
     """Where the pressure path's memories stand in the state."""
 
 
 def lead_of(record: Record, composition: Composition, drive_pa: Column, segment: int) -> Lead | None:
-    """Return what leads to a segment, by its place among them; None where nothing does, or no effect remembers it.
+    """Return what leads to a segment, by its place among them; None where no effect remembers it.
 
     A positioner follows the stem: what it makes of a set point while the stem moved is not known by holding it.
     """
-    first = record.segments[segment][0]
+    first, end = record.segments[segment]
     begun = record.commanded_from[segment]
     memories = tuple(_path_memories(composition))
-    if begun == first or not memories or composition.by_setpoint:
+    if not memories or composition.by_setpoint:
         return None
-    held_pa = checked_commands(drive_pa[begun:first])
-    periods_s = checked_periods(np.diff(record.time_s[begun : first + 1]), held_pa)
-    begin = initial_state(record, begun, record.segments[segment][1])
-    before = before_start(record, begun, first, begin.position_m)
-    return Lead(begin, float(record.time_s[begun]), before, held_pa, periods_s, memories)
+    begin = initial_state(record, begun, end)
+    before = before_start(record, begun, end, begin.position_m)
+    until = max(first, begun + before.rests)
+    held_pa = checked_commands(drive_pa[begun:until])
+    periods_s = checked_periods(np.diff(record.time_s[begun : until + 1]), held_pa)
+    return Lead(begin, float(record.time_s[begun]), before, held_pa, periods_s, first - begun, memories)
 
 
 def _path_memories(composition: Composition) -> Iterator[slice]:

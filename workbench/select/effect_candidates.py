@@ -24,6 +24,8 @@ from workbench.select.residual_structure import STRUCTURED
 
 AT_END = 0.2
 """Of the weakest start: nearer to the end of its range a parameter is at it."""
+NEARLY_AS_EVIDENT = 0.5
+"""Of the added one's evidence: with less, an effect is not tried in its place where that leads nowhere."""
 SAME_COST = 1.01
 """Factor on the cost within which two members of a class came out as the one they are."""
 
@@ -100,23 +102,27 @@ def judged_step(
     return ForwardStep(before, candidates, added, rivals, equivalent, suspected)
 
 
-def runner_up(step: EffectStep, library: Mapping[str, Effect]) -> EffectCandidate | None:
-    """Return the accepted effect that does best on what was held out, if there it is no worse than the added one.
+def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectCandidate, ...]:
+    """Return the accepted effects that might have been added: by what was held out, and by what was fitted.
 
-    One of the added one's class is none: no recording tells them apart.
+    The best of the held-out errors, if there it is no worse than the added one; then the one with the most evidence, if
+    that is `NEARLY_AS_EVIDENT`. One of the added one's class is none: no recording tells them apart.
     """
-    if step.added is None or step.added.model is None:
-        return None
-    best, own = step.added.model.errors, algebraic_class(step.added.name, library)
-    errors = {
-        each.name: each.model.errors
-        for each in step.candidates
-        if each.accepted and each.model and each.name not in own
-    }
-    first = min(errors, key=lambda name: float(errors[name].logs.mean()), default=None)
-    if first is None or not indistinguishable(best.logs, errors[first].logs):
-        return None
-    return next(each for each in step.candidates if each.name == first)
+    added = step.added
+    if added is None or added.model is None:
+        return ()
+    own = algebraic_class(added.name, library)
+    others = {each.name: each for each in step.candidates if each.accepted and each.model and each.name not in own}
+    logs = {name: each.model.errors.logs for name, each in others.items() if each.model}
+    held_out = min(logs, key=lambda name: float(logs[name].mean()), default=None)
+    fitted = max(others, key=lambda name: others[name].evidence, default=None)
+    found = []
+    if held_out is not None and indistinguishable(added.model.errors.logs, logs[held_out]):
+        found.append(held_out)
+    near = fitted is not None and others[fitted].evidence > NEARLY_AS_EVIDENT * added.evidence
+    if fitted is not None and near and not algebraic_class(fitted, library) & {*found}:
+        found.append(fitted)
+    return tuple(others[name] for name in found)
 
 
 def with_added(step: EffectStep, candidate: EffectCandidate, library: Mapping[str, Effect]) -> EffectStep:

@@ -7,8 +7,8 @@ another (`AFTER` in its file) is fitted only where that one has evidence, or is 
 would add leaves something to explain. Before they are judged, the valve without is fitted once more from the base
 parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
 model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
-two steps leave something to explain, the first is tried with its runner-up added, too, and taken back if that leads
-farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
+two steps leave something to explain, the first is tried with each of its runners-up added, too, and taken back if that
+leads farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
 several explain all, what had evidence in an earlier step is asked again beside what was added later.
 """
 
@@ -40,7 +40,7 @@ from workbench.select.effect_candidates import (
     EvaluatedModel,
     judged_step,
     leads_farther,
-    runner_up,
+    runners_up,
     with_added,
 )
 from workbench.select.equivalence import algebraic_class, bare_imitation, classes
@@ -162,19 +162,17 @@ class EffectSearch:
         return steps
 
     def _taken_back(self, step: EffectStep, following: EffectStep) -> tuple[EffectStep, EffectStep]:
-        """Return a step and the one after it, with the runner-up added in the first where that leads farther.
+        """Return a step and the one after it, with a runner-up added in the first where that leads farther.
 
         Of two effects that are missing together the first is chosen before the second is known: another may stand in
         for both, and have more evidence than either.
         """
-        if _best(following).explained:
-            return step, following
-        other = runner_up(step, self._library)
-        if other is None or other.model is None:
-            return step, following
-        turned = self._step(other.step + 1, other.model)
-        if leads_farther(_best(turned), _best(following)):
-            return with_added(step, other, self._library), turned
+        for other in runners_up(step, self._library):
+            if _best(following).explained or other.model is None:
+                break
+            turned = self._step(other.step + 1, other.model)
+            if leads_farther(_best(turned), _best(following)):
+                step, following = with_added(step, other, self._library), turned
         return step, following
 
     def _asked_beside(self, step: EffectStep, later: Sequence[EffectStep]) -> EffectStep:
