@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
-.PHONY: venv demo test suite lint browser bench campaign fuzz kills endurance blind journey locked sbom docs clean
+.PHONY: venv demo test suite long lint browser bench campaign fuzz kills endurance blind journey locked sbom docs clean
 
 venv: $(READY)
 
@@ -22,7 +22,10 @@ test: $(READY)          ## lint, types, import contracts and the whole test suit
 suite: $(READY)
 	@$(MAKE) --no-print-directory browser # no prerequisite: that one ends at once, and make -j may begin the next only after lint
 	@$(BIN)/pytest --collect-only -qq > /dev/null || true # what pytest makes of the tests' files is kept: once, not in every worker
-	$(BIN)/pytest --numprocesses=auto
+	$(BIN)/pytest --numprocesses=auto -m 'not long'
+
+long: $(READY) browser  ## the tests that take long: whole searches, journeys and campaigns, every recipe followed
+	$(BIN)/pytest --numprocesses=auto -m long
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -17,6 +17,7 @@ SHORT = {law: FlowCase(law, 0.02, settle_s=45.0, measured_s=90.0) for law in ("c
 NONE = FlowFigures(0.01, 0.03, 1.0, 0.01, 1.0, 10.0)
 
 
+@pytest.mark.long
 def test_ours_adds_less_than_half_of_what_the_others_do() -> None:
     found = {law: virtual_outcome(case).figures for law, case in SHORT.items()}
     for other in ("conventional", "seed"):

@@ -25,6 +25,7 @@ def test_there_is_a_recipe_for_all_that_is_added_often() -> None:
     assert set(RECIPES) == WANTED
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", RECIPES)
 def test_a_recipe_can_be_followed(name: str, tmp_path: Path) -> None:
     tree = tmp_path / "tree"

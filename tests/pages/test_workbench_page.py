@@ -184,6 +184,7 @@ def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, case: 
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
+@pytest.mark.long
 def test_another_recording_is_held_out_and_an_effect_of_ones_own_is_written(address: str, case: Path) -> None:
     with opened(address) as page:
         drop(page, "drop", case / "fit.csv")

@@ -226,6 +226,7 @@ def test_a_time_limit_that_leaves_no_room_is_refused(tmp_path: Path, capsys: pyt
     assert "site.toml: experiment.limit_s must exceed 126 s" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fit], recording: Recording) -> None:
     growing = EffectTable.model_validate({"name": "position_friction", "growth": 0.4, "travel_m": BARE.valve.stroke_m})
     changed = ValveFile(valve=LAGGING.valve, effect=(*LAGGING.effect, growing))

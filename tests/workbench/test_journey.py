@@ -57,7 +57,9 @@ MAPPING = [f"--column={each}" for each in ("time_s=Time", "command_pa=OUT:bar", 
         pytest.param(
             lambda: generated("backlash", "elasto_plastic", 2, "ip_lag", is_export=True), id="elasto-plastic, export"
         ),
-        pytest.param(lambda: generated("asymmetric_friction", "lugre", 1, "sensor_lag"), id="LuGre"),
+        pytest.param(
+            lambda: generated("asymmetric_friction", "lugre", 1, "sensor_lag"), marks=pytest.mark.long, id="LuGre"
+        ),
     ],
 )
 def test_the_hidden_effect_is_found_and_added_and_the_error_falls(

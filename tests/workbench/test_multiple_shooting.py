@@ -61,6 +61,7 @@ def test_pressure_and_its_memory_go_on(record: Record) -> None:
     assert not np.array_equal(runs[0].stem_m, runs[1].stem_m)
 
 
+@pytest.mark.long
 def test_it_leads_where_the_free_run_shows_no_way() -> None:
     """Friction's fall with speed, which a fit of the bare valve takes for static friction: 93 slips, most in ramps."""
     hidden = hide(52017)

@@ -21,6 +21,7 @@ def true_cost(recording: Recording, truth: ValveFile) -> float:
     return error.cost(np.zeros(0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [52027, 52055])
 def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth(seed: int) -> None:
     hidden = hide(seed)
