@@ -26,6 +26,9 @@ NO_TIME_S = 1e-9
 """A stretch that lasts no longer is over."""
 JUMP = 1e-9
 """Share of the pressure by which it has jumped, and is not merely rounded."""
+BEND = 1e-4
+"""Share of the pressure that a bend must be off a straight line to end a step: what follows a ramp bends at every step,
+if only by rounding."""
 MOST_CUTS = 8
 """Of what is left of a step a bend cuts off no less than this part. Behind a lag the end of a step is a bend, which
 comes out T later and would end another step there, and so on without end."""
@@ -64,11 +67,11 @@ def straight(u: float, h: float, t: float, q: Parameters, z: Memory) -> float:
             return h
         if jumps(z[VALUE + after], z[TIME + after], here, z):
             return float(lasts)
-        if z[SLOPE + after] != z[SLOPE + here] and lasts * MOST_CUTS >= h:
+        if lasts * MOST_CUTS >= h and bends(z[SLOPE + after] - z[SLOPE + here], lasts, h, u):
             return float(lasts)
         k += 1
     here = k % STRETCHES
-    cuts = jumps(u, t, here, z) or (z[SLOPE + here] != 0.0 and h <= MOST_CUTS * T)
+    cuts = jumps(u, t, here, z) or (h <= MOST_CUTS * T and bends(z[SLOPE + here], T, h, u))
     return T if cuts and h - NO_TIME_S > T else h
 
 
@@ -76,6 +79,11 @@ def jumps(value: float, t: float, here: int, z: Memory) -> bool:
     """Return whether a value is not that to which a stretch goes on."""
     apart = abs(value - z[VALUE + here] - z[SLOPE + here] * (t - z[TIME + here]))
     return bool(apart > JUMP * max(abs(value), abs(z[VALUE + here])))
+
+
+def bends(change: float, lasts: float, h: float, u: float) -> bool:
+    """Return whether a slope that changes within a step takes it off the straight line from its begin to its end."""
+    return bool(abs(change) * lasts * (h - lasts) > BEND * h * abs(u))
 
 
 def pressure(u: float, t: float, middle: float, q: Parameters, z: Memory) -> float:
