@@ -7,6 +7,7 @@ Its files:
     data_sheet                                    a valve file from what a data sheet says
     extended_valve                                a valve file worked out for the controller
     loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all
+    file_kinds                                    which of these a file is, where another is asked for
     file_stem                                     what the names of a valve's files begin with
     whole_file                                    replaces a file so that a crash leaves the old one or the new one
     device, canopen_device                        table [device], on Modbus and on CANopen

@@ -18,6 +18,7 @@ from pydantic import Field, IPvAnyNetwork, model_validator
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
+from config.file_kinds import require_kind
 from config.loading import FolderName, Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
 from config.record_tables import HistoryTable, RecorderTable
 from config.supervision_table import SafetyTable, SupervisionTable
@@ -322,6 +323,7 @@ def load_valves(path: Path) -> tuple[DaemonFile, ...]:
         InputError: names file, key, value and what is allowed.
     """
     tables, source = read_toml(path), str(path)
+    require_kind(tables, "daemon", source)
     if not tables.get("valve") or not isinstance(tables["valve"], list):
         return (validated(DaemonFile, tables, source, path.parent),)
     numbered = enumerate(tables["valve"], 1)

@@ -9,7 +9,8 @@ from pydantic import Field, Tag, model_validator
 from config.canopen_device import CanBus
 from config.device import Host
 from config.errors import InputError
-from config.loading import NonNegative, Port, Positive, Schema, chosen_by, load
+from config.file_kinds import require_kind
+from config.loading import NonNegative, Port, Positive, Schema, chosen_by, read_toml, validated
 from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
@@ -180,7 +181,9 @@ def load_slave(path: Path) -> SlaveFile:
     Raises:
         InputError: names file, key, value and what is allowed.
     """
-    return load(SlaveFile, path)
+    tables = read_toml(path)
+    require_kind(tables, "slave", str(path))
+    return validated(SlaveFile, tables, str(path), path.parent)
 
 
 def valve_path(slave: SlaveFile, path: Path) -> Path:

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from config.drive import KINDS, VALVE, Kind, KindName
 from config.errors import InputError
+from config.file_kinds import require_kind
 from config.loading import SHIPPED, NonNegative, Positive, Schema, read_toml, validated
 
 
@@ -90,6 +91,7 @@ def load_valve(path: Path | str) -> ValveFile:
     """
     path = Path(path)
     tables = read_toml(path)
+    require_kind(tables, "valve", str(path))
     file = _drive(tables, str(path)) if "drive" in tables else validated(ValveFile, tables, str(path), path.parent)
     return file.model_copy(update={"effect": tuple(each.seen_from(path.parent) for each in file.effect)})
 

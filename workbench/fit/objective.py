@@ -18,7 +18,7 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from sim.misfit import Judge
 from workbench.fit.breaking_off import go_on
-from workbench.model.free_run import FINE, ROUGH, Accuracy, FreeRun
+from workbench.model.free_run import FINE, ROUGH, SCOUTING, Accuracy, FreeRun
 from workbench.model.multiple_shooting import MultipleShooting
 from workbench.model.parameters import Parameter
 from workbench.model.thinning import thinned
@@ -61,10 +61,20 @@ class SimulationError:
     @cached_property
     def rough(self) -> "SimulationError":
         """The same over a simulation of longer steps, by fewer rows; itself where steps are of a sample."""
+        return self._coarser(ROUGH)
+
+    @cached_property
+    def scouting(self) -> "SimulationError":
+        """The same over one of steps longer still, where many valves are tried from afar."""
+        return self._coarser(SCOUTING)
+
+    def _coarser(self, accuracy: Accuracy) -> "SimulationError":
         if self.run.by.slow:
             return self
         record = thinned(self.run.record, self.composition.valve)
-        run = FreeRun(self.composition, record, from_pressure=self.run.from_pressure, accuracy=ROUGH, by=self.run.by)
+        run = FreeRun(
+            self.composition, record, from_pressure=self.run.from_pressure, accuracy=accuracy, by=self.run.by
+        )
         return self.over(run)
 
     def by_slips(self, accuracy: Accuracy = FINE, part: int | None = None) -> "SimulationError":

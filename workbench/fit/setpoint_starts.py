@@ -64,7 +64,7 @@ def setpoint_starts(
             tell(sum(renewed) / (EVOLUTIONS * GENERATIONS))
 
         found = differential_evolution(
-            partial(error.rough.cost, scale=MIDDLE),
+            partial(error.scouting.cost, scale=MIDDLE),
             Bounds(*box),
             rng=np.random.default_rng((seed, number)),
             popsize=POPULATION,
