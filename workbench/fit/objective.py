@@ -72,9 +72,7 @@ class SimulationError:
         if self.run.by.slow:
             return self
         record = thinned(self.run.record, self.composition.valve)
-        run = FreeRun(
-            self.composition, record, from_pressure=self.run.from_pressure, accuracy=accuracy, by=self.run.by
-        )
+        run = FreeRun(self.composition, record, from_pressure=self.run.from_pressure, accuracy=accuracy, by=self.run.by)
         return self.over(run)
 
     def by_slips(self, accuracy: Accuracy = FINE, part: int | None = None) -> "SimulationError":

@@ -289,7 +289,9 @@ class EffectSearch:
             effects = (*step.before.fit.valve.effect, *(each for each in valve.effect if each.name == last.name))
             alone = self.base(ValveFile(valve=valve.valve, effect=effects))
             models = {each.name: each.model or each.rejection_reason for each in step.candidates}
-            tried = models[last.name]
+            tried = models.get(last.name)
+            if tried is None and not leads_farther(alone, _best(step)):
+                continue  # it comes after an effect that had no evidence there
             if not isinstance(tried, EvaluatedModel) or log_likelihood_difference(alone.fit, tried.fit) > LEAST_BIC:
                 return [*steps[:i], judged_step(step.before, models | {last.name: alone}, i + 1, self._library)]
         return steps
