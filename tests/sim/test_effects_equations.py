@@ -225,6 +225,29 @@ def test_a_step_ends_where_a_delayed_jump_comes_out(dead_time_s: float) -> None:
         assert t == pytest.approx((i + 1) * h, abs=1e-12)
 
 
+def steps_cut(dead_time_s: float, rate_pa_per_s: float, swing_pa: float) -> int:
+    """Return in how many steps 100 periods of 5 ms go of a ramp that swings, behind a dead time."""
+    q, z, h, t, steps = dead_time.Parameters(dead_time_s), np.zeros(dead_time.MEMORY), 5e-3, 0.0, 0
+
+    def enters(t: float) -> float:
+        return 4e4 + rate_pa_per_s * t + swing_pa * float(np.sin(20.0 * t))
+
+    dead_time.start(0.0, enters(0.0), z)
+    for i in range(100):
+        while t < (i + 1) * h - 1e-12:
+            s = dead_time.straight(enters(t), (i + 1) * h - t, t, q, z)
+            dead_time.advance(t, enters(t), enters(t + s), s, q, z)
+            t, steps = t + s, steps + 1
+    return steps
+
+
+@pytest.mark.parametrize("dead_time_s", [1e-3, 3e-3, 1.23e-2])
+def test_what_hardly_bends_ends_no_step(dead_time_s: float) -> None:
+    """As a positioner's pressure does: each step was cut into five to ten."""
+    assert steps_cut(dead_time_s, 300.0, 10.0) == 100
+    assert steps_cut(dead_time_s, 300.0, 1e4) > 100
+
+
 @pytest.mark.parametrize("dead_time_s", [1.3e-5, 5.637e-4, 7.3e-3])
 def test_behind_a_lag_no_step_is_cut_without_end(dead_time_s: float) -> None:
     """Each step's end came out one dead time later and ended another there: a run through a record took minutes."""
