@@ -88,8 +88,8 @@ def _creeps(position_m: Column, still: int, noise_m: float) -> bool:
     went_m = gone_on_m - begun_m
     if abs(went_m) < min(CREPT, SURELY * float(np.sqrt(2.0 / half))) * noise_m:
         return False
-    goes_m = float(np.mean(position_m[still : 2 * still]) - np.mean(position_m[:still]))
-    return abs(goes_m) < FASTER * 2.0 * abs(went_m)
+    goes_m = np.sign(went_m) * float(np.mean(position_m[still : 2 * still]) - np.mean(position_m[:still]))
+    return bool(0.0 < goes_m < FASTER * 2.0 * abs(went_m))
 
 
 def before_start(record: Record, first: int, end: int, place_m: float) -> BeforeStart:
