@@ -105,9 +105,9 @@ def judged_step(
 def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectCandidate, ...]:
     """Return the accepted effects that might have been added: by what was held out, and by what was fitted.
 
-    The best of the held-out errors, if there it is no worse than the added one; then, in the first step, after which the
-    most is still missing, the one with the most evidence, if that is `NEARLY_AS_EVIDENT`. One of the added one's class
-    is none: no recording tells them apart.
+    The best of the held-out errors, if there it is no worse than the added one; then, in the first step, after which
+    the most is still missing, the one with the most evidence, if that is `NEARLY_AS_EVIDENT`. One of the added one's
+    class is none: no recording tells them apart.
     """
     added = step.added
     if added is None or added.model is None:
