@@ -102,6 +102,14 @@ def test_of_what_is_left_unexplained_what_is_suspected_is_said(parts: Split) -> 
     assert " Suspected, not proved: preload; of preload, the held-out error falls by " in found.sentence
 
 
+def test_of_what_is_left_beside_what_is_missing_what_is_suspected_is_no_explanation(parts: Split) -> None:
+    found_first = model_of("sensor_lag", cost=1.4 * AT_FLOOR, error_m=1.4 * FLOOR_M)
+    suspect = model_of("sensor_lag", "preload", cost=1.2 * AT_FLOOR, error_m=1.25 * FLOOR_M, scatter=0.3)
+    found = diagnosed(parts, step(POOR, sensor_lag=found_first), step(found_first, 2, preload=suspect))
+    assert (found.verdict, found.missing, found.suspected) == ("missing", ("sensor_lag",), ("preload",))
+    assert "what is left, 1.4 floors, no other effect is proved to explain. Suspected, not proved: " in found.sentence
+
+
 def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:
     found = diagnosed(parts, step(EXPLAINED, sensor_gain=model_of("sensor_gain", cost=0.5 * AT_FLOOR, error_m=3e-5)))
     assert (found.verdict, found.missing) == ("adequate", ())

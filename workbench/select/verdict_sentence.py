@@ -46,10 +46,10 @@ def _said(
         said = _adequate(best.errors, parts, length) + knife_edges_sentence(best.errors, length)
         return said + suspicion + _scatter(parts, length)
     if verdict == "missing":
-        said = f"Missing: {names}; {fell}, and {_left(best.errors, parts)}."
+        said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
         return said + knife_edges_sentence(best.errors, length) + suspicion
     if verdict == "one_of":
-        left = f", and {_left(best.errors, parts)}" if _floors_left(best.errors, parts) > NOISE_KNOWN_TO else ""
+        left = f", and {_left(best.errors, parts, steps[-1].suspected)}" if _floors_left(best.errors, parts) > NOISE_KNOWN_TO else ""
         return f"Missing: {names}{or_another}; {fell}{left}.{apart}{knife_edges_sentence(best.errors, length)}"
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
@@ -87,11 +87,13 @@ def _floors_left(errors: BlockErrors, parts: Split) -> float:
     return errors.floors_left(parts.floor_m) if parts.floor_m else 1.0
 
 
-def _left(errors: BlockErrors, parts: Split) -> str:
+def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate]) -> str:
     """Say what an explained record leaves."""
     floors = _floors_left(errors, parts)
     if floors <= NOISE_KNOWN_TO:
         return "nothing is left to explain"
+    if suspected:
+        return f"what is left, {floors:.2g} floors, no other effect is proved to explain"
     return f"what is left, {floors:.2g} floors, no other effect here explains"
 
 
