@@ -71,6 +71,7 @@ def landings_of(driver: MemoryDriver) -> int:
     return last.decision.static_law.landings
 
 
+@pytest.mark.long
 def test_lost_replies_cost_no_landing() -> None:
     # One slide may be going when its command is changed in the very cycle that is lost.
     assert landings_of(Losing(device())) >= 0.8 * landings_of(MemoryDriver(device()))

@@ -82,6 +82,7 @@ def goes_to_where_it_fails_and_in_other_units(page: Page, given_mm: float) -> No
     expect(page.get_by_test_id("error")).to_have_text(f"{given_mm:.4g} mm")
 
 
+@pytest.mark.long
 @pytest.mark.timeout(600)
 def test_from_a_dropped_file_to_the_floor(address: str, case: Path, tmp_path: Path) -> None:
     with opened(address) as page:

@@ -10,6 +10,7 @@ from workbench.select.kept_mass import kept_mass
 LIGHT_KG = 1.4
 
 
+@pytest.mark.long
 def test_a_mass_that_hides_what_the_recording_shows_is_named() -> None:
     drawn = drawn_valve(np.random.default_rng(11))
     agile = {"mass_kg": LIGHT_KG, "viscous_ns_per_m": 400.0}

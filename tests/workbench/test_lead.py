@@ -119,3 +119,14 @@ def test_the_pressure_on_its_way_is_known_by_how_the_stem_goes_on(
 ) -> None:
     """A stem that rests leaves when it has come; one that creeps follows it. Taken for settled: 2 to 390 noises."""
     assert error_floors(file, begun_with_a_step(file, begun_s=begun_s)) < floors
+
+
+def test_a_stem_that_never_leaves_tells_nothing() -> None:
+    """What was commanded, long held, is all that there is to begin with."""
+    time_s = 0.01 * np.arange(50)
+    still = Recording({"time_s": time_s, "command_pa": np.full(50, 54e3), "position_m": np.full(50, 0.066)})
+    composition = Composition.from_file(LAGGING)
+    lead = lead_of(ready(still), composition, still.command_pa, 0)
+    assert lead is not None
+    assert (lead.before.leaves, lead.remembered) == (0, 0)
+    assert np.ptp(FreeRun(composition, ready(still)).position_m(composition.theta)) < 1e-9

@@ -104,6 +104,7 @@ def test_when_the_stem_leaves_a_rest_tells_the_pressure_that_it_rested_with(trut
     assert found.rms_m < within_m, "begun in the middle of the band, 0.6 mm and 1.2 mm"
 
 
+@pytest.mark.long
 def test_the_positioner_is_fitted_as_the_rest() -> None:
     known = valve_file(200.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
     free = (

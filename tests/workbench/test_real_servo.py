@@ -54,6 +54,7 @@ def diagnosed() -> Diagnosis:
     return diagnose(recorded("J_7", 10), MOTOR, test=recorded("J_9", 10), effects=effects, workers=1)
 
 
+@pytest.mark.long
 def test_friction_differs_between_the_directions(diagnosed: Diagnosis) -> None:
     assert diagnosed.missing[:1] == ("asymmetric_friction",)
     assert diagnosed.base.errors.test_rmse_m > 10.0
@@ -125,6 +126,7 @@ def scatter_with(effect: str, names: tuple[str, ...], begin: tuple[float, ...]) 
     return float(np.std(error_m("sigma0_2", fitted.x)))
 
 
+@pytest.mark.long
 def test_below_break_away_energy_is_lost() -> None:
     """With the loop the other recording is predicted to its encoder's step; an elastic packing is 3.6 times off."""
     rounding_rad = QUANTUM_RAD / np.sqrt(12.0)

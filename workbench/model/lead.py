@@ -48,7 +48,7 @@ def lead_of(record: Record, composition: Composition, drive_pa: Column, segment:
         return None
     begin = initial_state(record, begun, end)
     before = before_start(record, begun, end, begin.position_m)
-    until = max(first, begun + before.rests)
+    until = max(first, begun + max(before.rests, 1))
     held_pa = checked_commands(drive_pa[begun:until])
     periods_s = checked_periods(np.diff(record.time_s[begun : until + 1]), held_pa)
     return Lead(begin, float(record.time_s[begun]), before, held_pa, periods_s, first - begun, memories)
