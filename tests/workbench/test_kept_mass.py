@@ -1,6 +1,7 @@
 """A mass that was assumed too large is found out where it shows, and left alone where it does not."""
 
 import numpy as np
+import pytest
 
 from tests.workbench.valves import drawn_valve, record_of
 from workbench.blind.input_signal import excitation

@@ -49,7 +49,8 @@ def _said(
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
         return said + knife_edges_sentence(best.errors, length) + suspicion
     if verdict == "one_of":
-        left = f", and {_left(best.errors, parts, steps[-1].suspected)}" if _floors_left(best.errors, parts) > NOISE_KNOWN_TO else ""
+        all_known = _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
+        left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
         return f"Missing: {names}{or_another}; {fell}{left}.{apart}{knife_edges_sentence(best.errors, length)}"
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
