@@ -70,8 +70,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Groups:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Of `-n auto`: three workers more than processors, as those of the two groups that wait mostly do."""
-    return min(os.cpu_count() or 1, MOST_PROCESSORS) + 3
+    """Of `-n auto`: two workers more than processors, as those of the two groups that wait mostly do."""
+    return min(os.cpu_count() or 1, MOST_PROCESSORS) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
