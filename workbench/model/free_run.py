@@ -253,11 +253,12 @@ class FreeRun:
             if segment.lead:
                 self._remember(theta, state, segment.lead, segment.step_s)
             return drive_pa, state
-        landed_pa = self._held_pa(theta, segment.begin, time_s, segment.before.came * theta[COULOMB] / theta[STATIC])
+        middle_pa, half_pa = self._holding_pa(theta, segment.begin, time_s)
+        landed_pa = middle_pa + segment.before.came * theta[COULOMB] / theta[STATIC] * half_pa
         state = self._begin(theta, segment.begin, time_s, landed_pa)
         if segment.before.leaves:
             risen_pa = self._risen_pa(theta, state, segment, segment.before.rests)
-            loose_pa = self._held_pa(theta, segment.begin, time_s, segment.before.leaves)
+            loose_pa = middle_pa + segment.before.leaves * half_pa
             state = self._begin(theta, segment.begin, time_s, loose_pa - risen_pa)
         return drive_pa, state
 
@@ -276,9 +277,8 @@ class FreeRun:
         nearest_pa = self._balanced_pa(theta, lead, float(lead.drive_pa[0]))
         if not lead.before.leaves or lead.begin.velocity_m_per_s:
             return nearest_pa
-        middle_pa, loose_pa = (
-            self._held_pa(theta, lead.begin, lead.time_s, share) for share in (0.0, float(lead.before.leaves))
-        )
+        middle_pa, half_pa = self._holding_pa(theta, lead.begin, lead.time_s)
+        loose_pa = middle_pa + lead.before.leaves * half_pa
         reached_pa = [self._led(theta, lead, each, lead.before.rests, step_s)[1] for each in (middle_pa, nearest_pa)]
         if reached_pa[1] == reached_pa[0]:
             return nearest_pa
@@ -289,13 +289,13 @@ class FreeRun:
         """Return the pressure, Pa, nearest to the one wanted with which the stem is as a lead begins."""
         return read(self._begin(theta, lead.begin, lead.time_s, wanted_pa)).p
 
-    def _held_pa(self, theta: Vector, begin: InitialState, time_s: float, share: float) -> float:
-        """Return the pressure, Pa, that a share of static friction holds a stem at rest against.
+    def _holding_pa(self, theta: Vector, begin: InitialState, time_s: float) -> tuple[float, float]:
+        """Return the middle of the pressures that static friction holds a stem at rest against, and half the band, Pa.
 
-        -1: it is about to break loose closing, +1 opening, 0: the middle of all that hold it.
+        Half the band above the middle it is about to break loose opening, below it closing.
         """
         closing_pa, opening_pa = (read(self._begin(theta, begin, time_s, way * BEYOND_PA)).p for way in (-1.0, 1.0))
-        return 0.5 * (closing_pa + opening_pa) + 0.5 * share * (opening_pa - closing_pa)
+        return 0.5 * (closing_pa + opening_pa), 0.5 * (opening_pa - closing_pa)
 
     def _led(self, theta: Vector, lead: Lead, begin_pa: float, periods: int, step_s: float) -> tuple[Vector, float]:
         """Return the state after so many periods of a lead, the stem held, and the pressure amid the last one, Pa."""
