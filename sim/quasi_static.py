@@ -44,8 +44,9 @@ from sim.karnopp import (
     write,
 )
 
-FREE = 2.0
-"""What a step is told where the stem decides itself; else the direction in which it went, -1, 0 or 1."""
+FREE, FED_BACK = 2.0, 3.0
+"""What a step is told where the stem decides itself, and where the pressure hangs on it besides; else the direction in
+which it went, -1, 0 or 1."""
 SLOWEST, FASTEST, SPEEDS = 1e-3, 300.0, 64
 """In Stribeck velocities: where v_l is sought, and on how many points first."""
 GOLDEN = 0.6180339887498949
@@ -273,14 +274,24 @@ def held(
 
 
 def slid(
-    valve: Karnopp, t: float, h: float, loose: Loose, way: Way, v_l: float, slide_s: float, q: Any, z: Any, shown: float
+    valve: Karnopp,
+    t: float,
+    h: float,
+    loose: Loose,
+    way: Way,
+    v_l: float,
+    slide_s: float,
+    at_once: bool,
+    q: Any,
+    z: Any,
+    shown: float,
 ) -> Slide:
     """Let a loose stem slide until it lands or the step ends; `shown` is what was indicated as it began."""
     tau, x, p, sigma = loose
     at_p = balanced(valve, sigma, v_l, t + tau, x, p, q, z)
     if sigma * (at_p - x) < 0.0:
         at_p = x
-    share, less_s = unfinished(valve, h - tau)
+    share, less_s = (0.0, 0.0) if at_once else unfinished(valve, h - tau)
     behind = (at_p - x) * share
     p_l, v1, at_end = p, 0.0, at_p
     if sigma * (way.p1 - p) > 0.0:
@@ -304,7 +315,7 @@ def slid(
 
 
 def free_step(
-    valve: Karnopp, now: Condition, way: Way, h: float, v_l: float, slide_s: float, q: Any, z: Any
+    valve: Karnopp, now: Condition, way: Way, h: float, v_l: float, slide_s: float, at_once: bool, q: Any, z: Any
 ) -> Condition:
     """Carry the stem over a step: it sticks, breaks away, follows and lands as often as the pressure makes it."""
     t, x, indicated = now.t, now.x, now.indicated
@@ -316,7 +327,7 @@ def free_step(
             broke, loose, indicated = held(valve, t, tau, h, x, way, p, q, z, indicated)
             if not broke:
                 return Condition(t + h, loose.x, 0.0, way.p1, STUCK, 0.0, indicated)
-        slide = slid(valve, t, h, loose, way, v_l, slide_s, q, z, indicated)
+        slide = slid(valve, t, h, loose, way, v_l, slide_s, at_once, q, z, indicated)
         tau, x, p, indicated, sliding = slide.tau, slide.x, slide.p, slide.indicated, False
         if not slide.over:
             return Condition(t + h, x, slide.v, way.p1, SLIP, loose.sigma, indicated)
@@ -334,6 +345,13 @@ def way_of(command: float, h: float, stem: Stem, q: Any, z: Any) -> Way:
     _, late = pressure_ends(command, command, h - 2.0 * moment, Stem(t + moment, x, v, early), q, z)
     _, p1 = pressure_ends(command, command, moment, Stem(t + h - moment, x, v, late), q, z)
     return Way(p0, (early - p0) / moment, p1, (p1 - late) / moment)
+
+
+def straight_way(command: float, h: float, stem: Stem, q: Any, z: Any) -> Way:
+    """Carry a pressure path that the stem feeds back on over a step, short enough for a straight line."""
+    p0, p1 = pressure_ends(command, command, h, stem, q, z)
+    rate = (p1 - p0) / h
+    return Way(p0, rate, p1, rate)
 
 
 def over_period(
@@ -354,12 +372,14 @@ def over_period(
     h = duration / n
     for k in range(n):
         t = begin.t + k * h
-        way = way_of(command, h, Stem(t, now.x, now.v, p), q, z)
+        stem = Stem(t, now.x, now.v, p)
+        fed_back = told == FED_BACK
+        way = straight_way(command, h, stem, q, z) if fed_back else way_of(command, h, stem, q, z)
         p = way.p1
-        if told == FREE:
+        if told >= FREE:
             here = Condition(t, now.x, now.v, way.p0, now.mode, now.sigma, now.indicated)
-            now = free_step(valve, here, way, h, v_l, slide_s, q, z)
-    if told != FREE:
+            now = free_step(valve, here, way, h, v_l, slide_s, fed_back, q, z)
+    if told < FREE:
         now = told_step(valve, begin, told, p, duration, v_l, slide_s, q, z)
     return now
 
@@ -375,8 +395,9 @@ def glide(
 ) -> None:
     """Hold each command for its period in turn; write t, p, x, v, indicated into the rows of path, the start first.
 
-    `told` says of each period whether the stem is free (FREE), or the direction in which it went. A period is cut into
-    equal steps of at most longest_step, s: one, but where effects of the pressure path with a memory follow each other.
+    `told` says of each period whether the stem is free (FREE, FED_BACK), or the direction in which it went. A period is
+    cut into equal steps of at most longest_step, s: one, but where effects of the pressure path with a memory follow
+    each other, or the stem feeds back on it.
     """
     valve, now, q, z = karnopp(theta), read(state), theta, state
     v_l = landing_speed(valve, now.t, now.x, now.p, q, z)

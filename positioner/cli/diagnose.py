@@ -93,7 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
             progress=progress,
             over=(lambda: time.monotonic() - began_s > budget_s),
         )
-        mass = kept_mass(diagnosis, seed=arguments.seed) if time.monotonic() - began_s < budget_s else None
+        in_time = time.monotonic() - began_s < budget_s
+        mass = kept_mass(diagnosis, seed=arguments.seed, progress=progress) if in_time else None
     commands = extend_commands(diagnosis, arguments)
     print(diagnosis.summary())
     if mass is not None:

@@ -20,7 +20,8 @@ Where samples lie farther apart than slides last (`sampling`), the stem has no i
 measured one at its end, and rows in which nothing happens are passed over (`stillness`): between a command long held
 and the next one, with the measured stem at rest, only some are simulated and judged. Where the command changed between
 samples, that of a period is the one at its end, the measured positions say which way the stem went, and only rests that
-a slide ended in are judged.
+a slide ended in are judged. Behind a positioner a period is cut into steps, for it feeds back on the pressure
+meanwhile, and all rows are judged.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,7 +40,7 @@ from sim.composition import AREA, COULOMB, STATIC, Composition
 from sim.karnopp import Vector, read, write
 from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
-from sim.quasi_static import FREE
+from sim.quasi_static import FED_BACK, FREE
 from workbench.data.record import Mask, Record
 from workbench.data.stillness import eventful
 from workbench.model.initial_state import (
@@ -69,7 +70,9 @@ FINE = Accuracy(1.0, 3e-4)
 """Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
 ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
-SCOUTING = Accuracy(10.0, 1e-3)
+WIDE_STEPS = 10.0
+"""Behind a positioner, of its own, where many valves are tried or no stem has inertia: it hunts as well by these."""
+SCOUTING = Accuracy(WIDE_STEPS, 1e-3)
 """Behind a positioner, where a quarter of the step moves a stem that hunts by as much as ten of them do."""
 BEYOND_PA = 1e12
 """More than holds any stem: nearest to it is what breaks it loose."""
@@ -218,10 +221,7 @@ class FreeRun:
         """Simulate each segment without inertia: it, and what the kernel writes, (5, rows kept)."""
         vector = np.array(theta[self._kept])
         for each in self._slow:
-            drive_pa = each.drive_pa if each.load_n is None else each.drive_pa + each.load_n / vector[AREA]
-            state = self._begin(vector, each.begin, float(self.record.time_s[each.rows[0]]), float(drive_pa[0]))
-            if each.lead:
-                self._remember(vector, state, each.lead, each.step_s)
+            drive_pa, state = self._started(vector, each)
             path = np.empty((PATH_ROWS, each.rows.size))
             self._glide(vector, state, drive_pa, each.periods_s, each.told, each.step_s, path)
             yield each, path
@@ -244,7 +244,7 @@ class FreeRun:
                 yield each.first + at + known, each.first + over + 1, path[:, known:]
                 at, known = over, 1
 
-    def _started(self, theta: Vector, segment: Segment) -> tuple[Vector, Vector]:
+    def _started(self, theta: Vector, segment: "Segment | SlowSegment") -> tuple[Vector, Vector]:
         """Return the pressures of a segment's periods, Pa, and the state that it begins with."""
         drive_pa = segment.drive_pa if segment.load_n is None else segment.drive_pa + segment.load_n / theta[AREA]
         time_s = float(self.record.time_s[segment.first])
@@ -301,27 +301,23 @@ class FreeRun:
         """Return the state after so many periods of a lead, the stem held, and the pressure amid the last one, Pa."""
         state = at_rest(self._composition, theta, lead.time_s, lead.begin.position_m, begin_pa)
         drive_pa, periods_s = lead.drive_pa[:periods], lead.periods_s[:periods]
-        path = np.empty((PATH_ROWS, periods + 1))
+        return state, float(np.mean(self._held_pa(theta, state, drive_pa, periods_s, step_s)[-2:]))
+
+    def _risen_pa(self, theta: Vector, state: Vector, segment: "Segment | SlowSegment", rests: int) -> float:
+        """Return by how much the positioner raises the pressure until the middle of a period, the stem held, Pa."""
+        drive_pa, periods_s = segment.drive_pa[:rests], segment.periods_s[:rests]
+        pressure_pa = self._held_pa(theta, state.copy(), drive_pa, periods_s, segment.step_s)
+        return float(0.5 * (pressure_pa[-1] + pressure_pa[-2]) - pressure_pa[0])
+
+    def _held_pa(self, theta: Vector, state: Vector, drive_pa: Vector, periods_s: Vector, step_s: float) -> Vector:
+        """Carry a state on with the stem held; return the pressure at the start and after each period, Pa."""
+        path = np.empty((PATH_ROWS, periods_s.size + 1))
         if self.by.slow:
-            self._glide(held(theta), state, drive_pa, periods_s, np.full(periods, FREE), step_s, path)
+            told = np.full(periods_s.size, _told_nothing(self._composition))
+            self._glide(held(theta), state, drive_pa, periods_s, told, step_s, path)
         else:
             self._composition.kernel.respond(held(theta), state, drive_pa, periods_s, step_s, self._tolerance, path)
-        return state, float(np.mean(path[PRESSURE, -2:]))
-
-    def _risen_pa(self, theta: Vector, state: Vector, segment: Segment, rests: int) -> float:
-        """Return by how much the positioner raises the pressure until the middle of a period, the stem held, Pa."""
-        path = np.empty((PATH_ROWS, rests + 1))
-        self._composition.kernel.respond(
-            held(theta),
-            state.copy(),
-            segment.drive_pa[:rests],
-            segment.periods_s[:rests],
-            segment.step_s,
-            self._tolerance,
-            path,
-        )
-        pressure_pa = path[PRESSURE]
-        return float(0.5 * (pressure_pa[-1] + pressure_pa[-2]) - pressure_pa[0])
+        return np.asarray(path[PRESSURE])
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         return self._composition.begin(theta, time_s, begin.position_m, begin.velocity_m_per_s, pressure_pa)
@@ -337,6 +333,8 @@ class SlowSegment(NamedTuple):
     at: npt.NDArray[np.int64]
     """and where they stand among those that are simulated."""
     begin: InitialState
+    before: BeforeStart | None
+    """As that of a `Segment`."""
     lead: Lead | None
     drive_pa: Vector
     """Of each period from one of the rows to the next, Pa."""
@@ -348,6 +346,11 @@ class SlowSegment(NamedTuple):
     step_s: float
     """Longest, s."""
 
+    @property
+    def first(self) -> int:
+        """The row of the record that it begins with."""
+        return int(self.rows[0])
+
 
 def _slow_segments(
     record: Record,
@@ -358,9 +361,9 @@ def _slow_segments(
     leads: Sequence[Lead | None],
 ) -> list[SlowSegment]:
     at_end = from_pressure or not by.held
-    remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
-    step_s = record.period_s / CASCADE if remembering > 1 else inf
-    told, judged = np.full(len(record), FREE), np.ones(len(record), np.bool_)
+    by_setpoint = composition.by_setpoint
+    step_s = _longest_slow_s(record, composition)
+    told, judged = np.full(len(record), _told_nothing(composition)), np.ones(len(record), np.bool_)
     if by.motion is Motion.LANDINGS:
         told, judged = _told(record, composition)
     found = []
@@ -376,10 +379,26 @@ def _slow_segments(
         load_n = None if record.load_n is None else checked_commands(record.load_n[following])
         periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
         begin = initial_state(record, first, end, moving=False)
+        before = before_start(record, first, end, begin.position_m) if by_setpoint else None
+        known = begin, before, lead
         found.append(
-            SlowSegment(rows, rows[counted], counted, begin, lead, held_pa, load_n, periods_s, told[rows[1:]], step_s)
+            SlowSegment(rows, rows[counted], counted, *known, held_pa, load_n, periods_s, told[rows[1:]], step_s)
         )
     return found
+
+
+def _told_nothing(composition: Composition) -> float:
+    """Return what a step is told of a stem that decides itself where it goes."""
+    return FED_BACK if composition.by_setpoint else FREE
+
+
+def _longest_slow_s(record: Record, composition: Composition) -> float:
+    """Return how long a step without inertia may be, s: one a sample, but where the pressure path bears less."""
+    positioner = next((each for each in composition.effects if each.by_setpoint), None)
+    if positioner:
+        return WIDE_STEPS * positioner.step_s
+    remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
+    return record.period_s / CASCADE if remembering > 1 else inf
 
 
 def _told(record: Record, composition: Composition) -> tuple[Column, Mask]:

@@ -3,8 +3,9 @@
     t_s = tau log(L / sigma)      a slide over the stroke L comes to within the noise sigma of its end in that time
     tau = F_v / k_s, or 2 m / F_v where that is longer
 
-dynamic       samples closer than t_s: with inertia; a set point always, for its positioner acts between samples
-quasi-static  samples farther apart: without (`sim.quasi_static`), a step a sample
+dynamic       samples closer than t_s: with inertia
+quasi-static  samples farther apart: without (`sim.quasi_static`), a step a sample; of a set point in shorter ones, for
+              its positioner acts between samples
 landings      the same, and the command changed between samples, perhaps several times: a stem that moves in the very
               sample in which the recorded command changes began before it could have known. What the pressure did
               meanwhile is not known, so the measured positions say when the stem went which way, and the model where
@@ -84,9 +85,11 @@ TOLD = Sampling(Motion.LANDINGS, "every rest judged by itself")
 def sampling(record: Record, valve: ValveParameters) -> Sampling:
     """Choose how a record of a valve is simulated."""
     period_s, slide_s = record.period_s, slide_time_s(valve, record.scale_m)
-    if record.by_setpoint or not period_s > slide_s:
+    if not period_s > slide_s:
         return replace(DYNAMIC, period_s=period_s)
     why = f"samples every {period_s:.3g} s cannot see slides of {slide_s:.2g} s"
+    if record.by_setpoint:
+        return Sampling(Motion.QUASI_STATIC, f"simulated without inertia: {why}", True, period_s)
     early, begun = _early(record, valve)
     if early < max(FEWEST_EARLY, EARLY * begun):
         return Sampling(Motion.QUASI_STATIC, f"simulated without inertia, a step a sample: {why}", True, period_s)

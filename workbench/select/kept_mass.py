@@ -5,15 +5,15 @@ effect explains. Asked where a diagnosis leaves something; what it finds is said
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 from config.drive import Scale
 from config.results.result import Brief
 from workbench.fit.fitting import fit
-from workbench.model.sampling import Motion
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
-from workbench.select.effect_search import evaluated
+from workbench.select.effect_search import Progress, evaluated
 
 MASS = "mass_kg"
 BEGINS = (1.0, 0.2)
@@ -42,26 +42,38 @@ class KeptMass(Brief):
         )
 
 
-def kept_mass(diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None) -> KeptMass | None:
+def kept_mass(
+    diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None, progress: Progress | None = None
+) -> KeptMass | None:
     """Return which mass leaves less than the valve file's; None where none does, or nothing is left to explain.
+
+    Nor is it asked where samples lie farther apart than slides last: there no mass shows.
 
     Args:
         diagnosis: what was found with the mass as it is.
         seed: of the fits' draws.
         workers: threads, by default one a core.
+        progress: called with what is under way, and the fraction done.
     """
     best, recording = diagnosis.best, diagnosis.split.train.recording
     before = best.fit
-    if best.explained or before.by.motion is not Motion.DYNAMIC or MASS in before.parameters:
+    if best.explained or before.by.slow or MASS in before.parameters:
         return None
     kept_kg = before.valve.valve.mass_kg
     free = [*before.parameters, MASS]
     models: list[EvaluatedModel] = []
-    for share in BEGINS:
+    for number, share in enumerate(BEGINS):
         valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
         begin = before.valve.model_copy(update={"valve": valve})
         found = fit(
-            recording, begin, free=free, seed=seed, workers=workers, from_pressure=before.from_pressure, profile=False
+            recording,
+            begin,
+            free=free,
+            seed=seed,
+            workers=workers,
+            from_pressure=before.from_pressure,
+            profile=False,
+            progress=partial(_tell, progress or _silent, number),
         )
         models.append(evaluated(found, diagnosis.split))
     model = min(models, key=lambda each: each.fit.cost)
@@ -69,3 +81,11 @@ def kept_mass(diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None
         return None
     fitted_kg = model.fit.valve.valve.mass_kg
     return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m, before.kind.length)
+
+
+def _tell(progress: Progress, number: int, done: float) -> None:
+    progress("fitting the mass, too", (number + done) / len(BEGINS))
+
+
+def _silent(_what: str, _done: float) -> None:
+    pass
