@@ -9,10 +9,14 @@ from config.errors import InputError
 from config.exports.column_mapping import read_mapping
 from config.recording import Recording
 from config.valve_file import ValveFile
+from sim.composition import Composition
 from sim.simulation import simulate
 from tests.sim.test_positioner import PA_PER_M, valve_file
 from tests.workbench.valves import with_effect
 from workbench import compare, fit
+from workbench.data.record import ready
+from workbench.model.free_run import Accuracy, FreeRun
+from workbench.model.sampling import DYNAMIC
 from workbench.report import Subject, report_comparison
 from workbench.select.effect_acceptance import Gain
 from workbench.select.positioner_or_packing import PositionerOrPacking, cause
@@ -74,6 +78,17 @@ def test_pressures_are_not_taken_for_set_points() -> None:
 
 TRUTH = valve_file(300.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.004, filling_pa_per_s=9e3, venting_pa_per_s=6e3)
 SLUGGISH = valve_file(300.0, gain_pa_per_ms=0.05 * PA_PER_M, dead_band_m=0.001, venting_pa_per_s=6e3)
+
+
+@pytest.mark.parametrize("gain", [0.4, 1.0, 40.0, 100.0], ids="gain {}".format)
+def test_without_inertia_it_answers_as_the_valve_with_inertia_does(gain: float) -> None:
+    """Also behind a pilot of high gain, whose loop closes within the steps of one that is slow."""
+    valve = valve_file(300.0, gain_pa_per_ms=gain * PA_PER_M, dead_band_m=0.004, filling_pa_per_s=2e4)
+    record, composition = ready(recorded(valve, 4, 300)), Composition.from_file(valve)
+    slow, dynamic = FreeRun(composition, record), FreeRun(composition, record, by=DYNAMIC, accuracy=Accuracy(0.2, 3e-4))
+    assert slow.by.slow
+    off_m = np.abs(slow.position_m(composition.theta) - dynamic.position_m(composition.theta))
+    assert np.nanquantile(off_m, 0.9) < 5e-5, "as little as the noise"
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -26,7 +26,7 @@ meanwhile, and all rows are judged.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import ceil, inf, log2
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +36,8 @@ from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
-from sim.composition import AREA, COULOMB, STATIC, Composition
+from sim.composition import AREA, COULOMB, SPRING, STATIC, Composition
+from sim.effect import Effect
 from sim.karnopp import Vector, read, write
 from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
@@ -72,8 +73,13 @@ ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
 WIDE_STEPS = 10.0
 """Behind a positioner, of its own, where many valves are tried or no stem has inertia: it hunts as well by these."""
+CLOSES, MOST_HALVINGS = 0.5, 3
+"""Of the time k_s / (K A) in which pilot and stem close their loop, the longest step without inertia; at most so often
+it is halved for that."""
 SCOUTING = Accuracy(WIDE_STEPS, 1e-3)
 """Behind a positioner, where a quarter of the step moves a stem that hunts by as much as ten of them do."""
+GAIN = "gain_pa_per_ms"
+"""K of a positioner."""
 BEYOND_PA = 1e12
 """More than holds any stem: nearest to it is what breaks it loose."""
 CASCADE = 16
@@ -143,6 +149,7 @@ class FreeRun:
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
         leads = [lead_of(record, self._composition, drive_pa, segment) for segment in range(len(record.segments))]
+        self._gain = _gain_of(self._composition)
         if self.by.slow:
             self._glide = self._composition.quasi_static.glide
             self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure, leads)
@@ -223,8 +230,19 @@ class FreeRun:
         for each in self._slow:
             drive_pa, state = self._started(vector, each)
             path = np.empty((PATH_ROWS, each.rows.size))
-            self._glide(vector, state, drive_pa, each.periods_s, each.told, each.step_s, path)
+            self._glide(vector, state, drive_pa, each.periods_s, each.told, self._glides_s(vector, each.step_s), path)
             yield each, path
+
+    def _glides_s(self, theta: Vector, longest_s: float) -> float:
+        """Return how long a step without inertia may be, s: shorter where a pilot of high gain closes its loop faster.
+
+        By halvings, lest a cost jumps wherever a gain is a little higher.
+        """
+        if self._gain is None:
+            return longest_s
+        closes_s = theta[SPRING] / (theta[AREA] * theta[self._gain])
+        halvings = ceil(log2(longest_s / (CLOSES * closes_s)))
+        return float(longest_s / 2 ** min(max(halvings, 0), MOST_HALVINGS))
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
         """Simulate each segment, from shot to shot: its rows and what the kernel writes, (5, rows)."""
@@ -392,9 +410,20 @@ def _told_nothing(composition: Composition) -> float:
     return FED_BACK if composition.by_setpoint else FREE
 
 
+def _positioner(composition: Composition) -> Effect | None:
+    return next((each for each in composition.effects if each.by_setpoint), None)
+
+
+def _gain_of(composition: Composition) -> int | None:
+    """Return where K of the positioner stands among the parameters, if it has one."""
+    positioner = _positioner(composition)
+    named = f"{positioner.name}.{GAIN}" if positioner else ""
+    return composition.names.index(named) if named in composition.names else None
+
+
 def _longest_slow_s(record: Record, composition: Composition) -> float:
     """Return how long a step without inertia may be, s: one a sample, but where the pressure path bears less."""
-    positioner = next((each for each in composition.effects if each.by_setpoint), None)
+    positioner = _positioner(composition)
     if positioner:
         return WIDE_STEPS * positioner.step_s
     remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
