@@ -11,6 +11,7 @@ import positioner as pos
 PAGE = Path(__file__).parents[2] / "docs" / "library.md"
 
 
+@pytest.mark.long
 def test_every_example_gives_what_the_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")

@@ -27,6 +27,7 @@ def sign_in(page: Page, role: str, password: str) -> None:
     page.get_by_test_id("enter").click()
 
 
+@pytest.mark.long
 def test_an_operator_watches_signs_in_moves_the_valve_and_is_told_what_dies(tmp_path: Path) -> None:
     roles = tmp_path / "roles.json"
     for role, password in PASSWORDS.items():

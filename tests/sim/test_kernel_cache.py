@@ -70,6 +70,7 @@ def filled(at_once: AtOnce, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     return cache
 
 
+@pytest.mark.long
 def test_a_kernel_is_compiled_by_one_process_and_translated_again_for_another_processor(
     at_once: AtOnce, tmp_path: Path
 ) -> None:

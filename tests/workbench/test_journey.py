@@ -51,15 +51,14 @@ def export(path: Path, recording: Recording, stroke_m: float) -> None:
 MAPPING = [f"--column={each}" for each in ("time_s=Time", "command_pa=OUT:bar", "position_m=PV:%")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "blind",
     [
         pytest.param(
             lambda: generated("backlash", "elasto_plastic", 2, "ip_lag", is_export=True), id="elasto-plastic, export"
         ),
-        pytest.param(
-            lambda: generated("asymmetric_friction", "lugre", 1, "sensor_lag"), marks=pytest.mark.long, id="LuGre"
-        ),
+        pytest.param(lambda: generated("asymmetric_friction", "lugre", 1, "sensor_lag"), id="LuGre"),
     ],
 )
 def test_the_hidden_effect_is_found_and_added_and_the_error_falls(

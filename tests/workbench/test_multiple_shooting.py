@@ -88,6 +88,7 @@ def test_nothing_is_begun_where_nothing_is_left(record: Record) -> None:
     assert not shooting_starts(error, [[there + 0.02]], there)
 
 
+@pytest.mark.long
 def test_a_lag_that_the_base_fit_took_for_viscous_friction_is_found() -> None:
     """Ten times the friction: of the strengths the least error is at the weakest, and leads to 240 times the noise."""
     hidden = hide(41039)
