@@ -112,7 +112,7 @@ def plant_valve() -> Iterator[str]:
     per_cent = 100.0 / PLANT.valve.stroke_m
     yield f"  {per_cent * errors.train_rmse_m:.3g} % rms fitted, {per_cent * errors.test_rmse_m:.3g} % held out"
     yield "  " + ", ".join(f"{name} {each.value:.4g}" for name, each in found.parameters.items())
-    model = EvaluatedModel(found, errors, errors.at_floor(parts.floor_m))
+    model = EvaluatedModel(found, errors, parts.floor_m)
     yield "  " + positioner_or_packing(parts, model, seed=0, workers=os.cpu_count() or 1).sentence
 
 

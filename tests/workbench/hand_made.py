@@ -93,4 +93,4 @@ def model_of(
     """Return a model that leaves this cost where it was fitted and this error where it was not."""
     errors = errors_of(error_m, scatter=scatter, structure=structure)
     fit = fit_of(*effects, cost=cost, rms_m=error_m, found=found, agreement=agreement)
-    return EvaluatedModel(fit, errors, errors.at_floor(FLOOR_M))
+    return EvaluatedModel(fit, errors, FLOOR_M)

@@ -9,6 +9,7 @@ from config.drive import VALVE
 from config.errors import InputError
 from config.recording import Recording
 from sim.effect import shipped_effect, shipped_effects
+from tests.workbench.hand_made import FLOOR_M, model_of
 from workbench.data.held_out import joined, residual_m, split
 from workbench.data.record import ready
 from workbench.select.block_errors import (
@@ -19,6 +20,7 @@ from workbench.select.block_errors import (
     relative_error_reduction,
 )
 from workbench.select.effect_acceptance import Gain
+from workbench.select.effect_acceptance import gain as gain_of
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.residual_structure import STRUCTURED, structure
 from workbench.select.verdict_sentence import reduction_sentence
@@ -143,6 +145,26 @@ def test_what_passes_every_part_is_not_refused() -> None:
     assert "10 % are independent: 9, more than 10" in Gain(90.0, 0.5, 9.0, 0.1).rejection_reason(at_floor=True)
     assert "more than 3 needed" in Gain(11.0, 0.06, 2.9, 1.0).rejection_reason(at_floor=True)
     assert not Gain(11.0, 0.06, 3.1, 1.0).rejection_reason(at_floor=True)
+
+
+def test_what_acts_rarely_and_leaves_nothing_need_not_show_in_many_blocks() -> None:
+    rare = Gain(1000.0, 0.06, 1.5, 0.9, completes=True)
+    assert not rare.rejection_reason(at_floor=True)
+    assert "more than 3 needed" in replace(rare, completes=False).rejection_reason(at_floor=True)
+    assert "more than 3 needed" in replace(rare, bic=100.0).rejection_reason(at_floor=True), "90 independent: chance"
+    assert "more than 1 needed" in replace(rare, standard_errors=0.9).rejection_reason(at_floor=True)
+    assert "a fall of more than 5 %" in replace(rare, held_out=0.04).rejection_reason(at_floor=True)
+
+
+@pytest.mark.parametrize(
+    ("floors_before", "floors_after", "floor_m", "completes"),
+    [(1.3, 1.0, FLOOR_M, True), (1.1, 1.0, FLOOR_M, False), (1.3, 1.2, FLOOR_M, False), (1.3, 1.0, None, False)],
+)
+def test_it_completes_what_leaves_more_than_the_noise_may_be_off_by(
+    floors_before: float, floors_after: float, floor_m: float | None, completes: bool
+) -> None:
+    before, after = (model_of(error_m=floors * FLOOR_M) for floors in (floors_before, floors_after))
+    assert gain_of(before.fit, after.fit, before.errors, after.errors, floor_m).completes == completes
 
 
 def test_noise_has_no_structure() -> None:

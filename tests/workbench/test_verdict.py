@@ -166,7 +166,7 @@ def test_searches_that_disagree_and_explain_nothing_are_not_trusted(parts: Split
     found = diagnosed(parts, step(lone, ip_lag=lone))
     assert found.verdict == "untrusted"
     assert found.sentence.startswith("Not to be trusted: searches from independent starts do not come to the same.")
-    explained = replace(lone, errors=EXPLAINED.errors, at_floor=True)
+    explained = replace(lone, errors=EXPLAINED.errors)
     assert diagnosed(parts, step(explained, ip_lag=explained)).verdict == "adequate", "it explains all"
 
 
@@ -175,7 +175,7 @@ def test_a_valve_pushed_at_random_is_not_called_adequate(parts: Split) -> None:
     scatters = replace(parts, floor_m=6e-3)
     errors = model_of(error_m=6e-3).errors
     assert not errors.follows(parts.motion_std_m)
-    as_good_as_any = EvaluatedModel(EXPLAINED.fit, errors, errors.at_floor(scatters.floor_m))
+    as_good_as_any = EvaluatedModel(EXPLAINED.fit, errors, scatters.floor_m)
     assert as_good_as_any.explained
     found = diagnosed(scatters, step(as_good_as_any, stribeck=as_good_as_any))
     assert (found.verdict, found.missing) == ("unexplained", ())

@@ -3,7 +3,9 @@
     BIC = n log(2 C / n) + k log n             C soft-L1 cost, k free parameters; the evidence is base less candidate
     reduction, in its standard errors          of the held-out block errors (`block_errors`)
 
-A falling held-out error is needed for an effect; it proves none. The rule is the same for a balance of forces, where
+A falling held-out error is needed for an effect; it proves none. What acts in k of the held-out blocks makes it fall by
+some sqrt(k) standard errors, however sure: where the evidence leaves no doubt, and what was left above the noise is
+gone, one is enough. The rule is the same for a balance of forces, where
 the blocks are strokes or readings in place of seconds.
 """
 
@@ -12,14 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.fit.fit_result import Fit
-from workbench.select.block_errors import BlockErrors, relative_error_reduction
+from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, relative_error_reduction
 
 LEAST_BIC = 10.0
 OVERWHELMING_BIC = 10.0 * LEAST_BIC
 """Of independent samples; suspected whatever was held out, for an effect that acts rarely need not show there."""
 LEAST_REDUCTION = 0.05
-LEAST_STANDARD_ERRORS, AT_THE_FLOOR = 2.0, 3.0
-"""More where the error is at the floor: of twenty candidates one falls by two deviations by pure chance."""
+LEAST_STANDARD_ERRORS, AT_THE_FLOOR, COMPLETE = 2.0, 3.0, 1.0
+"""More where the error is at the floor: of twenty candidates one falls by two deviations by pure chance. Less where
+overwhelming evidence leaves nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,8 @@ class Gain:
     """The same in its own standard errors."""
     independent_share: float
     """Share of the samples that are independent: the evidence is worth so much of `bic`."""
+    completes: bool = False
+    """Whether the model before leaves more than the noise may be off by, and with the candidate nothing is left."""
 
     @property
     def overwhelming(self) -> bool:
@@ -46,6 +51,7 @@ class Gain:
             at_floor: whether the error of the model before is at the floor, however what is left hangs on the state.
         """
         least = AT_THE_FLOOR if at_floor else LEAST_STANDARD_ERRORS
+        least = COMPLETE if self.completes and self.overwhelming else least
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
         if at_floor and self.independent_share * self.bic <= LEAST_BIC:
@@ -67,10 +73,15 @@ def no_better(first: str) -> str:
     return f"explains no better than {first}, after which it is tried"
 
 
-def gain(base: Fit, candidate: Fit, base_errors: BlockErrors, candidate_errors: BlockErrors) -> Gain:
-    """Compare a candidate with its base."""
+def gain(
+    base: Fit, candidate: Fit, base_errors: BlockErrors, candidate_errors: BlockErrors, floor_m: float | None = None
+) -> Gain:
+    """Compare a candidate with its base; the floor, m, if it is known, tells whether anything is left."""
     held_out, standard_errors = relative_error_reduction(base_errors.logs, candidate_errors.logs)
-    return Gain(bic(base) - bic(candidate), held_out, standard_errors, candidate_errors.independent_share)
+    left = floor_m is not None and base_errors.floors_left(floor_m) > NOISE_KNOWN_TO
+    completes = left and candidate_errors.leaves_nothing(floor_m)
+    evidence = bic(base) - bic(candidate)
+    return Gain(evidence, held_out, standard_errors, candidate_errors.independent_share, completes)
 
 
 def bic(fit: Fit) -> float:

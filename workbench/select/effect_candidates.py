@@ -36,7 +36,13 @@ class EvaluatedModel(Brief):
 
     fit: Fit
     errors: BlockErrors
-    at_floor: bool
+    floor_m: float | None
+    """What no model explains, m; None if it is unknown."""
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether no model could do better."""
+        return self.errors.at_floor(self.floor_m)
 
     @property
     def structured(self) -> bool:
@@ -149,7 +155,7 @@ def _candidate(
 ) -> EffectCandidate:
     if isinstance(model, str):
         return EffectCandidate(number, name, model, None, None, False)
-    found = gain(before.fit, model.fit, before.errors, model.errors)
+    found = gain(before.fit, model.fit, before.errors, model.errors, before.floor_m)
     beyond = _beyond(name, model.fit, library[name])
     same = bare_parameter(name, library)
     reason = beyond or found.rejection_reason(before.at_floor)

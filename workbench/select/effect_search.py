@@ -143,7 +143,7 @@ class EffectSearch:
         return steps
 
     def _leaves_nothing(self, model: EvaluatedModel) -> bool:
-        return model.explained and model.errors.leaves_nothing(self._split.floor_m)
+        return model.explained and model.errors.leaves_nothing(model.floor_m)
 
     def _without_stand_in(self, steps: list[EffectStep]) -> list[EffectStep]:
         """Search anew without an effect that is not needed beside those that were added after it.
@@ -408,8 +408,7 @@ class EffectSearch:
 
 def evaluated(fit: Fit, split: Split) -> EvaluatedModel:
     """Return a fit with how it does on what was held out."""
-    errors = block_errors(fit, split)
-    return EvaluatedModel(fit, errors, errors.at_floor(split.floor_m))
+    return EvaluatedModel(fit, block_errors(fit, split), split.floor_m)
 
 
 def _parted(racers: Mapping[str, BegunFit]) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:
