@@ -110,6 +110,16 @@ def test_of_what_is_left_beside_what_is_missing_what_is_suspected_is_no_explanat
     assert "what is left, 1.4 floors, no other effect is proved to explain. Suspected, not proved: " in found.sentence
 
 
+def test_beside_rivals_what_is_suspected_is_said_too(parts: Split) -> None:
+    found_first = model_of("preload", cost=1.4 * AT_FLOOR, error_m=1.4 * FLOOR_M)
+    rival = model_of("sensor_offset", cost=1.4 * AT_FLOOR, error_m=1.4 * FLOOR_M)
+    suspect = model_of("preload", "backlash", cost=1.2 * AT_FLOOR, error_m=1.25 * FLOOR_M, scatter=0.3)
+    steps = step(POOR, preload=found_first, sensor_offset=rival), step(found_first, 2, backlash=suspect)
+    found = diagnosed(parts, *steps)
+    assert (found.verdict, found.suspected) == ("one_of", ("backlash",))
+    assert "; of backlash, the held-out error falls by " in found.sentence
+
+
 def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:
     found = diagnosed(parts, step(EXPLAINED, sensor_gain=model_of("sensor_gain", cost=0.5 * AT_FLOOR, error_m=3e-5)))
     assert (found.verdict, found.missing) == ("adequate", ())

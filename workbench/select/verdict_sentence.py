@@ -51,7 +51,8 @@ def _said(
     if verdict == "one_of":
         all_known = _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
         left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
-        return f"Missing: {names}{or_another}; {fell}{left}.{apart}{knife_edges_sentence(best.errors, length)}"
+        said = f"Missing: {names}{or_another}; {fell}{left}.{apart}"
+        return said + knife_edges_sentence(best.errors, length) + suspicion
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
