@@ -87,7 +87,7 @@ def test_rows_that_say_it_again_are_passed_over_and_change_nothing(monkeypatch: 
     run = FreeRun(composition, record)
     np.testing.assert_array_equal(run.judged, kept)
     passed_over = run.run(composition.theta).indicated_m
-    monkeypatch.setattr("workbench.model.free_run.eventful", lambda *_: np.ones(400, np.bool_))
+    monkeypatch.setattr("workbench.model.slow_segments.eventful", lambda *_: np.ones(400, np.bool_))
     whole = FreeRun(composition, record).position_m(composition.theta)
     np.testing.assert_allclose(passed_over, whole, rtol=0.0, atol=1e-12)
 

@@ -16,34 +16,24 @@ Behind a positioner no command is a pressure: it begins at rest, with what the r
 Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
 of the measurements at its ends. A measured load acts as the pressure load / A besides.
 
-Where samples lie farther apart than slides last (`sampling`), the stem has no inertia, the pressure of a period is the
-measured one at its end, and rows in which nothing happens are passed over (`stillness`): between a command long held
-and the next one, with the measured stem at rest, only some are simulated and judged. Where the command changed between
-samples, that of a period is the one at its end, the measured positions say which way the stem went, and only rests that
-a slide ended in are judged. Behind a positioner a period is cut into steps, for it feeds back on the pressure
-meanwhile, and all rows are judged.
+Where samples lie farther apart than slides last (`sampling`), the stem has no inertia (`slow_segments`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from math import ceil, inf, log2
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
-from sim.composition import AREA, COULOMB, SPRING, STATIC, Composition
-from sim.effect import Effect
+from sim.composition import AREA, COULOMB, STATIC, Composition
 from sim.karnopp import Vector, read, write
 from sim.misfit import AT_ONCE, Judge, put_back
 from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
-from sim.quasi_static import FED_BACK, FREE
 from workbench.data.record import Mask, Record
-from workbench.data.stillness import eventful
 from workbench.model.initial_state import (
     BeforeStart,
     InitialState,
@@ -52,7 +42,8 @@ from workbench.model.initial_state import (
     initial_state,
 )
 from workbench.model.lead import Lead, lead_of
-from workbench.model.sampling import Motion, Sampling, landings, sampling
+from workbench.model.sampling import Sampling, sampling
+from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,21 +62,10 @@ FINE = Accuracy(1.0, 3e-4)
 """Within 1 um rms, where effects remember, of steps a hundredth as long: a fiftieth of a transmitter's noise."""
 ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
-WIDE_STEPS = 10.0
-"""Behind a positioner, of its own, where many valves are tried or no stem has inertia: it hunts as well by these."""
-CLOSES, MOST_HALVINGS = 0.5, 3
-"""Of the time k_s / (K A) in which pilot and stem close their loop, the longest step without inertia; at most so often
-it is halved for that."""
-SCOUTING = Accuracy(WIDE_STEPS, 1e-3)
+SCOUTING = Accuracy(10.0, 1e-3)
 """Behind a positioner, where a quarter of the step moves a stem that hunts by as much as ten of them do."""
-GAIN = "gain_pa_per_ms"
-"""K of a positioner."""
 BEYOND_PA = 1e12
 """More than holds any stem: nearest to it is what breaks it loose."""
-CASCADE = 16
-"""Steps to a sample where effects of the pressure path with a memory follow each other, without inertia."""
-JUDGED = 10
-"""Samples of a landing that are judged at most: a long rest knows no more than its beginning."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -149,10 +129,9 @@ class FreeRun:
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
         leads = [lead_of(record, self._composition, drive_pa, segment) for segment in range(len(record.segments))]
-        self._gain = _gain_of(self._composition)
         if self.by.slow:
             self._glide = self._composition.quasi_static.glide
-            self._slow = _slow_segments(record, self._composition, drive_pa, self.by, from_pressure, leads)
+            self._slow = slow_segments(record, self._composition, drive_pa, self.by, from_pressure, leads)
             return
         longest_s = accuracy.steps * self._composition.step_s
         by_setpoint = self._composition.by_setpoint
@@ -224,25 +203,14 @@ class FreeRun:
                 break
         return errors, float(cost[0])
 
-    def _glides(self, theta: Vector) -> Iterator[tuple["SlowSegment", Vector]]:
+    def _glides(self, theta: Vector) -> Iterator[tuple[SlowSegment, Vector]]:
         """Simulate each segment without inertia: it, and what the kernel writes, (5, rows kept)."""
         vector = np.array(theta[self._kept])
         for each in self._slow:
             drive_pa, state = self._started(vector, each)
             path = np.empty((PATH_ROWS, each.rows.size))
-            self._glide(vector, state, drive_pa, each.periods_s, each.told, self._glides_s(vector, each.step_s), path)
+            self._glide(vector, state, drive_pa, each.periods_s, each.told, each.bears_s(vector), path)
             yield each, path
-
-    def _glides_s(self, theta: Vector, longest_s: float) -> float:
-        """Return how long a step without inertia may be, s: shorter where a pilot of high gain closes its loop faster.
-
-        By halvings, lest a cost jumps wherever a gain is a little higher.
-        """
-        if self._gain is None:
-            return longest_s
-        closes_s = theta[SPRING] / (theta[AREA] * theta[self._gain])
-        halvings = ceil(log2(longest_s / (CLOSES * closes_s)))
-        return float(longest_s / 2 ** min(max(halvings, 0), MOST_HALVINGS))
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
         """Simulate each segment, from shot to shot: its rows and what the kernel writes, (5, rows)."""
@@ -262,7 +230,7 @@ class FreeRun:
                 yield each.first + at + known, each.first + over + 1, path[:, known:]
                 at, known = over, 1
 
-    def _started(self, theta: Vector, segment: "Segment | SlowSegment") -> tuple[Vector, Vector]:
+    def _started(self, theta: Vector, segment: Segment | SlowSegment) -> tuple[Vector, Vector]:
         """Return the pressures of a segment's periods, Pa, and the state that it begins with."""
         drive_pa = segment.drive_pa if segment.load_n is None else segment.drive_pa + segment.load_n / theta[AREA]
         time_s = float(self.record.time_s[segment.first])
@@ -321,7 +289,7 @@ class FreeRun:
         drive_pa, periods_s = lead.drive_pa[:periods], lead.periods_s[:periods]
         return state, float(np.mean(self._held_pa(theta, state, drive_pa, periods_s, step_s)[-2:]))
 
-    def _risen_pa(self, theta: Vector, state: Vector, segment: "Segment | SlowSegment", rests: int) -> float:
+    def _risen_pa(self, theta: Vector, state: Vector, segment: Segment | SlowSegment, rests: int) -> float:
         """Return by how much the positioner raises the pressure until the middle of a period, the stem held, Pa."""
         drive_pa, periods_s = segment.drive_pa[:rests], segment.periods_s[:rests]
         pressure_pa = self._held_pa(theta, state.copy(), drive_pa, periods_s, segment.step_s)
@@ -331,7 +299,7 @@ class FreeRun:
         """Carry a state on with the stem held; return the pressure at the start and after each period, Pa."""
         path = np.empty((PATH_ROWS, periods_s.size + 1))
         if self.by.slow:
-            told = np.full(periods_s.size, _told_nothing(self._composition))
+            told = np.full(periods_s.size, told_nothing(self._composition))
             self._glide(held(theta), state, drive_pa, periods_s, told, step_s, path)
         else:
             self._composition.kernel.respond(held(theta), state, drive_pa, periods_s, step_s, self._tolerance, path)
@@ -339,104 +307,6 @@ class FreeRun:
 
     def _begin(self, theta: Vector, begin: InitialState, time_s: float, pressure_pa: float) -> Vector:
         return self._composition.begin(theta, time_s, begin.position_m, begin.velocity_m_per_s, pressure_pa)
-
-
-class SlowSegment(NamedTuple):
-    """A stretch of a record without a gap, as it is simulated without inertia."""
-
-    rows: npt.NDArray[np.int64]
-    """Of the record that are simulated, ascending."""
-    judged: npt.NDArray[np.int64]
-    """Of the record that count in the error,"""
-    at: npt.NDArray[np.int64]
-    """and where they stand among those that are simulated."""
-    begin: InitialState
-    before: BeforeStart | None
-    """As that of a `Segment`."""
-    lead: Lead | None
-    drive_pa: Vector
-    """Of each period from one of the rows to the next, Pa."""
-    load_n: Vector | None
-    """The same of a measured load, N."""
-    periods_s: Vector
-    told: Vector
-    """Of each period, as `sim.quasi_static` takes it."""
-    step_s: float
-    """Longest, s."""
-
-    @property
-    def first(self) -> int:
-        """The row of the record that it begins with."""
-        return int(self.rows[0])
-
-
-def _slow_segments(
-    record: Record,
-    composition: Composition,
-    drive_pa: Column,
-    by: Sampling,
-    from_pressure: bool,
-    leads: Sequence[Lead | None],
-) -> list[SlowSegment]:
-    at_end = from_pressure or not by.held
-    by_setpoint = composition.by_setpoint
-    step_s = _longest_slow_s(record, composition)
-    told, judged = np.full(len(record), _told_nothing(composition)), np.ones(len(record), np.bool_)
-    if by.motion is Motion.LANDINGS:
-        told, judged = _told(record, composition)
-    found = []
-    for (first, end), lead in zip(record.segments, leads, strict=True):
-        keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
-        if by.held:
-            keep |= eventful(record, drive_pa, first, end)
-        keep[[0, -1]] = True  # a segment has its ends
-        rows = first + np.flatnonzero(keep)
-        counted = np.flatnonzero(judged[rows])
-        following = rows[1:] if at_end else rows[:-1]
-        held_pa = checked_commands(drive_pa[following])
-        load_n = None if record.load_n is None else checked_commands(record.load_n[following])
-        periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
-        begin = initial_state(record, first, end, moving=False)
-        before = before_start(record, first, end, begin.position_m) if by_setpoint else None
-        known = begin, before, lead
-        found.append(
-            SlowSegment(rows, rows[counted], counted, *known, held_pa, load_n, periods_s, told[rows[1:]], step_s)
-        )
-    return found
-
-
-def _told_nothing(composition: Composition) -> float:
-    """Return what a step is told of a stem that decides itself where it goes."""
-    return FED_BACK if composition.by_setpoint else FREE
-
-
-def _positioner(composition: Composition) -> Effect | None:
-    return next((each for each in composition.effects if each.by_setpoint), None)
-
-
-def _gain_of(composition: Composition) -> int | None:
-    """Return where K of the positioner stands among the parameters, if it has one."""
-    positioner = _positioner(composition)
-    named = f"{positioner.name}.{GAIN}" if positioner else ""
-    return composition.names.index(named) if named in composition.names else None
-
-
-def _longest_slow_s(record: Record, composition: Composition) -> float:
-    """Return how long a step without inertia may be, s: one a sample, but where the pressure path bears less."""
-    positioner = _positioner(composition)
-    if positioner:
-        return WIDE_STEPS * positioner.step_s
-    remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
-    return record.period_s / CASCADE if remembering > 1 else inf
-
-
-def _told(record: Record, composition: Composition) -> tuple[Column, Mask]:
-    """Return the direction in which the stem went in the sample before each row, and which rows are judged, (n,)."""
-    told, judged = np.zeros(len(record)), np.zeros(len(record), np.bool_)
-    for plateau, settled in landings(record, composition.valve):
-        told[plateau.first] = plateau.direction
-        judged[plateau.first : min(plateau.end, plateau.first + JUDGED)] = settled
-    return told, judged
 
 
 def _segment(

@@ -1,0 +1,159 @@
+"""A record as it is simulated without inertia, where samples lie farther apart than slides last (`sampling`).
+
+The pressure of a period is the measured one at its end, and rows in which nothing happens are passed over
+(`stillness`): between a command long held and the next one, with the measured stem at rest, only some are simulated and
+judged. Where the command changed between samples, that of a period is the one at its end, the measured positions say
+which way the stem went, and only rests that a slide ended in are judged. Behind a positioner a period is cut into
+steps, for it feeds back on the pressure meanwhile, and all rows are judged.
+"""
+
+from collections.abc import Sequence
+from math import ceil, inf, log2
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from config.recording import Column
+from sim.composition import AREA, SPRING, Composition
+from sim.effect import Effect
+from sim.karnopp import Vector
+from sim.open_loop import checked_commands, checked_periods
+from sim.quasi_static import FED_BACK, FREE
+from workbench.data.record import Mask, Record
+from workbench.data.stillness import eventful
+from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
+from workbench.model.lead import Lead
+from workbench.model.sampling import Motion, Sampling, landings
+
+CASCADE = 16
+"""Steps to a sample where effects of the pressure path with a memory follow each other."""
+FED_BACK_STEPS = 10.0
+"""Of a positioner's own with inertia: the longest step. A quarter of it moves a stem that hunts by as much."""
+CLOSES, MOST_HALVINGS = 0.5, 3
+"""Of the time in which pilot and stem close their loop, the longest step; at most so often it is halved for that."""
+GAIN = "gain_pa_per_ms"
+"""K of a positioner."""
+JUDGED = 10
+"""Samples of a landing that are judged at most: a long rest knows no more than its beginning."""
+
+
+class SlowSegment(NamedTuple):
+    """A stretch of a record without a gap, as it is simulated without inertia."""
+
+    rows: npt.NDArray[np.int64]
+    """Of the record that are simulated, ascending."""
+    judged: npt.NDArray[np.int64]
+    """Of the record that count in the error,"""
+    at: npt.NDArray[np.int64]
+    """and where they stand among those that are simulated."""
+    begin: InitialState
+    before: BeforeStart | None
+    """As that of a `Segment`."""
+    lead: Lead | None
+    drive_pa: Vector
+    """Of each period from one of the rows to the next, Pa."""
+    load_n: Vector | None
+    """The same of a measured load, N."""
+    periods_s: Vector
+    told: Vector
+    """Of each period, as `sim.quasi_static` takes it."""
+    step_s: float
+    """Longest, s."""
+    gain: int | None
+    """Where K of a positioner stands among the parameters."""
+
+    @property
+    def first(self) -> int:
+        """The row of the record that it begins with."""
+        return int(self.rows[0])
+
+    def bears_s(self, theta: Vector) -> float:
+        """Return how long a step may be, s: shorter where pilot and stem close their loop in less, k_s / (K A).
+
+        By halvings, lest a cost jumps wherever a gain is a little higher.
+        """
+        if self.gain is None:
+            return self.step_s
+        closes_s = theta[SPRING] / (theta[AREA] * theta[self.gain])
+        halvings = ceil(log2(self.step_s / (CLOSES * closes_s)))
+        return float(self.step_s / 2 ** min(max(halvings, 0), MOST_HALVINGS))
+
+
+def slow_segments(
+    record: Record,
+    composition: Composition,
+    drive_pa: Column,
+    by: Sampling,
+    from_pressure: bool,
+    leads: Sequence[Lead | None],
+) -> list[SlowSegment]:
+    """Make the segments of a record ready to be simulated.
+
+    Args:
+        record: what was measured.
+        composition: what is simulated.
+        drive_pa: what enters it at each row, Pa; a set point, m.
+        by: how the record is simulated.
+        from_pressure: whether what enters is the measured pressure.
+        leads: what was commanded before each segment.
+    """
+    at_end = from_pressure or not by.held
+    step_s, gain = _longest_s(record, composition), _gain_of(composition)
+    told, judged = np.full(len(record), told_nothing(composition)), np.ones(len(record), np.bool_)
+    if by.motion is Motion.LANDINGS:
+        told, judged = _told(record, composition)
+    found = []
+    for (first, end), lead in zip(record.segments, leads, strict=True):
+        keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
+        if by.held:
+            keep |= eventful(record, drive_pa, first, end)
+        keep[[0, -1]] = True  # a segment has its ends
+        rows = first + np.flatnonzero(keep)
+        counted = np.flatnonzero(judged[rows])
+        following = rows[1:] if at_end else rows[:-1]
+        held_pa = checked_commands(drive_pa[following])
+        load_n = None if record.load_n is None else checked_commands(record.load_n[following])
+        periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
+        begin = initial_state(record, first, end, moving=False)
+        before = before_start(record, first, end, begin.position_m) if composition.by_setpoint else None
+        of_periods = held_pa, load_n, periods_s
+        directions = told[rows[1:]]  # of the sample before each row
+        found.append(
+            SlowSegment(rows, rows[counted], counted, begin, before, lead, *of_periods, directions, step_s, gain)
+        )
+    return found
+
+
+def told_nothing(composition: Composition) -> float:
+    """Return what a step is told of a stem that decides itself where it goes."""
+    return FED_BACK if composition.by_setpoint else FREE
+
+
+def _positioner(composition: Composition) -> Effect | None:
+    return next((each for each in composition.effects if each.by_setpoint), None)
+
+
+def _gain_of(composition: Composition) -> int | None:
+    """Return where K of the positioner stands among the parameters, if it has one."""
+    positioner = _positioner(composition)
+    named = f"{positioner.name}.{GAIN}" if positioner else ""
+    return composition.names.index(named) if named in composition.names else None
+
+
+def _longest_s(record: Record, composition: Composition) -> float:
+    """Return how long a step without inertia may be, s: one a sample, but where the pressure path bears less."""
+    positioner = _positioner(composition)
+    if positioner:
+        return FED_BACK_STEPS * positioner.step_s
+    remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
+    return record.period_s / CASCADE if remembering > 1 else inf
+
+
+def _told(record: Record, composition: Composition) -> tuple[Column, Mask]:
+    """Return the direction in which the stem went in the sample before each row, and which rows are judged, (n,)."""
+    told, judged = np.zeros(len(record)), np.zeros(len(record), np.bool_)
+    for plateau, settled in landings(record, composition.valve):
+        told[plateau.first] = plateau.direction
+        judged[plateau.first : min(plateau.end, plateau.first + JUDGED)] = settled
+    return told, judged
