@@ -1,6 +1,7 @@
 """A kernel is compiled once for all processes, and never taken for another."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -23,6 +24,7 @@ ASYMMETRIC = ValveFile(
     valve=SEED.valve,
     effect=(EffectTable.model_validate({"name": "asymmetric_friction", "asymmetry": 0.2}),),
 )
+DIGEST = re.compile("[0-9a-f]{64}")
 PROBE = """
 import sys
 from config.valve_file import load_valve, shipped_valve
@@ -61,13 +63,19 @@ def at_once(tmp_path_factory: pytest.TempPathFactory) -> AtOnce:
 
 
 @pytest.fixture
-def filled(at_once: AtOnce, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache of this test's own in which the seed's kernel lies, compiled by another process."""
-    cache = tmp_path / "filled"
-    shutil.copytree(at_once.cache, cache)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+def filled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of this test's own in which the seed's kernel lies, and the laws that it is linked from."""
     compiled._compiled.cache_clear()
-    return cache
+    digest = Composition.from_file(SEED).kernel.digest
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    there, here = (each / "positioner" / "kernels" for each in (home, tmp_path / "filled"))
+    here.mkdir(parents=True, mode=0o700)
+    for part in {digest, *DIGEST.findall((there / f"{digest}.py").read_text())}:
+        for file in there.glob(f"{part}.*"):
+            shutil.copy(file, here)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "filled"))
+    compiled._compiled.cache_clear()
+    return tmp_path / "filled"
 
 
 @pytest.mark.long
