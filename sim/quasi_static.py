@@ -15,6 +15,9 @@ pressure that approaches its end as behind a lag, p is a straight line over p', 
 
     p_l = p_0 + (p_1 - p_0) (p'_0 - p'_l) / (p'_0 - p'_1),    p'_l = v_l / (dx/dp)
 
+Behind a positioner the stem feeds back on the pressure. There a period is cut into steps so short that the pressure is
+a straight line over each, p'_0 = p'_1, and a jump, which no sample sees under way, is over at once.
+
 Where a step is told which way the stem went, because the pressure between samples is not known, the stem lands in that
 direction at the pressure of the step's end, or stays.
 
@@ -286,7 +289,10 @@ def slid(
     z: Any,
     shown: float,
 ) -> Slide:
-    """Let a loose stem slide until it lands or the step ends; `shown` is what was indicated as it began."""
+    """Let a loose stem slide until it lands or the step ends; `shown` is what was indicated as it began.
+
+    A jump takes its own time, unless it is over `at_once`.
+    """
     tau, x, p, sigma = loose
     at_p = balanced(valve, sigma, v_l, t + tau, x, p, q, z)
     if sigma * (at_p - x) < 0.0:
