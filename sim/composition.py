@@ -128,9 +128,14 @@ class Composition:
         return min((each.step_s for each in self.effects), default=inf)
 
     @property
+    def positioner(self) -> Effect | None:
+        """The effect that obeys a set point, if there is one."""
+        return next((each for each in self.effects if each.by_setpoint), None)
+
+    @property
     def by_setpoint(self) -> bool:
         """Whether its input is a set point, m, that a positioner obeys, and not a pressure, Pa."""
-        return any(each.by_setpoint for each in self.effects)
+        return self.positioner is not None
 
     def changed(self, theta: Vector, parameters: Mapping[str, float]) -> Vector:
         """Return theta, (parameters,) in the order of `names`, with some of them replaced by name.

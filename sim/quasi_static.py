@@ -376,10 +376,10 @@ def over_period(
     begin, p = now, now.p
     n = 1 if duration <= longest_step else ceil(duration / longest_step - 1e-6)
     h = duration / n
+    fed_back = told == FED_BACK
     for k in range(n):
         t = begin.t + k * h
         stem = Stem(t, now.x, now.v, p)
-        fed_back = told == FED_BACK
         way = straight_way(command, h, stem, q, z) if fed_back else way_of(command, h, stem, q, z)
         p = way.p1
         if told >= FREE:

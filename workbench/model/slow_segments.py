@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from config.recording import Column
 from sim.composition import AREA, SPRING, Composition
-from sim.effect import Effect
 from sim.karnopp import Vector
 from sim.open_loop import checked_commands, checked_periods
 from sim.quasi_static import FED_BACK, FREE
@@ -117,10 +116,21 @@ def slow_segments(
         periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
         begin = initial_state(record, first, end, moving=False)
         before = before_start(record, first, end, begin.position_m) if composition.by_setpoint else None
-        of_periods = held_pa, load_n, periods_s
-        directions = told[rows[1:]]  # of the sample before each row
         found.append(
-            SlowSegment(rows, rows[counted], counted, begin, before, lead, *of_periods, directions, step_s, gain)
+            SlowSegment(
+                rows=rows,
+                judged=rows[counted],
+                at=counted,
+                begin=begin,
+                before=before,
+                lead=lead,
+                drive_pa=held_pa,
+                load_n=load_n,
+                periods_s=periods_s,
+                told=told[rows[1:]],
+                step_s=step_s,
+                gain=gain,
+            )
         )
     return found
 
@@ -130,22 +140,17 @@ def told_nothing(composition: Composition) -> float:
     return FED_BACK if composition.by_setpoint else FREE
 
 
-def _positioner(composition: Composition) -> Effect | None:
-    return next((each for each in composition.effects if each.by_setpoint), None)
-
-
 def _gain_of(composition: Composition) -> int | None:
     """Return where K of the positioner stands among the parameters, if it has one."""
-    positioner = _positioner(composition)
+    positioner = composition.positioner
     named = f"{positioner.name}.{GAIN}" if positioner else ""
     return composition.names.index(named) if named in composition.names else None
 
 
 def _longest_s(record: Record, composition: Composition) -> float:
     """Return how long a step without inertia may be, s: one a sample, but where the pressure path bears less."""
-    positioner = _positioner(composition)
-    if positioner:
-        return FED_BACK_STEPS * positioner.step_s
+    if composition.positioner:
+        return FED_BACK_STEPS * composition.positioner.step_s
     remembering = sum("pressure" in each.functions and each.in_time for each in composition.effects)
     return record.period_s / CASCADE if remembering > 1 else inf
 

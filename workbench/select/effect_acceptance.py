@@ -5,8 +5,8 @@
 
 A falling held-out error is needed for an effect; it proves none. What acts in k of the held-out blocks makes it fall by
 some sqrt(k) standard errors, however sure: where the evidence leaves no doubt, and what was left above the noise is
-gone, one is enough. The rule is the same for a balance of forces, where
-the blocks are strokes or readings in place of seconds.
+gone, one is enough. The rule is the same for a balance of forces, where the blocks are strokes or readings in place of
+seconds.
 """
 
 from dataclasses import dataclass

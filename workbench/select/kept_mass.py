@@ -73,7 +73,7 @@ def kept_mass(
             workers=workers,
             from_pressure=before.from_pressure,
             profile=False,
-            progress=partial(_tell, progress or _silent, number),
+            progress=partial(_tell, progress, number) if progress else None,
         )
         models.append(evaluated(found, diagnosis.split))
     model = min(models, key=lambda each: each.fit.cost)
@@ -85,7 +85,3 @@ def kept_mass(
 
 def _tell(progress: Progress, number: int, done: float) -> None:
     progress("fitting the mass, too", (number + done) / len(BEGINS))
-
-
-def _silent(_what: str, _done: float) -> None:
-    pass
