@@ -11,8 +11,9 @@ from workbench.data.held_out import Split, split
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import as_json
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
+from workbench.select.rest_errors import RestErrors
 from workbench.select.verdict import verdict
-from workbench.select.verdict_sentence import rivals_sentence, verdict_sentence
+from workbench.select.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
 EXPLAINED = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M)
@@ -168,6 +169,19 @@ def test_a_residual_that_hangs_on_the_state_is_not_explained_by_reaching_the_flo
     structured = model_of(structure=0.9)
     assert structured.at_floor
     assert diagnosed(parts, step(structured, ip_lag=structured)).verdict == "unexplained"
+
+
+def test_what_reaches_the_floor_but_not_the_rests_may_stand_in_for_something_else(parts: Split) -> None:
+    reached = model_of("ip_lag")
+    elsewhere = replace(reached, errors=replace(reached.errors, rests=RestErrors(3e-5, 2e-5)))
+    found = diagnosed(parts, step(POOR, ip_lag=elsewhere))
+    assert elsewhere.at_floor
+    assert found.verdict == "unexplained"
+    assert found.sentence.endswith(
+        "Where the stem rests the model is off by 0.03 mm, besides noise; the valve's scatter and a smooth friction "
+        f"leave 0.02 mm at most: ip_lag may stand in for it.{REPEAT}"
+    )
+    assert as_json(found)["best"]["rests_off_m"] == 3e-5
 
 
 def test_searches_that_disagree_and_explain_nothing_are_not_trusted(parts: Split) -> None:

@@ -18,6 +18,7 @@ Its files:
     slip_evidence                                 what slips say of a rival: forces, whatever came between
     slip_promise                                  what the slips of an experiment promise to say
     residual_structure                            the meter of what is unexplained
+    rest_errors                                   whether slides end where the model says
     extension, extension_json                     adds what was found; the same as JSON
     extension_journal                             what was added when, and why
 """

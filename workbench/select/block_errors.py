@@ -22,6 +22,7 @@ from workbench.data.held_out import Part, Split, residual_m
 from workbench.fit.fit_result import Fit
 from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 from workbench.select.residual_structure import clipped, structure
+from workbench.select.rest_errors import RestErrors, rest_errors
 
 BLOCK_S, BLOCK_SAMPLES = 1.0, 10
 AT_FLOOR, RARELY_OFF = 1.6, 1.75
@@ -67,6 +68,8 @@ class BlockErrors(Brief):
     """Held-out slips that are narrowly mistimed, where these decide whether all is explained, or anything is left."""
     test_rest_rmse_m: float
     """The rms error held out without these."""
+    rests: RestErrors | None = None
+    """How far rests are off, where all else is at the floor."""
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -117,9 +120,10 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         test_rest_rmse_m=test_rmse_m,
     )
     floor_m = split.floor_m
-    if floor_m is None or test_rmse_m <= NOISE_KNOWN_TO * floor_m:
+    if floor_m is None or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
-    if not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
+    found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
+    if test_rmse_m <= NOISE_KNOWN_TO * floor_m:
         return found
     edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
     if not edges:

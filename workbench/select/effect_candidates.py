@@ -52,7 +52,12 @@ class EvaluatedModel(Brief):
     @property
     def explained(self) -> bool:
         """Whether nothing is left but what no model explains."""
-        return self.at_floor and not self.structured
+        return self.at_floor and not self.structured and not self.stands_in
+
+    @property
+    def stands_in(self) -> bool:
+        """Whether slides end elsewhere, though all else is at the floor: what explains it stands in for another."""
+        return self.errors.rests is not None and self.errors.rests.beyond
 
     @property
     def effects(self) -> tuple[str, ...]:

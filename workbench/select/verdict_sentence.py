@@ -59,7 +59,7 @@ def _said(
     begun = f" {names} {part}: {fell}." if names else f" The held-out error is {length.said(best.errors.test_rmse_m)}."
     if verdict == "unexplained":
         said = f"Something is missing that the library does not have.{begun}"
-        return f"{said}{suspicion}{repeat}{_scatter(parts, length)}"
+        return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, steps, library) + begun + (suspicion if verdict == "untrusted" else "")
 
 
@@ -141,6 +141,18 @@ def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
         if distinguishing_record(name, other, library) or len(classes((name, other), library)) == 1
     ]
     return "".join(texts) or f" Equally good: {', '.join(names)}."
+
+
+def _elsewhere(best: EvaluatedModel, names: str, length: Scale) -> str:
+    """Say that slides end elsewhere, with a leading space, where all else is at the floor."""
+    rests = best.errors.rests
+    if rests is None or not rests.beyond:
+        return ""
+    stands_in = f": {names} may stand in for it" if names else ""
+    return (
+        f" Where the stem rests the model is off by {length.said(rests.off_m)}, besides noise; the valve's scatter and "
+        f"a smooth friction leave {length.said(rests.allowed_m)} at most{stands_in}."
+    )
 
 
 def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
