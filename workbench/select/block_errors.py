@@ -69,7 +69,7 @@ class BlockErrors(Brief):
     test_rest_rmse_m: float
     """The rms error held out without these."""
     rests: RestErrors | None = None
-    """How far rests are off, where all else is at the floor."""
+    """How far rests are off, where all else is at the floor and yet something may be left."""
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -122,7 +122,8 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     floor_m = split.floor_m
     if floor_m is None or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
-    found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
+    if found.floors_left(floor_m) > NOTHING_LEFT:
+        found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
     if test_rmse_m <= NOISE_KNOWN_TO * floor_m:
         return found
     edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
