@@ -5,7 +5,8 @@
     nothing    no effect, clean and dirty in turn
     two        two effects, clean
     two_dirty  two effects, dirty
-    removed    one effect, clean, taken out of the library: the right verdict is "unexplained"
+    removed    one effect, clean, taken out of the library: the right verdict is "unexplained", or an equivalent: what
+               the recording does not tell from it, for with both in the library they stand in one set, or none is named
     others     what `tests/workbench/generators.py` makes: other integrators and friction laws, what the library has
     outside    the same, what the library lacks
 
@@ -47,6 +48,8 @@ SEEDS: Mapping[str, range] = {
 """Nobody has looked at a case before the rules stood; of earlier seeds, see docs/blind.md."""
 APART = 100
 """Seeds farther from each other are told as another span."""
+NAMES_ALL = ("adequate", "missing", "one_of")
+"""Verdicts by which what is named is all there is."""
 FOLDER = Path("docs/blind")
 KEPT = "cases.jsonl"
 """Where the lines are kept, and in which file there."""
@@ -111,6 +114,7 @@ def line(family: str, seed: int) -> Line:
         "visible": posed.visible and _missed_m(found, posed.fit_floor_m) > VISIBLE * posed.fit_floor_m,
         "verdict": found.verdict,
         "missing": list(found.missing),
+        "equivalent": family == "removed" and _is_equivalent(found, posed),
         "suspected": list(found.suspected),
         "sets": [[each.name for each in step.indistinguishable] for step in found.steps if step.added],
         "ranked": [each.name for each in found.steps[0].candidates[:3]],
@@ -128,6 +132,16 @@ def line(family: str, seed: int) -> Line:
         "seconds": round(time.perf_counter() - began_s, 1),
         "cpu_seconds": round(time.process_time() - cpu_s, 1),
     }
+
+
+def _is_equivalent(found: Diagnosis, posed: Problem) -> bool:
+    """Whether what was named beside a removed effect does as well as the effect itself, in the verdict's own words."""
+    if found.verdict not in NAMES_ALL:
+        return False
+    both = diagnose(posed.fit, posed.base, test=posed.test, effects=[*found.missing, *posed.hidden], workers=1)
+    sets = [{each.name for each in step.indistinguishable} | {step.added.name} for step in both.steps if step.added]
+    hidden = {each for name in posed.hidden for each in _same(name)}
+    return not sets if not found.missing else len(sets) == 1 and sets[0] >= {*found.missing} and bool(sets[0] & hidden)
 
 
 def _missed_m(found: Diagnosis, floor_m: float) -> float:
@@ -186,8 +200,13 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         return
     yield f"  {'visible':<52}{len(seen)} of {len(lines)}"
     if family in {"removed", "outside"}:
-        yield share("called unexplained", [each["verdict"] in {"unexplained", "untrusted"} for each in seen])
-        yield share("a wrong effect named as all there is", [each["verdict"] in {"missing", "one_of"} for each in seen])
+        unexplained = [each["verdict"] in {"unexplained", "untrusted"} for each in seen]
+        same = [each.get("equivalent", False) for each in seen]
+        yield share("called unexplained", unexplained)
+        if any(same):
+            yield share("an equivalent, which the recording does not tell from it", same)
+        wrong = [not (left or alike) for left, alike in zip(unexplained, same, strict=True)]
+        yield share("a wrong effect, or none, named as all there is", wrong)
         return
     bare = _bare()
     known = [each for each in seen if not set(each["hidden"]) <= bare]
