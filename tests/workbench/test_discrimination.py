@@ -185,6 +185,7 @@ def test_twins_spend_the_budget_and_nothing_is_named(fits: dict[str, Fit], recor
     assert found.odds == pytest.approx(1.0)
 
 
+@pytest.mark.long
 def test_the_command_tells_a_lag_from_a_dead_time(
     fits: dict[str, Fit],
     recording: Recording,

@@ -55,6 +55,7 @@ def searched(folder: Path, **environment: str) -> Found | None:
     return Found(*json.loads(done.stdout))
 
 
+@pytest.mark.long
 @pytest.mark.timeout(240)
 def test_the_last_bits_decide_nothing(tmp_path: Path) -> None:
     hidden = hide(31013, duration_s=10.0)
