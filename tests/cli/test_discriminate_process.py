@@ -73,6 +73,13 @@ def test_what_is_missing_is_said_before_anything_is_worked_out(site: Site, capsy
         dcs.set_all({"experiment_consent": 1, "experiment_veto": 1})
     assert main(words(site)) == 1
     assert "experiments are vetoed" in capsys.readouterr().err
+    with site.dcs() as dcs:
+        dcs.set("experiment_veto", 0)
+    whole = site.config.read_text()
+    site.config.write_text(whole + "[experiment]\ntravel_window = [0.7, 0.95]\n")
+    assert main(words(site)) == 1
+    assert "of its stroke, outside [experiment] travel_window = [0.7, 0.95]" in capsys.readouterr().err
+    site.config.write_text(whole)
     site.config.write_text(site.config.read_text().replace(RECORDER, ""))
     assert main(words(site)) == 2
     assert "recorder: is needed" in capsys.readouterr().err

@@ -25,11 +25,11 @@ SAME, MOSTLY = 0.01, 0.95
 
 
 def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
-    """Look whether a daemon answers, in automatic, with consent, and records.
+    """Look whether a daemon answers, in automatic, with consent, records, and has its stem where it may play.
 
     Raises:
         InputError: no recorder in the file, or its folder is not on this machine.
-        CommandFailed: no daemon, another mode, no consent, or a veto; says what to do.
+        CommandFailed: no daemon, another mode, no consent, a veto, or the stem elsewhere; says what to do.
     """
     from config.codes import Mode
     from config.errors import CommandFailed, InputError
@@ -48,6 +48,13 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
             raise CommandFailed("the DCS has not consented to experiments: positioner set experiment_consent 1")
         if dcs.get("experiment_veto"):
             raise CommandFailed("experiments are vetoed: positioner set experiment_veto 0")
+        least, most = file.experiment.travel_window
+        position = float(dcs.get("position"))
+        if not least <= position <= most:
+            raise CommandFailed(
+                f"the stem is at {position:.3g} of its stroke, outside [experiment] travel_window = "
+                f"[{least:g}, {most:g}]: move it there, by positioner set reference"
+            )
 
 
 def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
