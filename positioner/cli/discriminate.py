@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 HELP = "diagnose, then play experiments on the valve until the rivals are told apart (moves it: state S3)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
 
+BROKEN_OFF = "nothing is named; the daemon has its recordings of what was played"
 WINDOW_MARGIN = 0.03
 """Of the stroke: a design keeps so far inside the travel window, as it knows the stem by its models only."""
 
@@ -42,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, play, print a line a round; 0 if nothing is left to be told apart, else 1."""
     from config.daemon_file import load_daemon
     from config.recording import Recording
+    from positioner.cli.parts.breaking_off import told_when_broken_off
     from positioner.cli.parts.experiment_player import player_on, require_ready
     from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import naming
@@ -69,16 +71,18 @@ def run(arguments: argparse.Namespace) -> int:
         print("no rivals to be told apart; nothing was played")
         return 0 if found.verdict in ("adequate", "missing") else 1
     effects = [find_effect(name, "effects") for name in arguments.effects or tried_effects()]
-    told = discriminate(
-        fits,
-        [*recordings, test] if test else recordings,
-        player_on(file, arguments),
-        bounds,
-        {each.written: each for each in effects},
-        budget=arguments.budget,
-        seed=arguments.seed,
-        on_round=_tell,
-    )
+    with told_when_broken_off("discriminate", lambda: BROKEN_OFF), Progress() as progress:
+        told = discriminate(
+            fits,
+            [*recordings, test] if test else recordings,
+            player_on(file, arguments),
+            bounds,
+            {each.written: each for each in effects},
+            budget=arguments.budget,
+            seed=arguments.seed,
+            on_round=_tell,
+            progress=progress,
+        )
     _write(told, arguments.out)
     print(told.summary())
     return 0 if told.outcome in ("resolved", "one_class") else 1

@@ -170,7 +170,13 @@ def test_whole_inputs_are_weighed_against_short_ones(fits: dict[str, Fit], recor
 
 
 def test_what_the_valve_does_not_play_stops_it(fits: dict[str, Fit], recording: Recording) -> None:
-    found = discriminate(fits, [recording], silent, BOUNDS, LIBRARY, design=Design(2.0))
+    told: list[tuple[str, float]] = []
+    design = Design(2.0)
+    found = discriminate(
+        fits, [recording], silent, BOUNDS, LIBRARY, design=design, progress=lambda *each: told.append(each)
+    )
+    playing = f"playing experiment 1, {design.course.name}, {design.course.duration_s:.0f} s"
+    assert told == [("choosing experiment 1", 0.0), (playing, 0.0)]
     assert (found.outcome, found.named) == ("stopped", ())
     assert "vetoed" in found.sentence
 

@@ -25,6 +25,7 @@ from sim.effect import Effect
 from workbench.fit.fit_result import Fit
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import parameters_json
+from workbench.select.effect_search import Progress
 from workbench.select.equivalence import classes
 from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, designed
 from workbench.select.rival_race import ODDS, RivalRace
@@ -195,6 +196,7 @@ def discriminate(
     seed: int = 0,
     workers: int | None = None,
     on_round: Callable[[Round], None] | None = None,
+    progress: Progress | None = None,
 ) -> Discrimination:
     """Tell rivals apart by experiments on the valve.
 
@@ -209,6 +211,7 @@ def discriminate(
         seed: of the designs and searches.
         workers: threads, by default one a core.
         on_round: told each round when it is weighed.
+        progress: called with what is being done, and the fraction of the budget used.
 
     Raises:
         InputError: the recordings hold too little.
@@ -219,20 +222,25 @@ def discriminate(
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
     problem, used = "", 0
+    tell = progress or (lambda _what, _done: None)
     while outcome is None:
-        left = budget - used
+        left, number = budget - used, len(rounds) + 1
+        tell(f"choosing experiment {number}", used / budget)
         chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
         if chosen is None or (chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING):
             outcome = "not_separable"
             break
+        tell(f"playing experiment {number}, {chosen.course.name}, {chosen.course.duration_s:.0f} s", used / budget)
         played = player(chosen)
         if played.recording is None:
             outcome, problem = "stopped", played.problem
             break
         experiments.append(played.recording)
         used += chosen.course.moves
+        tell(f"refitting the rivals to experiment {number}", used / budget)
         race = race.with_recording(played.recording)
         rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
+        tell(f"experiment {number} weighed", 1.0)
         if on_round:
             on_round(rounds[-1])
         outcome = race.decided or ("budget_spent" if used >= budget else None)
