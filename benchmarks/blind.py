@@ -6,7 +6,7 @@
     two        two effects, clean
     two_dirty  two effects, dirty
     removed    one effect, clean, taken out of the library: the right verdict is "unexplained", or an equivalent: what
-               the recording does not tell from it, for with both in the library they stand in one set, or none is named
+               does as well as the effect itself on both recordings, by the rule for sets
     others     what `tests/workbench/generators.py` makes: other integrators and friction laws, what the library has
     outside    the same, what the library lacks
 
@@ -32,6 +32,7 @@ from sim.effect import shipped_effect, tried_effects
 from tests.workbench.generators import KINDS, LAWS, case
 from workbench.blind.hiding import VISIBLE, hide
 from workbench.blind.trial import NOISE_M
+from workbench.select.block_errors import indistinguishable
 from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.equivalence import algebraic_class
 
@@ -135,13 +136,11 @@ def line(family: str, seed: int) -> Line:
 
 
 def _is_equivalent(found: Diagnosis, posed: Problem) -> bool:
-    """Whether what was named beside a removed effect does as well as the effect itself, in the verdict's own words."""
+    """Whether what is named as all there is does as well as the removed effect itself, by the rule for sets."""
     if found.verdict not in NAMES_ALL:
         return False
-    both = diagnose(posed.fit, posed.base, test=posed.test, effects=[*found.missing, *posed.hidden], workers=1)
-    sets = [{each.name for each in step.indistinguishable} | {step.added.name} for step in both.steps if step.added]
-    hidden = {each for name in posed.hidden for each in _same(name)}
-    return not sets if not found.missing else len(sets) == 1 and sets[0] >= {*found.missing} and bool(sets[0] & hidden)
+    itself = diagnose(posed.fit, posed.base, test=posed.test, effects=posed.hidden, workers=1)
+    return indistinguishable(itself.best.errors.all_logs, found.best.errors.all_logs)
 
 
 def _missed_m(found: Diagnosis, floor_m: float) -> float:
@@ -204,7 +203,7 @@ def _figures(family: str, lines: Sequence[Line]) -> Iterator[str]:
         same = [each.get("equivalent", False) for each in seen]
         yield share("called unexplained", unexplained)
         if any(same):
-            yield share("an equivalent, which the recording does not tell from it", same)
+            yield share("an equivalent, as good on both recordings", same)
         wrong = [not (left or alike) for left, alike in zip(unexplained, same, strict=True)]
         yield share("a wrong effect, or none, named as all there is", wrong)
         return
