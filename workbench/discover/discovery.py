@@ -163,8 +163,8 @@ def discover(
     tell = progress or (lambda _what, _done: None)
     by = sampling(parts.train.record, valve.valve)
     base = EffectSearch(parts, {}, valve.valve, seed=seed, workers=threads, progress=tell).base(valve)
-    if base.explained or parts.floor_m is None:
-        return Discovery("explained" if base.explained else "unjudged", base, (), (), (), parts, ())
+    if base.complete or parts.floor_m is None:
+        return Discovery("explained" if base.complete else "unjudged", base, (), (), (), parts, ())
     with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
         written = write_forms(FORMS, Path(folder))
         effects = {path: find_effect(path, "forms") for path in written}

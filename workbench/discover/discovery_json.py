@@ -23,7 +23,7 @@ def as_json(found: Discovery) -> dict[str, Any]:
                 "evidence": each.gain and each.gain.bic,
                 "held_out_gain": each.gain and each.gain.held_out,
                 "held_out_standard_errors": each.gain and each.gain.standard_errors,
-                "explains": each.model is not None and each.model.explained,
+                "explains": each.model is not None and each.model.complete,
                 "accepted": each.accepted,
                 "why_not": each.rejection_reason,
             }

@@ -213,7 +213,7 @@ class FormSearch:
         if not _explains(step):
             return ()
         believed = {each.name: each for each in (step.added, *step.indistinguishable) if each}
-        models = {name: each.model for name, each in believed.items() if each.model and each.model.explained}
+        models = {name: each.model for name, each in believed.items() if each.model and each.model.complete}
         best, *others = models
         fit = profiled(models[best].fit, self.split.train.recording)
         models[best] = replace(models[best], fit=fit)
@@ -245,4 +245,4 @@ def _parted(
 
 def _explains(step: EffectStep) -> bool:
     """Whether what a step would add passes the rule and leaves nothing to explain."""
-    return step.added is not None and step.added.model is not None and step.added.model.explained
+    return step.added is not None and step.added.model is not None and step.added.model.complete

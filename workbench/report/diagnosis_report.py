@@ -164,8 +164,8 @@ def _fall(diagnosis: Diagnosis, validation: _Validation) -> Html:
                 read.length(model.errors.test_block_m),
                 "–" if candidate is None or candidate.gain is None else f"{candidate.gain.bic:.4g}",
             ],
-            "" if model.explained else "something is left to explain",
-            "good" if model.explained else "",
+            "" if model.complete else "something is left to explain",
+            "good" if model.complete else "",
         )
         for name, model, candidate in stages
     ]

@@ -51,13 +51,16 @@ class EvaluatedModel(Brief):
 
     @property
     def explained(self) -> bool:
-        """Whether nothing is left but what no model explains."""
-        return self.at_floor and not self.structured and not self.stands_in
+        """Whether nothing is left in which an effect would be sought."""
+        return self.at_floor and not self.structured
 
     @property
-    def stands_in(self) -> bool:
-        """Whether slides end elsewhere, though all else is at the floor: what explains it stands in for another."""
-        return self.errors.rests is not None and self.errors.rests.beyond
+    def complete(self) -> bool:
+        """Whether it explains all, and slides end where it says: else what explains it stands in for something.
+
+        No effect is sought for that: of the library, what has more parameters would only stand in better.
+        """
+        return self.explained and not (self.errors.rests and self.errors.rests.beyond)
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -5,7 +5,8 @@ missing       these effects, and with them all is explained
               Of both, where only the bare valve by another name explains the rest: a parameter that was kept is off
 one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
 unexplained   something is missing that the library does not have; what lowered the error so far is still named.
-              Or the valve scatters so much that a tenth of the motion is left, which no model could explain
+              Or slides end elsewhere, so that what explains the rest stands in for it; or the valve scatters so much
+              that a tenth of the motion is left, which no model could explain
 unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named
 unfinished    broken off before the search was through; what was known by then is named
 untrusted     the searches disagree, and the best of them explains nothing
@@ -32,7 +33,7 @@ def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: flo
         return "unjudged"
     equivalent = by_another_name(steps)
     best = equivalent.model if equivalent and equivalent.model and equivalent.model.explained else best
-    if best.explained and not best.errors.follows(motion_std_m):
+    if best.explained and not (best.complete and best.errors.follows(motion_std_m)):
         return "unexplained"
     added = [step for step in steps if step.added]
     if best.explained and not added:
