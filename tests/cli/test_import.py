@@ -55,6 +55,7 @@ def matlab(path: Path, recording: Recording) -> None:
     savemat(path, {"time": recording.time_s, "stem": recording.position_m, "cmd": 1e-3 * recording.command_pa})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("write", "name", "mended"),
     [

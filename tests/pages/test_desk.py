@@ -109,6 +109,7 @@ def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:
     assert not any(isinstance(each, Raced) for each in told)
 
 
+@pytest.mark.long
 def test_the_notebook_run_from_top_to_bottom_comes_to_the_same(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

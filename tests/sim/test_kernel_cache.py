@@ -135,6 +135,7 @@ def test_an_edited_effect_is_another_kernel(tmp_path: Path) -> None:
     assert digests[0] == Composition.from_file(ASYMMETRIC).kernel.digest, "the same text is the same kernel"
 
 
+@pytest.mark.long
 def test_edited_physics_is_another_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = Composition.from_file(SEED).kernel.digest
     edited = tmp_path / "karnopp.py"

@@ -63,6 +63,7 @@ def test_what_is_added_by_hand_goes_on_from_the_fits_of_the_diagnosis(
     assert added.extended.cost <= there.cost
 
 
+@pytest.mark.long
 def test_the_experiment_separates_what_it_was_chosen_for(diagnosed: Diagnosis, tmp_path: Path) -> None:
     fits = [each.model.fit for each in diagnosed.candidates if each.step == 1 and each.model]
     record = diagnosed.split.test.record

@@ -145,6 +145,7 @@ def test_what_a_refit_imitates_is_not_played(fits: dict[str, Fit], recording: Re
     assert "cannot be told apart by this valve within these permissives" in found.sentence
 
 
+@pytest.mark.long
 def test_little_promised_is_played_while_moves_are_left(fits: dict[str, Fit], recording: Recording) -> None:
     """A valve that scatters: no experiment promises the odds however often it is repeated; they are played."""
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
@@ -181,6 +182,7 @@ def test_what_the_valve_does_not_play_stops_it(fits: dict[str, Fit], recording: 
     assert "vetoed" in found.sentence
 
 
+@pytest.mark.long
 def test_twins_spend_the_budget_and_nothing_is_named(fits: dict[str, Fit], recording: Recording) -> None:
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
     design = Design(2.0)

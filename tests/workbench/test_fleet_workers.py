@@ -78,6 +78,7 @@ def test_a_task_runs_since_those_before_it_at_its_worker_are_through() -> None:
     assert clocks.late(6.1) == [("here", "behind")]
 
 
+@pytest.mark.long
 @pytest.mark.patient
 def test_a_recording_that_takes_too_long_is_listed_and_tried_again(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -17,6 +17,8 @@ from workbench.blind.input_signal import excitation
 from workbench.data.motion import slips
 from workbench.data.noise_floor import repeatability_m
 
+pytestmark = pytest.mark.long
+
 PERIOD_S = 0.01
 SAME = Plant(law=SMOOTH, v_s=1e-2)
 """The law that has our valve as its limit, smoothing to zero."""

@@ -33,6 +33,7 @@ def test_where_a_sensor_rounds_a_trusted_fit_is_the_truth(seed: int) -> None:
     assert found.cost < 1.1 * least, "a stair off at most"
 
 
+@pytest.mark.long
 def test_a_quantum_finer_than_the_noise_shows_is_not_trusted_however_many_searches_agree() -> None:
     hidden = hide(52055)
     columns = {name: each[:652] for name, each in hidden.fit.columns.items()}

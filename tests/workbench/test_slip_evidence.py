@@ -215,6 +215,7 @@ def apart(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> float
     return promised(fits, told, ("preload", "asymmetric_friction"), record)
 
 
+@pytest.mark.long
 def test_a_bent_balance_promises_more_than_a_break_away(
     fits: dict[str, Fit], told: dict[str, Slips], record: Record, apart: float
 ) -> None:
@@ -223,6 +224,7 @@ def test_a_bent_balance_promises_more_than_a_break_away(
     assert promised(fits, told, ("preload", "spring_hardening"), record) > 2.0 * apart
 
 
+@pytest.mark.long
 def test_of_three_the_least_distinct_two_count(
     fits: dict[str, Fit], told: dict[str, Slips], record: Record, apart: float
 ) -> None:
