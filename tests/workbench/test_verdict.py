@@ -173,13 +173,13 @@ def test_a_residual_that_hangs_on_the_state_is_not_explained_by_reaching_the_flo
 
 def test_what_reaches_the_floor_but_not_the_rests_may_stand_in_for_something_else(parts: Split) -> None:
     reached = model_of("ip_lag")
-    elsewhere = replace(reached, errors=replace(reached.errors, rests=RestErrors(3e-5, 2e-5)))
+    elsewhere = replace(reached, errors=replace(reached.errors, rests=RestErrors(3e-5, 1e-5, FLOOR_M)))
     found = diagnosed(parts, step(POOR, ip_lag=elsewhere))
     assert elsewhere.at_floor
     assert found.verdict == "unexplained"
     assert found.sentence.endswith(
-        "Where the stem rests the model is off by 0.03 mm, besides noise; the valve's scatter and a smooth friction "
-        f"leave 0.02 mm at most: ip_lag may stand in for it.{REPEAT}"
+        "Where the stem rests the model is off by 0.03 mm, besides noise; place and direction tell all of it but "
+        f"0.01 mm: a balance of forces that it lacks, for which ip_lag may stand in.{REPEAT}"
     )
     assert as_json(found)["best"]["rests_off_m"] == 3e-5
 

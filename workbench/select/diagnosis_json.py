@@ -45,7 +45,7 @@ def _model(model: EvaluatedModel) -> dict[str, Any]:
         "at_floor": model.at_floor,
         "structure_r2": model.errors.structure,
         "rests_off_m": model.errors.rests.off_m if model.errors.rests else None,
-        "rests_may_be_off_m": model.errors.rests.allowed_m if model.errors.rests else None,
+        "rests_scatter_m": model.errors.rests.scatter_m if model.errors.rests else None,
         "parameters": parameters_json(model.fit),
     }
 

@@ -60,7 +60,7 @@ class EvaluatedModel(Brief):
 
         No effect is sought for that: of the library, what has more parameters would only stand in better.
         """
-        return self.explained and not (self.errors.rests and self.errors.rests.beyond)
+        return self.explained and not (self.errors.rests and self.errors.rests.elsewhere)
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -3,62 +3,80 @@
     e_j     mean over rest j of simulated less measured position, of n_j samples
     b       how far rests are off besides noise and rounding: median_j e_j^2 / (sigma^2 / n_j + q^2 / 12 + b^2) is
             0.455, that of chi^2 with one degree of freedom; a slip missed now and then does not move it
-    b^2 <= (1.2)^2 s^2 + (0.4 sigma)^2,    s^2 = floor^2 - (1.1 sigma)^2, at least 0: the valve's own scatter
+    b_s     the same of e_j - f(x_j, s_j), x_j where it rests, s_j direction of the slide that ended there, f a cubic in
+            x for each direction, fitted robustly (soft L1); times n / (n - 8), in squares, of n rests
 
-sigma noise of the sensor, q its quantum. Friction that is smooth where the model's is not (LuGre's) leaves up to 1.5
-floors, mostly on the way, and at rest b up to 0.3 sigma. An effect that stands in for another may leave 1.1 floors, and
-b of half a sigma and more: every slide ends somewhat elsewhere.
+    slides end elsewhere if b > 0.4 sigma and b_s^2 < 0.3 b^2
+
+sigma noise of the sensor, q its quantum. What misses rests by place and direction is a balance of forces that the model
+lacks: an effect that stands in for another may leave 1.1 floors of the whole, and yet b of half a sigma and more, of
+which place and direction tell four fifths. Friction that is smooth where the model's is not (LuGre's) leaves as much,
+and so does a valve that scatters, but by no such law.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
+from scipy.optimize import least_squares
 
 from config.noise import MEDIAN_OF_NORMAL, quantum_m
 from config.recording import Column
 from workbench.data.held_out import Part, Split
 from workbench.fit.landings import rests
 
-SMOOTH = 0.4
-"""Of the noise: as far off may rests be of a valve whose friction is smooth."""
-NO_SCATTER, SCATTER_KNOWN_TO = 1.1, 1.2
-"""Noises, up to which a floor shows no scatter of the valve; a factor."""
-FEWEST = 20
+LEAST_OFF, MOST_SCATTER = 0.4, 0.3
+"""Noises; of the square of how far rests are off."""
+DEGREE = 3
+PARAMETERS = 2 * (DEGREE + 1)
+FEWEST = 5 * PARAMETERS
+"""Rests."""
 HALVINGS = 50
 
 
 @dataclass(frozen=True, slots=True)
 class RestErrors:
-    """How far rests are off besides noise and rounding, and how far they may be, m."""
+    """How far rests are off besides noise and rounding, and how far by no law of place and direction, m."""
 
     off_m: float
-    allowed_m: float
+    scatter_m: float
+    noise_m: float
 
     @property
-    def beyond(self) -> bool:
-        """Whether rests are elsewhere than noise, scatter and a smooth friction would leave them."""
-        return self.off_m > self.allowed_m
+    def elsewhere(self) -> bool:
+        """Whether slides end elsewhere, by place and direction."""
+        return self.off_m > LEAST_OFF * self.noise_m and self.scatter_m**2 < MOST_SCATTER * self.off_m**2
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """Rests after slides: mean errors, m; the variances that noise and rounding leave them, m^2; places, m; directions;
+    each (rests,)."""
+
+    means_m: Column
+    variances: Column
+    places_m: Column
+    directions: Column
 
 
 def rest_errors(split: Split, fitted_m: Column, held_out_m: Column) -> RestErrors | None:
-    """Return how far a model is off at rest; None of too few rests, or where noise or floor are unknown.
+    """Return how far a model is off at rest; None of too few rests, or where the noise is unknown.
 
     Args:
         split: what was fitted and what was held out.
         fitted_m: simulated less measured position of what was fitted, m, (samples,); NaN where it does not count.
         held_out_m: the same of what was held out.
     """
-    parts = ((split.train, fitted_m), (split.test, held_out_m))
-    noises_m = [part.record.noise_m for part, _ in parts if part.record.noise_m is not None]
-    if split.floor_m is None or len(noises_m) < len(parts):
+    noises_m = [part.record.noise_m for part in (split.train, split.test) if part.record.noise_m is not None]
+    if len(noises_m) < 2:
         return None
-    means_m, variances = (np.concatenate(each) for each in zip(*(_means(*each) for each in parts), strict=True))
-    if means_m.size < FEWEST:
+    fitted, held_out = _missed(split.train, fitted_m), _missed(split.test, held_out_m)
+    both = Missed(*(np.concatenate([getattr(each, name) for each in (fitted, held_out)]) for name in Missed.__slots__))
+    if both.means_m.size < FEWEST:
         return None
-    noise_m = max(noises_m)
-    scatter_m2 = max(0.0, split.floor_m**2 - (NO_SCATTER * noise_m) ** 2)
-    allowed_m = float(np.hypot(SCATTER_KNOWN_TO * scatter_m2**0.5, SMOOTH * noise_m))
-    return RestErrors(off_m(means_m, variances), allowed_m)
+    scatter_m = off_m(both.means_m - by_place(both), both.variances)
+    lost = both.means_m.size / (both.means_m.size - PARAMETERS)
+    return RestErrors(off_m(both.means_m, both.variances), scatter_m * lost**0.5, max(noises_m))
 
 
 def off_m(means_m: Column, variances: Column) -> float:
@@ -73,13 +91,30 @@ def off_m(means_m: Column, variances: Column) -> float:
     return float(least**0.5)
 
 
-def _means(part: Part, error_m: Column) -> tuple[Column, Column]:
-    """Return the mean error of each rest after a slide, m, and the variance that noise and rounding leave it, m^2."""
+def by_place(missed: Missed) -> Column:
+    """Return f, how far rests are off by a cubic of their places for each direction, m, (rests,)."""
+    middle_m, half_m = 0.5 * (missed.places_m.max() + missed.places_m.min()), 0.5 * float(np.ptp(missed.places_m))
+    cubic = legvander((missed.places_m - middle_m) / half_m, DEGREE)
+    columns = np.hstack([cubic, cubic * missed.directions[:, None]])
+    scale_m = np.sqrt(missed.variances + off_m(missed.means_m, missed.variances) ** 2)
+    matrix = columns / scale_m[:, None]
+
+    def left(c: Column) -> Column:
+        return np.asarray(matrix @ c - missed.means_m / scale_m)
+
+    return np.asarray(columns @ least_squares(left, np.zeros(PARAMETERS), loss="soft_l1").x)
+
+
+def _missed(part: Part, error_m: Column) -> Missed:
     record = part.record
     assert record.noise_m is not None
     rounding = quantum_m(record.position_m[record.valid]) ** 2 / 12.0
-    landed = [error_m[each.first : each.end] for each in rests(record) if each.direction]
-    counted = [each[np.isfinite(each)] for each in landed]
-    counted = [each for each in counted if each.size]
-    means_m = np.array([float(np.mean(each)) for each in counted])
-    return means_m, np.array([record.noise_m**2 / each.size + rounding for each in counted])
+    landed = [each for each in rests(record) if each.direction and np.isfinite(error_m[each.first : each.end]).any()]
+    errors = [error_m[each.first : each.end] for each in landed]
+    counts = np.array([np.count_nonzero(np.isfinite(each)) for each in errors], np.float64)
+    return Missed(
+        means_m=np.array([float(np.nanmean(each)) for each in errors]),
+        variances=record.noise_m**2 / np.maximum(counts, 1.0) + rounding,
+        places_m=np.array([each.position_m for each in landed]),
+        directions=np.array([float(each.direction) for each in landed]),
+    )

@@ -146,12 +146,12 @@ def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
 def _elsewhere(best: EvaluatedModel, names: str, length: Scale) -> str:
     """Say that slides end elsewhere, with a leading space, where all else is at the floor."""
     rests = best.errors.rests
-    if rests is None or not rests.beyond:
+    if rests is None or not rests.elsewhere:
         return ""
-    stands_in = f": {names} may stand in for it" if names else ""
+    stands_in = f", for which {names} may stand in" if names else ""
     return (
-        f" Where the stem rests the model is off by {length.said(rests.off_m)}, besides noise; the valve's scatter and "
-        f"a smooth friction leave {length.said(rests.allowed_m)} at most{stands_in}."
+        f" Where the stem rests the model is off by {length.said(rests.off_m)}, besides noise; place and direction "
+        f"tell all of it but {length.said(rests.scatter_m)}: a balance of forces that it lacks{stands_in}."
     )
 
 
