@@ -115,7 +115,7 @@ def line(family: str, seed: int) -> Line:
         "visible": posed.visible and _missed_m(found, posed.fit_floor_m) > VISIBLE * posed.fit_floor_m,
         "verdict": found.verdict,
         "missing": list(found.missing),
-        "equivalent": family == "removed" and _is_equivalent(found, posed),
+        **({"equivalent": _is_equivalent(found, posed)} if family == "removed" else {}),
         "suspected": list(found.suspected),
         "sets": [[each.name for each in step.indistinguishable] for step in found.steps if step.added],
         "ranked": [each.name for each in found.steps[0].candidates[:3]],
