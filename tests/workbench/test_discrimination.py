@@ -193,29 +193,30 @@ def test_twins_spend_the_budget_and_nothing_is_named(fits: dict[str, Fit], recor
     assert found.odds == pytest.approx(1.0)
 
 
-@pytest.mark.long
-def test_the_command_tells_a_lag_from_a_dead_time(
-    fits: dict[str, Fit],
-    recording: Recording,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """All but the diagnosis and the wire, which have their own tests."""
+@pytest.fixture
+def words(fits: dict[str, Fit], recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """A command line; all but the diagnosis and the wire, which have their own tests."""
     rivals = [SimpleNamespace(name=name, model=SimpleNamespace(fit=each)) for name, each in fits.items()]
     steps = [SimpleNamespace(indistinguishable=rivals)]
     diagnosis = SimpleNamespace(verdict="one_of", sentence="one of two", steps=steps)
     monkeypatch.setattr("workbench.select.diagnosis.diagnose", lambda *_, **__: diagnosis)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.player_on", lambda *_: answering)
-    monkeypatch.setattr("workbench.select.experiment_design.TRIED", 4)
-    config, out = tmp_path / "site.toml", tmp_path / "told"
+    config, rec = tmp_path / "site.toml", tmp_path / "rec.csv"
     config.write_text(
         f"[valve]\nstroke_m = {BARE.valve.stroke_m}\n[pressure]\nmaximum_pa = 80e3\n"
         "[experiment]\ntravel_window = [0.0, 1.0]\nrate_limit_pa_per_s = 400e3\nlimit_s = 6.0\n"
     )
-    recording.write(tmp_path / "rec.csv")
-    words = ["discriminate", str(config), "--rec", str(tmp_path / "rec.csv"), "--valve", "seed", "--out", str(out)]
+    recording.write(rec)
+    return ["discriminate", str(config), "--rec", str(rec), "--valve", "seed", "--out", str(tmp_path / "told")]
+
+
+@pytest.mark.long
+def test_the_command_tells_a_lag_from_a_dead_time(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("workbench.select.experiment_design.TRIED", 4)
+    out = tmp_path / "told"
     assert main(words) == 0
     said = capsys.readouterr().out
     assert "resolved: ip_lag is missing" in said
@@ -226,6 +227,18 @@ def test_the_command_tells_a_lag_from_a_dead_time(
     assert 0 < verdict["moves"] <= 8
     assert len(list(out.glob("experiment-*.csv"))) == len(verdict["rounds"]) > 0
     assert set(verdict["fits"]["ip_lag"]) == {"rmse_m", "parameters"}
+
+
+def test_broken_off_it_says_that_nothing_is_named(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken_off(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("workbench.select.discrimination.discriminate", broken_off)
+    assert main(words) == 130
+    said = capsys.readouterr().err
+    assert "positioner discriminate: broken off; nothing is named; the daemon has its recordings of what was" in said
 
 
 def test_a_time_limit_that_leaves_no_room_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
