@@ -9,7 +9,7 @@ from config.recording import Column, Recording
 from workbench.blind.hiding import hide
 from workbench.data.held_out import Split, split
 from workbench.select.diagnosis import diagnose
-from workbench.select.rest_errors import RestErrors, off_m, rest_errors
+from workbench.select.rest_errors import Missed, RestErrors, by_place, off_m, rest_errors
 
 NOISE_M = 5e-5
 PERIOD_S, RESTS, SAMPLES = 0.01, 60, 30
@@ -113,6 +113,12 @@ def test_of_few_rests_nothing_is_said(parts: Split) -> None:
     hidden_m = np.where(np.arange(error_m.size) < 19 * SAMPLES, error_m, np.nan)
     assert rest_errors(parts, error_m, error_m)
     assert rest_errors(parts, hidden_m, hidden_m) is None
+
+
+def test_rests_that_are_all_at_one_place_follow_from_direction_alone() -> None:
+    means_m: Column = np.asarray(1e-5 * np.where(np.arange(60) % 2, 1.0, -1.0))
+    missed = Missed(means_m, np.full(60, 1e-12), np.full(60, 0.05), np.sign(means_m))
+    assert np.allclose(by_place(missed), means_m, atol=1e-7)
 
 
 @pytest.mark.long

@@ -93,8 +93,8 @@ def off_m(means_m: Column, variances: Column) -> float:
 
 def by_place(missed: Missed) -> Column:
     """Return f, how far rests are off by a cubic of their places for each direction, m, (rests,)."""
-    middle_m, half_m = 0.5 * (missed.places_m.max() + missed.places_m.min()), 0.5 * float(np.ptp(missed.places_m))
-    cubic = legvander((missed.places_m - middle_m) / half_m, DEGREE)
+    x = missed.places_m - 0.5 * (missed.places_m.max() + missed.places_m.min())
+    cubic = legvander(x / max(float(np.abs(x).max()), np.finfo(float).tiny), DEGREE)
     columns = np.hstack([cubic, cubic * missed.directions[:, None]])
     scale_m = np.sqrt(missed.variances + off_m(missed.means_m, missed.variances) ** 2)
     matrix = columns / scale_m[:, None]
