@@ -118,7 +118,7 @@ def test_of_few_rests_nothing_is_said(parts: Split) -> None:
 def test_rests_that_are_all_at_one_place_follow_from_direction_alone() -> None:
     means_m: Column = np.asarray(1e-5 * np.where(np.arange(60) % 2, 1.0, -1.0))
     missed = Missed(means_m, np.full(60, 1e-12), np.full(60, 0.05), np.sign(means_m))
-    assert np.allclose(by_place(missed), means_m, atol=1e-7)
+    assert np.allclose(by_place(missed, 1e-5), means_m, atol=1e-7)
 
 
 @pytest.mark.long

@@ -211,7 +211,7 @@ def discriminate(
         seed: of the designs and searches.
         workers: threads, by default one a core.
         on_round: told each round when it is weighed.
-        progress: called with what is being done, and the fraction of the budget used.
+        progress: called with what is being done, and the fraction of the budget used; 1 where a round ends.
 
     Raises:
         InputError: the recordings hold too little.

@@ -14,6 +14,7 @@ which place and direction tell four fifths. Friction that is smooth where the mo
 and so does a valve that scatters, but by no such law.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,16 +68,17 @@ def rest_errors(split: Split, fitted_m: Column, held_out_m: Column) -> RestError
         fitted_m: simulated less measured position of what was fitted, m, (samples,); NaN where it does not count.
         held_out_m: the same of what was held out.
     """
-    noises_m = [part.record.noise_m for part in (split.train, split.test) if part.record.noise_m is not None]
-    if len(noises_m) < 2:
+    train, test = split.train, split.test
+    if train.record.noise_m is None or test.record.noise_m is None:
         return None
-    fitted, held_out = _missed(split.train, fitted_m), _missed(split.test, held_out_m)
-    both = Missed(*(np.concatenate([getattr(each, name) for each in (fitted, held_out)]) for name in Missed.__slots__))
-    if both.means_m.size < FEWEST:
+    rows = [*_missed(train, fitted_m, train.record.noise_m), *_missed(test, held_out_m, test.record.noise_m)]
+    if len(rows) < FEWEST:
         return None
-    scatter_m = off_m(both.means_m - by_place(both), both.variances)
-    lost = both.means_m.size / (both.means_m.size - PARAMETERS)
-    return RestErrors(off_m(both.means_m, both.variances), scatter_m * lost**0.5, max(noises_m))
+    missed = Missed(*np.array(rows).T)
+    whole_m = off_m(missed.means_m, missed.variances)
+    scatter_m = off_m(missed.means_m - by_place(missed, whole_m), missed.variances)
+    lost = len(rows) / (len(rows) - PARAMETERS)
+    return RestErrors(whole_m, scatter_m * lost**0.5, max(train.record.noise_m, test.record.noise_m))
 
 
 def off_m(means_m: Column, variances: Column) -> float:
@@ -91,12 +93,12 @@ def off_m(means_m: Column, variances: Column) -> float:
     return float(least**0.5)
 
 
-def by_place(missed: Missed) -> Column:
-    """Return f, how far rests are off by a cubic of their places for each direction, m, (rests,)."""
+def by_place(missed: Missed, whole_m: float) -> Column:
+    """Return f, how far rests are off by a cubic of their places for each direction, m, (rests,); of b, m, in all."""
     x = missed.places_m - 0.5 * (missed.places_m.max() + missed.places_m.min())
     cubic = legvander(x / max(float(np.abs(x).max()), np.finfo(float).tiny), DEGREE)
     columns = np.hstack([cubic, cubic * missed.directions[:, None]])
-    scale_m = np.sqrt(missed.variances + off_m(missed.means_m, missed.variances) ** 2)
+    scale_m = np.sqrt(missed.variances + whole_m**2)
     matrix = columns / scale_m[:, None]
 
     def left(c: Column) -> Column:
@@ -105,16 +107,13 @@ def by_place(missed: Missed) -> Column:
     return np.asarray(columns @ least_squares(left, np.zeros(PARAMETERS), loss="soft_l1").x)
 
 
-def _missed(part: Part, error_m: Column) -> Missed:
+def _missed(part: Part, error_m: Column, noise_m: float) -> Iterator[tuple[float, float, float, float]]:
+    """Yield the row of `Missed` of each rest after a slide in which samples count."""
     record = part.record
-    assert record.noise_m is not None
     rounding = quantum_m(record.position_m[record.valid]) ** 2 / 12.0
-    landed = [each for each in rests(record) if each.direction and np.isfinite(error_m[each.first : each.end]).any()]
-    errors = [error_m[each.first : each.end] for each in landed]
-    counts = np.array([np.count_nonzero(np.isfinite(each)) for each in errors], np.float64)
-    return Missed(
-        means_m=np.array([float(np.nanmean(each)) for each in errors]),
-        variances=record.noise_m**2 / np.maximum(counts, 1.0) + rounding,
-        places_m=np.array([each.position_m for each in landed]),
-        directions=np.array([float(each.direction) for each in landed]),
-    )
+    for each in rests(record):
+        counted_m = error_m[each.first : each.end]
+        counted_m = counted_m[np.isfinite(counted_m)]
+        if each.direction and counted_m.size:
+            variance = noise_m**2 / counted_m.size + rounding
+            yield float(np.mean(counted_m)), variance, each.position_m, float(each.direction)
