@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from config.recording import Recording
 from config.results.result import Brief
 from sim.composition import Composition
-from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
+from workbench.data.noise_floor import with_noise
 from workbench.data.record import Record, ready
 from workbench.fit.descent import descended_through
 from workbench.fit.fit_result import Fit
@@ -147,12 +147,14 @@ def _answers(
 ) -> Iterator[tuple[Fit, Record]]:
     for truth in fits:
         composition = Composition.from_file(truth.valve)
-        response = respond(composition, composition.theta, command_pa[:-1], np.diff(time_s), step_s=FINE_STEP_S)
+        periods_s = np.diff(time_s)
+        step_s = min(float(periods_s.max()), composition.step_s)
+        response = respond(composition, composition.theta, command_pa[:-1], periods_s, step_s=step_s)
         noise = noise_m * np.random.default_rng(seed).standard_normal(time_s.size)
         columns = {"time_s": time_s, "command_pa": command_pa, "position_m": response.indicated_m + noise}
         # The first hold brings the valve from rest to where the input begins: a free run starts after it.
         settled = time_s >= REST_S
-        yield truth, ready(Recording({name: column[settled] for name, column in columns.items()}))
+        yield truth, ready(with_noise(Recording({name: column[settled] for name, column in columns.items()}), noise_m))
 
 
 def _left(answer: Record, rival: Fit) -> float:

@@ -32,9 +32,9 @@ from config.errors import InputError
 from config.recording import Recording
 from config.results.result import Brief
 from sim.composition import AREA, SPRING, Composition
-from sim.effect import FINE_STEP_S
 from sim.karnopp import Vector
 from sim.open_loop import respond
+from workbench.data.noise_floor import with_noise
 from workbench.data.record import Record, ready
 from workbench.fit.descent import descended_through
 from workbench.fit.fit_result import Fit
@@ -321,8 +321,8 @@ class Rivalry:
         generator = np.random.default_rng([self._seed, draw])
         time_s, command_pa = course.sampled(period_s)
         noise_pa = noise * self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
-        periods_s = np.diff(time_s)
-        response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, periods_s, step_s=FINE_STEP_S)
+        step_s = min(period_s, composition.step_s)
+        response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, period_s, step_s=step_s)
         # The first hold brings the valve from rest to where the course begins: a free run starts after it.
         settled = time_s >= REST_S
         position_m = response.indicated_m[settled]
@@ -330,7 +330,7 @@ class Rivalry:
             return None
         sensed_m = position_m + self._record.scale_m * generator.standard_normal(position_m.size)
         columns = {"time_s": time_s[settled], "command_pa": command_pa[settled], "position_m": sensed_m}
-        return replace(ready(Recording(columns)), noise_m=self._record.scale_m)
+        return ready(with_noise(Recording(columns), self._record.scale_m))
 
     def _noise_pa(self, i: int) -> float:
         theta = self._compositions[i].theta
