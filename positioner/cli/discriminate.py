@@ -1,6 +1,7 @@
 """`positioner discriminate`: where a diagnosis ends `one_of`, experiments on the running valve tell rivals apart."""
 
 import argparse
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,13 +9,13 @@ from positioner.cli.parts.output_files import make_folder, write_json
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
-    from workbench.select.discrimination import Discrimination, Round
-    from workbench.select.experiment_design import Bounds
+    from workbench.select.discrimination import Played, Player, Round
+    from workbench.select.experiment_design import Bounds, DesignedExperiment
 
 HELP = "diagnose, then play experiments on the valve until the rivals are told apart (moves it: state S3)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
 
-BROKEN_OFF = "nothing is named; the daemon has its recordings of what was played"
+BROKEN_OFF = "nothing is named; what was played is in"
 WINDOW_MARGIN = 0.03
 """Of the stroke: a design keeps so far inside the travel window, as it knows the stem by its models only."""
 
@@ -71,11 +72,11 @@ def run(arguments: argparse.Namespace) -> int:
         print("no rivals to be told apart; nothing was played")
         return 0 if found.verdict in ("adequate", "missing") else 1
     effects = [find_effect(name, "effects") for name in arguments.effects or tried_effects()]
-    with told_when_broken_off("discriminate", lambda: BROKEN_OFF), Progress() as progress:
+    with told_when_broken_off("discriminate", lambda: f"{BROKEN_OFF} {arguments.out}"), Progress() as progress:
         told = discriminate(
             fits,
             [*recordings, test] if test else recordings,
-            player_on(file, arguments),
+            _kept(player_on(file, arguments), arguments.out),
             bounds,
             {each.written: each for each in effects},
             budget=arguments.budget,
@@ -83,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
             on_round=_tell,
             progress=progress,
         )
-    _write(told, arguments.out)
+    write_json(arguments.out / "verdict.json", told.as_json(), indent=1)
     print(told.summary())
     return 0 if told.outcome in ("resolved", "one_class") else 1
 
@@ -122,7 +123,14 @@ def _tell(each: "Round") -> None:
     print(f"{each.moves} moves: {each.name}, separation {each.separation:.3g}; odds {odds}", flush=True)
 
 
-def _write(told: "Discrimination", folder: Path) -> None:
-    for number, recording in enumerate(told.recordings, start=1):
-        recording.write(folder / f"experiment-{number}.csv")
-    write_json(folder / "verdict.json", told.as_json(), indent=1)
+def _kept(player: "Player", folder: Path) -> "Player":
+    """Return it so that each recording is written before anything is made of it, whatever becomes of the rest."""
+    numbers = count(1)
+
+    def play(chosen: "DesignedExperiment") -> "Played":
+        played = player(chosen)
+        if played.recording is not None:
+            played.recording.write(folder / f"experiment-{next(numbers)}.csv")
+        return played
+
+    return play

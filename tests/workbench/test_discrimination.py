@@ -19,10 +19,10 @@ from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.select.discrimination import Played, discriminate
+from workbench.select.discrimination import Played, Player, discriminate
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg
-from workbench.select.rival_race import RivalRace, Weighed, log_odds
+from workbench.select.rival_race import RivalRace, Weighed, _independent_share, log_odds
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))
@@ -49,38 +49,51 @@ def weighed(one: Fit, cost: float, logs: Sequence[float], share: float = 1.0, co
 
 
 def apart(size: float) -> list[float]:
-    """Return block errors that differ from none by so much, with some scatter."""
+    """Return errors, slip by slip, that differ from none by so much, with some scatter."""
     return [size * (1.0 + 0.1 * (-1.0) ** i) for i in range(20)]
 
 
 def test_log_odds_by_hand(fits: dict[str, Fit]) -> None:
     one = fits["ip_lag"]
     best = weighed(one, 500.0, [0.0] * 20)
-    assert log_odds(best, weighed(one, 550.0, apart(0.05))) == pytest.approx(500.0 * log(1.1))
+    assert log_odds(best, weighed(one, 550.0, apart(0.15))) == pytest.approx(500.0 * log(1.1))
 
 
 def test_what_hangs_together_counts_once(fits: dict[str, Fit]) -> None:
     one = fits["ip_lag"]
     best = weighed(one, 500.0, [0.0] * 20, share=0.01)
-    assert log_odds(best, weighed(one, 550.0, apart(0.05))) == pytest.approx(5.0 * log(1.1))
+    assert log_odds(best, weighed(one, 550.0, apart(0.15))) == pytest.approx(5.0 * log(1.1))
 
 
 def test_a_parameter_more_costs_the_rival_evidence(fits: dict[str, Fit]) -> None:
     one = fits["ip_lag"]
     more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})
-    best, rival = weighed(one, 500.0, [0.0] * 20), weighed(more, 550.0, apart(0.05))
+    best, rival = weighed(one, 500.0, [0.0] * 20), weighed(more, 550.0, apart(0.15))
     assert log_odds(best, rival) == pytest.approx(500.0 * log(1.1) + 0.5 * log(1000.0))
 
 
-def test_one_second_that_went_wrong_gives_no_odds(fits: dict[str, Fit]) -> None:
+def test_one_slip_that_went_wrong_gives_no_odds(fits: dict[str, Fit]) -> None:
     one = fits["ip_lag"]
     best = weighed(one, 500.0, [0.0] * 20)
     assert log_odds(best, weighed(one, 900.0, [3.0] + [0.0] * 19)) < 1.0
 
 
+def test_slips_that_hardly_agree_say_hardly_more_than_chance(fits: dict[str, Fit]) -> None:
+    one = fits["ip_lag"]
+    best = weighed(one, 500.0, [0.0] * 25)
+    one_deviation_in_five = [0.1 + 0.5 * (-1.0) ** i for i in range(24)] + [0.1]
+    assert log_odds(best, weighed(one, 550.0, one_deviation_in_five)) == pytest.approx(0.5, rel=0.1)
+
+
+def test_what_a_slip_has_spoilt_counts_once_however_long_it_lasts() -> None:
+    parts = [np.full(100, 1.0) for _ in range(9)] + [np.full(2000, 100.0)]
+    assert _independent_share(parts) * 2900 < 5.0
+    assert _independent_share([np.array([1.0, 100.0])] * 1450) == 1.0
+
+
 def test_a_better_rival_is_not_spoken_against(fits: dict[str, Fit]) -> None:
     one = fits["ip_lag"]
-    assert log_odds(weighed(one, 500.0, [0.0] * 20), weighed(one, 400.0, apart(-0.05))) == 0.0
+    assert log_odds(weighed(one, 500.0, [0.0] * 20), weighed(one, 400.0, apart(-0.15))) == 0.0
 
 
 def test_the_moves_of_a_course_are_the_times_its_command_sets_out() -> None:
@@ -224,21 +237,26 @@ def test_the_command_tells_a_lag_from_a_dead_time(
     verdict = json.loads((out / "verdict.json").read_text())
     assert (verdict["outcome"], verdict["named"]) == ("resolved", ["ip_lag"])
     assert verdict["odds"] is None or verdict["odds"] >= 100.0
-    assert 0 < verdict["moves"] <= 8
+    assert 0 < verdict["moves"] <= 12
     assert len(list(out.glob("experiment-*.csv"))) == len(verdict["rounds"]) > 0
     assert set(verdict["fits"]["ip_lag"]) == {"rmse_m", "parameters"}
 
 
-def test_broken_off_it_says_that_nothing_is_named(
-    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_broken_off_it_says_that_nothing_is_named_and_keeps_what_was_played(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken_off(*_: object, **__: object) -> None:
+    def broken_off(_fits: object, _recordings: object, player: Player, *_: object, **__: object) -> None:
+        player(DesignedExperiment(COURSE, 1.0))
         raise KeyboardInterrupt
 
     monkeypatch.setattr("workbench.select.discrimination.discriminate", broken_off)
     assert main(words) == 130
+    told = tmp_path / "told"
     said = capsys.readouterr().err
-    assert "positioner discriminate: broken off; nothing is named; the daemon has its recordings of what was" in said
+    assert f"positioner discriminate: broken off; nothing is named; what was played is in {told}" in said
+    kept = Recording.read(told / "experiment-1.csv")
+    assert kept.time_s[-1] == pytest.approx(COURSE.duration_s, abs=3.0)
+    assert not (told / "verdict.json").exists()
 
 
 def test_a_time_limit_that_leaves_no_room_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from config.recording import Recording
 from config.slave_file import Sensor
 from config.valve_file import ValveFile
 from sim.composition import Composition
+from sim.karnopp import Vector
 from tests.workbench.valves import PERIOD_S, drawn_valve, pressures, with_effect
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
@@ -140,10 +141,14 @@ def test_likelihoods_are_students() -> None:
     )
 
 
+def alike(each: float, count: int) -> Vector:
+    """Return so many that say nearly the same."""
+    return np.array([each * (1.0 + 0.1 * (-1.0) ** i) for i in range(count)])
+
+
 def weighed(one: Fit, cost: float, apart: float, log_likelihood: float | None) -> Weighed:
-    told = None if log_likelihood is None else Slips(log_likelihood, 100)
-    logs = np.array([apart * (1.0 + 0.1 * (-1.0) ** i) for i in range(20)])
-    return Weighed(replace(one, cost=cost, count=1000), logs, 1.0, told)
+    told = None if log_likelihood is None else Slips(log_likelihood, 100, logs=alike(log_likelihood / 100.0, 100))
+    return Weighed(replace(one, cost=cost, count=1000), alike(apart, 20), 1.0, told)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +160,7 @@ def test_the_stronger_counts_unless_they_disagree(
     fits: dict[str, Fit], log_likelihood: float | None, expected: float
 ) -> None:
     best = weighed(fits["preload"], 500.0, 0.0, 0.0)
-    rival = weighed(fits["preload"], 550.0, 0.05, log_likelihood)
+    rival = weighed(fits["preload"], 550.0, 0.15, log_likelihood)
     by_run = log_odds(best, rival)
     assert by_run == pytest.approx(500.0 * np.log(1.1))
     assert evidence(best, rival) == pytest.approx(by_run + expected)
@@ -194,7 +199,18 @@ def test_what_luck_has_won_it_may_have_lost(fits: dict[str, Fit]) -> None:
 def test_a_parameter_more_is_paid_for(fits: dict[str, Fit]) -> None:
     one = fits["preload"]
     more = replace(one, parameters={**one.parameters, "another": next(iter(one.parameters.values()))})
-    assert slip_odds(weighed(one, 500.0, 0.0, 7.0), weighed(more, 500.0, 0.0, 7.0)) == pytest.approx(0.5 * np.log(100))
+    assert slip_odds(weighed(one, 500.0, 0.0, 9.0), weighed(more, 500.0, 0.0, 7.0)) == pytest.approx(
+        2.0 + 0.5 * np.log(100)
+    )
+
+
+def test_slips_say_no_more_than_they_agree(fits: dict[str, Fit]) -> None:
+    """By Vuong: of 100 slips that differ by 0.3 +- 1 the sum is 30, three standard errors from nothing."""
+    one = weighed(fits["preload"], 500.0, 0.0, 0.0)
+    told = 0.3 + np.array([(-1.0) ** i for i in range(100)])
+    other = replace(one, slips=Slips(float(-told.sum()), 100, logs=-told))
+    assert slip_odds(one, other) == pytest.approx(4.5)
+    assert slip_odds(other, one) == pytest.approx(-4.5)
 
 
 def promised(

@@ -1,13 +1,13 @@
 """Rivals weighed against each other in all recordings so far.
 
     lambda_i = n/2 log(C_i / C) + (k_i - k)/2 log n     log odds of the best against rival i; C cost, k parameters
-    n = N var(c) / (m var(mean of c in a block))        independent ones of N samples: c loss of the best, sample by
-                                                        sample, m samples in a stretch of 2 s
+    n = N^2 var(c) / sum_s (sum of c - mean c in s)^2   independent ones of N samples: c loss of the best, sample by
+                                                        sample, s a slip and the rest that follows
     odds of the best = 1 / sum exp(-lambda_i)           against all the others together
 
-So the noise is what the best itself scatters by: where break-away jitters, its errors come in stretches, each of which
-counts once. Besides, lambda_i is at most z_i^2 / 2 as long as the errors of the two, second by second, differ by less
-than z_i = 2 standard errors (`block_errors`), as they must for a diagnosis to tell them apart.
+So the noise is what the best itself scatters by: where break-away jitters, a slip that luck has mistimed spoils all
+until the next, however long that is, and counts once. Besides, lambda_i is at most z_i^2 / 2, where the errors of the
+two, slip by slip, differ by z_i standard errors (`block_errors`).
 
 Where the best leaves nothing but the sensor's noise in any of B stretches, luck has mistimed no slip of it, and every
 stretch tells what it tells; but a mistimed slip, which spoils two of them at most, no more than an accident that has
@@ -19,17 +19,21 @@ What slips say (`slip_evidence`) is weighed beside the run: where both speak for
 they come from the same samples; where they disagree the one takes from the other.
 
     lambda = the stronger of lambda_run and lambda_slips, or their sum if they disagree
-    lambda_slips = l - l_i + (k_i - k)/2 log N_slips
+    lambda_slips = l - l_i + (k_i - k)/2 log N_slips, at most z^2 / 2      z = sum d / sqrt(N_slips var d)
+
+d is the difference from slip to slip, z Vuong's statistic: no rival is the very valve, and what many slips make of a
+small misfit that both have must not name one. Slips say nothing of a rival whose landings its own balance does not
+tell, as those on a stop, which holds the stem in friction's place.
 
 Nothing is named by a search that failed: rivals that have lost are searched anew from many starts before the best one
 is named, and the best must explain the experiments as well as a model can.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
-from math import exp, inf, log
+from math import copysign, exp, inf, log
 from typing import Any, Literal
 
 import numpy as np
@@ -43,6 +47,7 @@ from workbench.data.record import ready, require_few_samples, require_fittable
 from workbench.fit.descent import MIDDLING, descended, settled
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
+from workbench.fit.landings import rests
 from workbench.fit.objective import FINAL, SimulationError, softs
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
@@ -50,7 +55,6 @@ from workbench.model.parameters import free_parameters
 from workbench.select.block_errors import (
     NEGLIGIBLE,
     RARELY_OFF,
-    SAME_STANDARD_ERRORS,
     block_logs,
     relative_error_reduction,
 )
@@ -63,13 +67,16 @@ ODDS = 100.0
 """Of the best against all others, that name it."""
 EXPLAINED = (0.5, 0.75)
 """Quantiles of the blocks' errors."""
+UNTOLD = 0.5
+"""Of Coulomb friction: a scatter of its own landings beyond which slips say nothing of a rival."""
+TINY = np.finfo(float).tiny
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
 
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A rival in all recordings so far: its fit, log rms of its error by blocks, what is independent, its slips."""
+    """A rival in all recordings so far: its fit, log rms of its error slip by slip, what is independent, its slips."""
 
     fit: Fit
     logs: Vector
@@ -86,13 +93,12 @@ def log_odds(best: Weighed, rival: Weighed) -> float:
     n = best.share * best.fit.count
     price = 0.5 * (len(rival.fit.parameters) - len(best.fit.parameters)) * log(max(n, 1.0))
     if best.steady:
-        told = 0.5 * n * (rival.stretches - best.stretches) / max(best.stretches.sum(), np.finfo(float).tiny)
+        told = 0.5 * n * (rival.stretches - best.stretches) / max(best.stretches.sum(), TINY)
         most = 0.5 * log(1.0 + told.size)
         return max(0.0, float(np.clip(told, -most, most).sum()) + price)
-    ratio = log(max(rival.fit.cost, np.finfo(float).tiny) / max(best.fit.cost, np.finfo(float).tiny))
-    by_cost = 0.5 * n * ratio + price
+    ratio = log(max(rival.fit.cost, TINY) / max(best.fit.cost, TINY))
     _, z = relative_error_reduction(rival.logs, best.logs)
-    return max(0.0, by_cost if z >= SAME_STANDARD_ERRORS else min(by_cost, 0.5 * max(0.0, z) ** 2))
+    return max(0.0, min(0.5 * n * ratio + price, 0.5 * max(0.0, z) ** 2))
 
 
 def slip_odds(one: Weighed, other: Weighed) -> float:
@@ -100,7 +106,10 @@ def slip_odds(one: Weighed, other: Weighed) -> float:
     if one.slips is None or other.slips is None:
         return 0.0
     price = 0.5 * (len(other.fit.parameters) - len(one.fit.parameters)) * log(one.slips.count)
-    return one.slips.log_likelihood - other.slips.log_likelihood + price
+    told = one.slips.log_likelihood - other.slips.log_likelihood + price
+    d = one.slips.logs - other.slips.logs
+    z = float(d.sum() / max(d.size**0.5 * float(np.std(d)), TINY))
+    return copysign(min(abs(told), 0.5 * z**2), told) if z * told > 0.0 else 0.0
 
 
 def evidence(one: Weighed, other: Weighed) -> float:
@@ -130,7 +139,7 @@ class RivalRace:
         self._seed = seed
         self._workers = workers
         self.fits = dict(fits)
-        self._sigma_m = self.record.scale_m or np.finfo(float).tiny
+        self._sigma_m = self.record.scale_m or TINY
 
     @property
     def _first_rows(self) -> list[int]:
@@ -139,9 +148,12 @@ class RivalRace:
     @cached_property
     def _all(self) -> dict[str, Weighed]:
         fits = list(self.fits.values())
-        needed = on_threads(lambda each: needed_n(each, self.record, self._first_rows), fits, self._workers)
-        least_n = max(needed)
-        weighed = on_threads(lambda each: self._weighed(each, least_n), fits, self._workers)
+        needed = list(on_threads(lambda each: needed_n(each, self.record, self._first_rows), fits, self._workers))
+        told = [need_n <= UNTOLD * each.valve.valve.coulomb_n for need_n, each in zip(needed, fits, strict=True)]
+        least_n = max((need_n for need_n, tells in zip(needed, told, strict=True) if tells), default=0.0)
+        weighed = on_threads(
+            lambda i: self._weighed(fits[i], least_n if told[i] else None), range(len(fits)), self._workers
+        )
         return dict(zip(self.fits, weighed, strict=True))
 
     @cached_property
@@ -283,18 +295,25 @@ class RivalRace:
         position_m = FreeRun(composition, self.record).position_m(composition.theta)
         return np.where(self.record.valid, position_m - self.record.position_m, np.nan)
 
-    def _weighed(self, found: Fit, least_n: float) -> Weighed:
+    @cached_property
+    def _parts(self) -> list[slice]:
+        """The record, cut where a recording begins and where the stem leaves a rest."""
+        leaves = {each.leaves for each in rests(self.record)}
+        cuts = sorted({*self._first_rows, *leaves, len(self.record.time_s)})
+        return [slice(*each) for each in pairwise(cuts)]
+
+    def _weighed(self, found: Fit, least_n: float | None) -> Weighed:
         error_m = self._error_m(found)
         negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
-        parts = np.array([*self._first_rows, len(self.record.time_s)])
-        logs = [block_logs(self.record.time_s[a:b], error_m[a:b], negligible_m) for a, b in pairwise(parts.tolist())]
         cost = softs(error_m / self._sigma_m, FINAL)
-        stretches = [part for a, b in pairwise(parts.tolist()) for part in _stretches(cost[a:b], self.record.period_s)]
+        recordings = [slice(*each) for each in pairwise([*self._first_rows, len(self.record.time_s)])]
+        stretches = [part for each in recordings for part in _stretches(cost[each], self.record.period_s)]
+        by_slips = [part for each in self._parts if np.isfinite(part := error_m[each]).any()]
         return Weighed(
             found,
-            np.concatenate(logs),
-            _independent_share(cost, self.record.period_s),
-            slips(found, self.record, self._first_rows, least_n),
+            np.log([np.hypot(np.sqrt(np.nanmean(part**2)), negligible_m) for part in by_slips]),
+            _independent_share([cost[each] for each in self._parts]),
+            None if least_n is None else slips(found, self.record, self._first_rows, least_n),
             np.array([np.nansum(each) for each in stretches]),
             steady=self.record.noise_m is not None
             and all(self._is_noise(each) for each in _stretches(error_m, self.record.period_s)),
@@ -310,15 +329,14 @@ def _stretches(each: Vector, period_s: float) -> list[Vector]:
     return np.split(each, range(size, each.size // size * size, size)) if each.size >= size else [each]
 
 
-def _independent_share(cost: Vector, period_s: float) -> float:
-    """Return n / N of the losses, sample by sample."""
-    cost = cost[np.isfinite(cost)]
-    size = max(1, round(STRETCH_S / period_s))
-    blocks = cost[: cost.size // size * size].reshape(-1, size)
-    spread = size * float(np.var(blocks.mean(axis=1)))
-    return min(1.0, float(np.var(cost)) / spread) if spread > 0.0 else 1.0
+def _independent_share(parts: Sequence[Vector]) -> float:
+    """Return n / N of the losses, sample by sample, in parts that tell nothing of each other."""
+    counted = [part[np.isfinite(part)] for part in parts]
+    cost = np.concatenate(counted)
+    spread = sum(float(np.sum(part - cost.mean())) ** 2 for part in counted)
+    return min(1.0, cost.size * float(np.var(cost)) / spread) if spread > 0.0 else 1.0
 
 
 def _criterion(found: Fit) -> float:
     n = found.count
-    return n * log(max(found.cost, np.finfo(float).tiny)) + len(found.parameters) * log(n)
+    return n * log(max(found.cost, TINY)) + len(found.parameters) * log(n)

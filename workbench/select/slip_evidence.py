@@ -17,7 +17,7 @@ where its static balance says needs S_c to be so large that it does; rivals are 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import lgamma, log, nan, pi
 from typing import NamedTuple
 
@@ -65,6 +65,8 @@ class Slips:
     """S_c."""
     static_n: float = nan
     """S_s."""
+    logs: Vector = field(default_factory=lambda: np.empty(0))
+    """Of that, what each landing and each break-away says, (slips,); the distance from the fit is not among it."""
 
 
 def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_n: float = LEAST_N) -> Slips | None:
@@ -84,7 +86,8 @@ def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_n: float = 
     begin[-2] = max(begin[-2], scatter[0][0])
     bounds = [*[(None, None)] * (begin.size - 2), *scatter]
     found = minimize(forces.loss_and_slope, begin, jac=True, method="L-BFGS-B", bounds=bounds)
-    return Slips(-float(found.fun), forces.count, *np.exp(found.x[-2:]).tolist())
+    coulomb_n, static_n = np.exp(found.x[-2:]).tolist()
+    return Slips(-float(found.fun), forces.count, coulomb_n, static_n, forces.logs(found.x))
 
 
 def needed_n(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
@@ -154,19 +157,12 @@ class SlipForces:
         The forces are followed over the parameters by differences, all else by hand: it is cheap, and there are two
         offsets more for each recording.
         """
-        free, recordings = len(self._free), self._recordings
-        z = self.fitted.copy()
-        z[self._free] += HELD * u[:free]
-        z = np.clip(z, self.error.lower, self.error.upper)
-        left = self.left(z)
+        z, left = self._there(u)
         coulomb_n, static_n = np.exp(u[-2:])
-        d_n = BETWEEN * coulomb_n * u[free : free + recordings][self._landed_in]
-        g_n = BETWEEN * static_n * u[free + recordings : -2][self._broke_in]
-        scale_n = np.hypot(coulomb_n, self.own_n)
-        off = (left.e_n - d_n) / scale_n
-        lower, upper = (left.lower_n - g_n) / static_n - PADDING, (left.upper_n - g_n) / static_n + PADDING
-        broke = _log_between(lower, upper)
-        value = _log_density(off).sum() + np.log(left.slope_n_per_m / scale_n).sum() + broke.sum()
+        d_n, _ = self._offsets_n(u)
+        scale_n, off, lower, upper = self._in_scatters(u, left)
+        landed, broke = _landed(off, left.slope_n_per_m / scale_n), _log_between(lower, upper)
+        value = landed.sum() + broke.sum()
 
         by_off = -(FREEDOM + 1.0) * off / (FREEDOM + off**2)
         by_lower, by_upper = -np.exp(_log_density(lower) - broke), np.exp(_log_density(upper) - broke)
@@ -184,6 +180,33 @@ class SlipForces:
         )
         slope[:-2] -= u[:-2]
         return float(0.5 * (u[:-2] @ u[:-2]) - value), -slope
+
+    def logs(self, u: Vector) -> Vector:
+        """Return what each landing and each break-away adds to l, (slips,)."""
+        _, left = self._there(u)
+        scale_n, off, lower, upper = self._in_scatters(u, left)
+        return np.concatenate([_landed(off, left.slope_n_per_m / scale_n), _log_between(lower, upper)])
+
+    def _there(self, u: Vector) -> tuple[Vector, "Left"]:
+        """Return the coordinates at u, and what is left of the balances there."""
+        z = self.fitted.copy()
+        z[self._free] += HELD * u[: len(self._free)]
+        z = np.clip(z, self.error.lower, self.error.upper)
+        return z, self.left(z)
+
+    def _offsets_n(self, u: Vector) -> tuple[Vector, Vector]:
+        """Return d_r of each landing and g_r of each break-away, N."""
+        d, g = np.split(u[len(self._free) : -2], 2)
+        coulomb_n, static_n = np.exp(u[-2:])
+        return BETWEEN * coulomb_n * d[self._landed_in], BETWEEN * static_n * g[self._broke_in]
+
+    def _in_scatters(self, u: Vector, left: "Left") -> tuple[Vector, Vector, Vector, Vector]:
+        """Return S_j, N, and in scatters: each e_j - d_r, and the bounds of each F_s,k - F_s - g_r."""
+        coulomb_n, static_n = np.exp(u[-2:])
+        d_n, g_n = self._offsets_n(u)
+        scale_n = np.hypot(coulomb_n, self.own_n)
+        lower, upper = (left.lower_n - g_n) / static_n - PADDING, (left.upper_n - g_n) / static_n + PADDING
+        return scale_n, (left.e_n - d_n) / scale_n, lower, upper
 
     def moved(self, z: Vector, left: "Left") -> Iterator["Left"]:
         """Yield the forces' slopes over each free coordinate, in steps of u; flat beyond a bound."""
@@ -205,6 +228,11 @@ class SlipForces:
         bounds_n = [self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke)]
         e_n = self._way * self.landings.balance_n(theta, self._landed)
         return Left(e_n, slope_n_per_m, np.minimum(*bounds_n), np.maximum(*bounds_n))
+
+
+def _landed(off: Vector, per_m: Vector) -> Vector:
+    """Return the log density of each landing, off by so many scatters, a scatter being 1 / per_m long."""
+    return np.asarray(_log_density(off) + np.log(per_m))
 
 
 def _log_density(off: Vector) -> Vector:

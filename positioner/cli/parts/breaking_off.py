@@ -1,4 +1,4 @@
-"""Ctrl-C during long work: how far it came is said. Nothing has been written by then: files come after the work."""
+"""Ctrl-C during long work: how far it came is said. No file of results is written by then, only what was measured."""
 
 import sys
 from collections.abc import Callable, Iterator
