@@ -17,7 +17,7 @@ import argparse
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,13 @@ WHOLE = 1000
 
 
 def menu(
-    race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+    race: RivalRace,
+    bounds: Bounds,
+    *,
+    seed: int,
+    most_moves: int,
+    workers: int | None,
+    without: Collection[str] = (),  # noqa: ARG001 -- what told nothing comes again: a diagnosis knows of no round before
 ) -> DesignedExperiment | None:
     """Choose the whole input of the menu as a diagnosis does; there are no shorter ones."""
     if most_moves in (FEW_MOVES, MOST_MOVES):

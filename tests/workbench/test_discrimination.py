@@ -1,11 +1,12 @@
 """The odds on hand-made fits, the rounds with a scripted designer and player, and one whole journey in virtual time."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import log
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,11 +133,20 @@ class Design:
         self.separation = separation
         self.course, self.otherwise = course, otherwise or course
         self.asked: list[int] = []
+        self.left_out: list[frozenset[str]] = []
 
     def __call__(
-        self, race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+        self,
+        race: RivalRace,
+        bounds: Bounds,
+        *,
+        seed: int,
+        most_moves: int,
+        workers: int | None,
+        without: Collection[str] = (),
     ) -> DesignedExperiment | None:
         self.asked.append(most_moves)
+        self.left_out.append(frozenset(without))
         return DesignedExperiment(self.course if most_moves <= MOST_MOVES else self.otherwise, self.separation)
 
 
@@ -164,6 +174,30 @@ def test_little_promised_is_played_while_moves_are_left(fits: dict[str, Fit], re
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
     found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=Design(1.002), budget=4)
     assert (found.outcome, found.moves) == ("budget_spent", 4)
+
+
+def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit], recording: Recording) -> None:
+    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
+    design = Design(2.0)
+    found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
+    assert (found.outcome, found.moves) == ("budget_spent", 4)
+    asked = {len(design.left_out[0]), len(design.left_out[-1])}
+    assert asked == {0, 1}, "the first one is left out of what is chosen next"
+
+
+def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], recording: Recording) -> None:
+    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
+
+    class Once(Design):
+        def __call__(self, *given: Any, without: Collection[str] = (), **how: Any) -> DesignedExperiment | None:
+            chosen = super().__call__(*given, without=without, **how)
+            return None if without else chosen
+
+    design = Once(2.0)
+    found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
+    assert (found.outcome, found.moves) == ("budget_spent", 4)
+    assert frozenset({COURSE.name}) in design.left_out
+    assert design.left_out[-1] == frozenset()
 
 
 def test_whole_inputs_are_weighed_against_short_ones(fits: dict[str, Fit], recording: Recording) -> None:

@@ -218,7 +218,7 @@ def promised(
 ) -> float:
     low_pa, high_pa = float(record.command_pa.min()), float(record.command_pa.max())
     bounds = Bounds(low_pa, high_pa, 400e3, 26.0, -0.1 * window_m, window_m)
-    found = promised_by_slips([(fits[name], told[name]) for name in names], record, [0, ROWS], bounds, 4, 0)
+    found = promised_by_slips([(fits[name], told[name]) for name in names], record, [0, ROWS], bounds, most=4, seed=0)
     return 0.0 if found is None else found[1]
 
 

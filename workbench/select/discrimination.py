@@ -11,9 +11,9 @@ How they are weighed stands in `rival_race`. Members of one class by algebra (`e
 experiment is played for them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, log
+from math import exp, inf, log
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -38,7 +38,7 @@ BUDGET = 60
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
 IMITATED, NOTHING = 1.001, 0.5
-"""A separation below it is none; log odds that all moves left together must promise."""
+"""A separation below it is none; log odds that all moves left together must promise, and one experiment must change."""
 
 Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
 
@@ -59,18 +59,32 @@ class Designer(Protocol):
     """Chooses the next experiment."""
 
     def __call__(
-        self, race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+        self,
+        race: RivalRace,
+        bounds: Bounds,
+        *,
+        seed: int,
+        most_moves: int,
+        workers: int | None,
+        without: Collection[str] = (),
     ) -> DesignedExperiment | None:
-        """Return it; None if none is allowed."""
+        """Return it, of another name than those; None if none is allowed."""
         ...
 
 
 def by_run_or_slips(
-    race: RivalRace, bounds: Bounds, *, seed: int, most_moves: int, workers: int | None
+    race: RivalRace,
+    bounds: Bounds,
+    *,
+    seed: int,
+    most_moves: int,
+    workers: int | None,
+    without: Collection[str] = (),
 ) -> DesignedExperiment | None:
     """Return the experiment that its run or its slips recommend, whichever promises more a move."""
-    by_run = designed(race.alive, race.record, bounds, seed=seed, most_moves=most_moves, workers=workers)
-    both = [each for each in (by_run, race.slip_experiment(bounds, most_moves, seed)) if each]
+    how: dict[str, Any] = {"seed": seed, "most_moves": most_moves, "without": without}
+    by_run = designed(race.alive, race.record, bounds, workers=workers, **how)
+    both = [each for each in (by_run, race.slip_experiment(bounds, **how)) if each]
     return max(both, key=lambda each: race.promised_by(each, most_moves), default=None)
 
 
@@ -222,12 +236,16 @@ def discriminate(
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
     problem, used = "", 0
+    silent: set[str] = set()
     tell = progress or (lambda _what, _done: None)
     while outcome is None:
         left, number = budget - used, len(rounds) + 1
         tell(f"choosing experiment {number}", used / budget)
-        chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers)
-        if chosen is None or (chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING):
+        chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers, silent)
+        if chosen is None or _promises_nothing(race, chosen, left):
+            if silent:
+                silent.clear()
+                continue
             outcome = "not_separable"
             break
         tell(f"playing experiment {number}, {chosen.course.name}, {chosen.course.duration_s:.0f} s", used / budget)
@@ -238,7 +256,10 @@ def discriminate(
         experiments.append(played.recording)
         used += chosen.course.moves
         tell(f"refitting the rivals to experiment {number}", used / budget)
+        before = race.relative
         race = race.with_recording(played.recording)
+        if _alike(before, race.relative):
+            silent.add(chosen.course.name)
         rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
         if on_round:
@@ -248,17 +269,33 @@ def discriminate(
     return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
 
 
+def _promises_nothing(race: RivalRace, chosen: DesignedExperiment, left: int) -> bool:
+    return chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING
+
+
+def _alike(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
+    """Whether an experiment has told nothing: the odds are what they were."""
+    return all(before[name] * exp(-NOTHING) <= odds <= before[name] * exp(NOTHING) for name, odds in after.items())
+
+
 def _chosen(
-    race: RivalRace, bounds: Bounds, design: Designer, left: int, seed: int, workers: int | None
+    race: RivalRace,
+    bounds: Bounds,
+    design: Designer,
+    left: int,
+    seed: int,
+    workers: int | None,
+    without: Collection[str],
 ) -> DesignedExperiment | None:
     """Return the shortest experiment that promises the odds by itself, or the one that promises most if repeated.
 
     Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
     promise say much, worked out under few draws of that noise. So experiments go on as long as there are moves left.
+    What promised, was played and told nothing will not by being played again: it waits until nothing else promises.
     """
     best = None
     for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):
-        chosen = design(race, bounds, seed=seed, most_moves=most, workers=workers)
+        chosen = design(race, bounds, seed=seed, most_moves=most, workers=workers, without=without)
         if chosen is None:
             continue
         if race.promised(chosen) >= SURE * log(ODDS):

@@ -19,7 +19,7 @@ valve that answered. A slip that only luck decides mistimes both, and separates 
 Every course stays inside its bounds: pressures, rate, length; and every rival says that the stem stays in its window.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -163,6 +163,7 @@ def designed(
     seed: int = 0,
     most_moves: int = MOST_MOVES,
     workers: int | None = None,
+    without: Collection[str] = (),
 ) -> DesignedExperiment | None:
     """Design the experiment that best tells fitted valves apart; None if no course stays inside the bounds.
 
@@ -173,9 +174,11 @@ def designed(
         seed: of the changes tried, and of the noise.
         most_moves: of the experiment.
         workers: threads, by default one a core.
+        without: names of inputs of the menu that are left out.
     """
     rivalry = Rivalry(fits, record, bounds, seed)
-    starts = [course.within(bounds) for course in courses(record, bounds, most_moves)]
+    menu = (course for course in courses(record, bounds, most_moves) if course.name not in without)
+    starts = [course.within(bounds) for course in menu]
     scores = list(on_threads(rivalry.score, starts, workers))
     order = sorted((i for i, score in enumerate(scores) if score > -np.inf), key=lambda i: -scores[i])
 

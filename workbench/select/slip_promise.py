@@ -13,7 +13,7 @@ freedom of t. By l the log odds of A against B are to rise. A course promises th
 On a valve that scatters a slow ramp of many slips tells more than a large step: each leg is one move.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,11 @@ def promised_by_slips(
     record: Record,
     first_rows: Sequence[int],
     bounds: Bounds,
+    *,
     most: int,
     seed: int,
     workers: int | None = None,
+    without: Collection[str] = (),
 ) -> tuple[Course, float] | None:
     """Return the course of so many moves at most whose slips promise most a move, and by how much the log odds rise.
 
@@ -48,11 +50,12 @@ def promised_by_slips(
         most: moves.
         seed: of the sensor's noise under which the rivals answer.
         workers: threads, by default one a core.
+        without: names of what is not to be played.
     """
     fits = [fit for fit, _ in rivals]
     rivalry = Rivalry(fits, record, bounds, seed)
     known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
-    inside = [course.within(bounds) for course in courses(record, bounds, most)]
+    inside = [course.within(bounds) for course in courses(record, bounds, most) if course.name not in without]
 
     def promised(course: Course) -> float:
         told = np.inf
