@@ -18,7 +18,7 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import local_fit
 from workbench.select.experiment_design import Bounds
 from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
-from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_n, slips
+from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed, slips
 from workbench.select.slip_promise import promised_by_slips
 
 BARE = drawn_valve(np.random.default_rng(11))
@@ -107,13 +107,28 @@ def test_landings_of_a_rival_that_does_not_land_where_its_balance_says_tell_less
         ValveFile(valve=one.valve.valve), "stribeck", excess_n=120.0, velocity_m_per_s=0.01, exponent=2.0
     )
     own = {name: each for name, each in one.parameters.items() if "." not in name}
-    needed = needed_n(replace(one, valve=rising, parameters=own), record, [0, ROWS])
-    assert needed > 3.0 * needed_n(one, record, [0, ROWS])
-    less = {name: slips(fits[name], record, [0, ROWS], needed) for name in ("preload", "spring_hardening")}
+    most = needed(replace(one, valve=rising, parameters=own), record, [0, ROWS])
+    alone = needed(one, record, [0, ROWS])
+    assert most.position_m > 3.0 * alone.position_m
+    assert most.force_n > 3.0 * alone.force_n
+    less = {name: slips(fits[name], record, [0, ROWS], most.position_m) for name in ("preload", "spring_hardening")}
     assert less["preload"] is not None
     assert less["spring_hardening"] is not None
     apart = told["preload"].log_likelihood - told["spring_hardening"].log_likelihood
     assert less["preload"].log_likelihood - less["spring_hardening"].log_likelihood < 0.7 * apart
+
+
+def test_where_much_is_needed_the_stiffer_valve_is_not_the_likelier(fits: dict[str, Fit], record: Record) -> None:
+    """Landings far inside what is needed tell nothing, whatever a displacement is worth in forces."""
+    one = fits["preload"]
+    softer = one.valve.valve
+    stiffer = softer.model_copy(update={"spring_n_per_m": 1.1 * softer.spring_n_per_m})
+    told = [
+        SlipForces(each, record, [0, ROWS], least_m=3.0)
+        for each in (one, replace(one, valve=one.valve.model_copy(update={"valve": stiffer})))
+    ]
+    landed = [each.logs(each.first())[: each.landings.count] for each in told]
+    assert landed[1] == pytest.approx(landed[0], abs=0.01)
 
 
 def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recording]) -> None:
@@ -121,8 +136,9 @@ def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recordin
     assert slips(fits["preload"], ready(short), [0]) is None
 
 
-def test_the_slope_is_that_of_the_loss(fits: dict[str, Fit], record: Record) -> None:
-    forces = SlipForces(fits["preload"], record, [0, ROWS])
+@pytest.mark.parametrize("least_m", [0.0, 1e-3])
+def test_the_slope_is_that_of_the_loss(fits: dict[str, Fit], record: Record, least_m: float) -> None:
+    forces = SlipForces(fits["preload"], record, [0, ROWS], least_m)
     u = forces.first() + 0.05 * np.random.default_rng(0).standard_normal(forces.first().size)
     apart = [
         (forces.loss_and_slope(u + step)[0] - forces.loss_and_slope(u - step)[0]) / 2e-4

@@ -60,7 +60,7 @@ from workbench.select.block_errors import (
 )
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import Bounds, DesignedExperiment
-from workbench.select.slip_evidence import Slips, needed_n, slips
+from workbench.select.slip_evidence import Slips, needed, slips
 from workbench.select.slip_promise import promised_by_slips
 
 ODDS = 100.0
@@ -148,11 +148,11 @@ class RivalRace:
     @cached_property
     def _all(self) -> dict[str, Weighed]:
         fits = list(self.fits.values())
-        needed = list(on_threads(lambda each: needed_n(each, self.record, self._first_rows), fits, self._workers))
-        told = [need_n <= UNTOLD * each.valve.valve.coulomb_n for need_n, each in zip(needed, fits, strict=True)]
-        least_n = max((need_n for need_n, tells in zip(needed, told, strict=True) if tells), default=0.0)
+        needs = list(on_threads(lambda each: needed(each, self.record, self._first_rows), fits, self._workers))
+        told = [need.force_n <= UNTOLD * each.valve.valve.coulomb_n for need, each in zip(needs, fits, strict=True)]
+        least_m = max((need.position_m for need, tells in zip(needs, told, strict=True) if tells), default=0.0)
         weighed = on_threads(
-            lambda i: self._weighed(fits[i], least_n if told[i] else None), range(len(fits)), self._workers
+            lambda i: self._weighed(fits[i], least_m if told[i] else None), range(len(fits)), self._workers
         )
         return dict(zip(self.fits, weighed, strict=True))
 
@@ -313,7 +313,7 @@ class RivalRace:
         cuts = sorted({*self._first_rows, *leaves, len(self.record.time_s)})
         return [slice(*each) for each in pairwise(cuts)]
 
-    def _weighed(self, found: Fit, least_n: float | None) -> Weighed:
+    def _weighed(self, found: Fit, least_m: float | None) -> Weighed:
         error_m = self._error_m(found)
         negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
         cost = softs(error_m / self._sigma_m, FINAL)
@@ -324,7 +324,7 @@ class RivalRace:
             found,
             np.log([np.hypot(np.sqrt(np.nanmean(part**2)), negligible_m) for part in by_slips]),
             _independent_share([cost[each] for each in self._parts]),
-            None if least_n is None else slips(found, self.record, self._first_rows, least_n),
+            None if least_m is None else slips(found, self.record, self._first_rows, least_m),
             np.array([np.nansum(each) for each in stretches]),
             steady=self.record.noise_m is not None
             and all(self._is_noise(each) for each in _stretches(error_m, self.record.period_s)),

@@ -3,7 +3,7 @@
     e_j = s (A p - k_s x + F) - F_c          at landing j, N; see `workbench.fit.landings`
     lower_k <= F_s,k - F_s <= upper_k        at break-away k, N: the last sample at rest, the first in motion
 
-    l = sum_j log t(e_j - d_r; S_j) |de_j/dx|             S_j^2 = S_c^2 + sigma_j^2
+    l = sum_j log t(e_j - d_r; S_j) |de_j/dx|             S_j^2 = S_c^2 + sigma_j^2 + (s |de_j/dx|)^2
       + sum_k log (T(upper_k - g_r; S_s) - T(lower_k - g_r; S_s))
       - 2 sum_r (d_r / S_c)^2 + (g_r / S_s)^2
 
@@ -13,7 +13,8 @@ density of 4 degrees of freedom, T its distribution function: a slip may be told
 that its parameters, scatters and offsets make of l. A slip mistimed by luck spoils seconds of a free run, and no force.
 
 Parameters are held loosely to the fit, so that what slips do not tell stays. A rival whose own simulation does not land
-where its static balance says needs S_c to be so large that it does; rivals are compared at the most that any needs.
+where its static balance says needs a scatter s, m, so large that it does; rivals are compared at the most that any
+needs. It is one of positions: were it one of forces, the stiffer rival would be the likelier, whatever landed where.
 """
 
 from collections.abc import Iterator, Sequence
@@ -65,33 +66,40 @@ class Slips:
     """S_c."""
     static_n: float = nan
     """S_s."""
+    least_m: float = 0.0
+    """s."""
     logs: Vector = field(default_factory=lambda: np.empty(0))
     """Of that, what each landing and each break-away says, (slips,); the distance from the fit is not among it."""
 
 
-def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_n: float = LEAST_N) -> Slips | None:
+class Needed(NamedTuple):
+    """Scatter within which most slides of a rival's own simulation land where its balance says."""
+
+    force_n: float
+    position_m: float
+
+
+def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_m: float = 0.0) -> Slips | None:
     """Return what slips say of a fitted valve; None where there are too few.
 
     Args:
         fit: the rival.
         record: of all recordings.
         first_rows: of each recording in the record.
-        least_n: scatter of landings, N, of rivals that are to be compared: the most of what they need (`needed_n`).
+        least_m: s of rivals that are to be compared: the most of what they need (`needed`).
     """
-    forces = SlipForces(fit, record, first_rows)
+    forces = SlipForces(fit, record, first_rows, least_m)
     if forces.landings.count < FEWEST:
         return None
-    scatter = (log(min(max(least_n, LEAST_N), MOST_N)), log(MOST_N)), (log(LEAST_N), log(MOST_N))
     begin = forces.first()
-    begin[-2] = max(begin[-2], scatter[0][0])
-    bounds = [*[(None, None)] * (begin.size - 2), *scatter]
+    bounds = [*[(None, None)] * (begin.size - 2), *[(log(LEAST_N), log(MOST_N))] * 2]
     found = minimize(forces.loss_and_slope, begin, jac=True, method="L-BFGS-B", bounds=bounds)
     coulomb_n, static_n = np.exp(found.x[-2:]).tolist()
-    return Slips(-float(found.fun), forces.count, coulomb_n, static_n, forces.logs(found.x))
+    return Slips(-float(found.fun), forces.count, coulomb_n, static_n, least_m, forces.logs(found.x))
 
 
-def needed_n(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
-    """Return the scatter, N, within which most slides of a rival's own simulation land where its balance says.
+def needed(fit: Fit, record: Record, first_rows: Sequence[int]) -> Needed:
+    """Return the scatter that a rival's landings need, as a force and as a distance.
 
     A stem that creeps, or whose friction rises as it slows down, ends elsewhere: so much its landings do not tell.
     """
@@ -101,9 +109,14 @@ def needed_n(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
     own = replace(record, position_m=np.where(np.isfinite(simulated_m), simulated_m, record.position_m))
     lands = SlipForces(fit, own, first_rows)
     if lands.landings.count < FEWEST:
-        return 0.0
-    off_n = lands.left(lands.fitted).e_n / TOLD
-    return float(np.sqrt(max(0.0, np.quantile(off_n**2 - lands.own_n**2, MOSTLY))))
+        return Needed(0.0, 0.0)
+    left = lands.left(lands.fitted)
+    beyond = (left.e_n / TOLD) ** 2 - lands.own_n**2
+    return Needed(_mostly(beyond), _mostly(beyond / left.slope_n_per_m**2))
+
+
+def _mostly(squares: Vector) -> float:
+    return float(np.sqrt(max(0.0, np.quantile(squares, MOSTLY))))
 
 
 class Left(NamedTuple):
@@ -121,7 +134,8 @@ class SlipForces:
     u = ((z - z_fit) / HELD of what is free, d_r / (S_c / 2), g_r / (S_s / 2), log S_c, log S_s)
     """
 
-    def __init__(self, fit: Fit, record: Record, first_rows: Sequence[int]) -> None:
+    def __init__(self, fit: Fit, record: Record, first_rows: Sequence[int], least_m: float = 0.0) -> None:
+        self._least_m = least_m
         composition = Composition.from_file(fit.valve)
         theta = composition.theta
         parameters = free_parameters(composition, tuple(fit.parameters))
@@ -166,15 +180,16 @@ class SlipForces:
 
         by_off = -(FREEDOM + 1.0) * off / (FREEDOM + off**2)
         by_lower, by_upper = -np.exp(_log_density(lower) - broke), np.exp(_log_density(upper) - broke)
-        of_forces = Left(by_off / scale_n, 1.0 / left.slope_n_per_m, by_lower / static_n, by_upper / static_n)
+        by_scale = -(by_off * off + 1.0) / scale_n**2
+        by_slope = 1.0 / left.slope_n_per_m + by_scale * left.slope_n_per_m * self._least_m**2
+        of_forces = Left(by_off / scale_n, by_slope, by_lower / static_n, by_upper / static_n)
         by_g = -(of_forces.lower_n + of_forces.upper_n)
-        scaled = (coulomb_n / scale_n) ** 2
         slope = np.concatenate(
             [
                 [sum(of @ by for of, by in zip(of_forces, moved, strict=True)) for moved in self.moved(z, left)],
                 -BETWEEN * coulomb_n * self._by_recording(of_forces.e_n, self._landed_in),
                 BETWEEN * static_n * self._by_recording(by_g, self._broke_in),
-                [-(scaled * (by_off * off + 1.0)).sum() - of_forces.e_n @ d_n],
+                [coulomb_n**2 * by_scale.sum() - of_forces.e_n @ d_n],
                 [-of_forces.lower_n @ left.lower_n - of_forces.upper_n @ left.upper_n],
             ]
         )
@@ -204,9 +219,13 @@ class SlipForces:
         """Return S_j, N, and in scatters: each e_j - d_r, and the bounds of each F_s,k - F_s - g_r."""
         coulomb_n, static_n = np.exp(u[-2:])
         d_n, g_n = self._offsets_n(u)
-        scale_n = np.hypot(coulomb_n, self.own_n)
+        scale_n = self.scatter_n(left, coulomb_n)
         lower, upper = (left.lower_n - g_n) / static_n - PADDING, (left.upper_n - g_n) / static_n + PADDING
         return scale_n, (left.e_n - d_n) / scale_n, lower, upper
+
+    def scatter_n(self, left: "Left", coulomb_n: float) -> Vector:
+        """Return S_j, N, (landings,)."""
+        return np.asarray(np.sqrt(coulomb_n**2 + self.own_n**2 + (self._least_m * left.slope_n_per_m) ** 2))
 
     def moved(self, z: Vector, left: "Left") -> Iterator["Left"]:
         """Yield the forces' slopes over each free coordinate, in steps of u; flat beyond a bound."""

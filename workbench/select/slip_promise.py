@@ -63,7 +63,7 @@ def promised_by_slips(
             answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
             if answer is None:
                 return 0.0
-            forces = [SlipForces(fit, answer, [0]) for fit in fits]
+            forces = [SlipForces(fit, answer, [0], told.least_m) for fit, told in rivals]
             if forces[i].landings.count < FEWEST:
                 return 0.0
             left = [each.left(each.fitted) for each in forces]
@@ -81,7 +81,7 @@ class _Known:
 
     def __init__(self, fit: Fit, told: Slips, record: Record, first_rows: Sequence[int]) -> None:
         self._told = told
-        forces = SlipForces(fit, record, first_rows)
+        forces = SlipForces(fit, record, first_rows, told.least_m)
         here = forces.left(forces.fitted)
         J = self._slopes(forces, here) / self._scatter_n(forces, here)[:, None]
         self._information = np.eye(J.shape[1]) + J.T @ J
@@ -106,8 +106,9 @@ class _Known:
     def _scatter_n(self, forces: SlipForces, here: Left) -> Vector:
         """Return S_j and T_k, N, (slips,)."""
         widths_n = here.upper_n - here.lower_n
-        landed = np.hypot(self._told.coulomb_n, forces.own_n)
-        return np.concatenate([landed, np.hypot(self._told.static_n, widths_n / 12.0**0.5)])
+        return np.concatenate(
+            [forces.scatter_n(here, self._told.coulomb_n), np.hypot(self._told.static_n, widths_n / 12.0**0.5)]
+        )
 
 
 def _middles(left: Left) -> Vector:
