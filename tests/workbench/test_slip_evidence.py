@@ -18,7 +18,7 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import local_fit
 from workbench.select.experiment_design import Bounds
 from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
-from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed, slips
+from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_m, slips
 from workbench.select.slip_promise import promised_by_slips
 
 BARE = drawn_valve(np.random.default_rng(11))
@@ -107,11 +107,9 @@ def test_landings_of_a_rival_that_does_not_land_where_its_balance_says_tell_less
         ValveFile(valve=one.valve.valve), "stribeck", excess_n=120.0, velocity_m_per_s=0.01, exponent=2.0
     )
     own = {name: each for name, each in one.parameters.items() if "." not in name}
-    most = needed(replace(one, valve=rising, parameters=own), record, [0, ROWS])
-    alone = needed(one, record, [0, ROWS])
-    assert most.position_m > 3.0 * alone.position_m
-    assert most.force_n > 3.0 * alone.force_n
-    less = {name: slips(fits[name], record, [0, ROWS], most.position_m) for name in ("preload", "spring_hardening")}
+    most_m = needed_m(replace(one, valve=rising, parameters=own), record, [0, ROWS])
+    assert most_m > 3.0 * needed_m(one, record, [0, ROWS])
+    less = {name: slips(fits[name], record, [0, ROWS], most_m) for name in ("preload", "spring_hardening")}
     assert less["preload"] is not None
     assert less["spring_hardening"] is not None
     apart = told["preload"].log_likelihood - told["spring_hardening"].log_likelihood
@@ -221,12 +219,12 @@ def test_a_parameter_more_is_paid_for(fits: dict[str, Fit]) -> None:
 
 
 def test_slips_say_no_more_than_they_agree(fits: dict[str, Fit]) -> None:
-    """By Vuong: of 100 slips that differ by 0.3 +- 1 the sum is 30, three standard errors from nothing."""
+    """By Vuong: of 100 slips that differ by 0.3 +- 1 the sum is 30, three standard errors from nothing, 740 : 1."""
     one = weighed(fits["preload"], 500.0, 0.0, 0.0)
     told = 0.3 + np.array([(-1.0) ** i for i in range(100)])
     other = replace(one, slips=Slips(float(-told.sum()), 100, logs=-told))
-    assert slip_odds(one, other) == pytest.approx(4.5)
-    assert slip_odds(other, one) == pytest.approx(-4.5)
+    assert np.exp(slip_odds(one, other)) == pytest.approx(740.0, rel=0.01)
+    assert slip_odds(other, one) == pytest.approx(-slip_odds(one, other))
 
 
 def promised(

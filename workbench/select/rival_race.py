@@ -6,8 +6,11 @@
     odds of the best = 1 / sum exp(-lambda_i)           against all the others together
 
 So the noise is what the best itself scatters by: where break-away jitters, a slip that luck has mistimed spoils all
-until the next, however long that is, and counts once. Besides, lambda_i is at most z_i^2 / 2, where the errors of the
-two, slip by slip, differ by z_i standard errors (`block_errors`).
+until the next, however long that is, and counts once. Besides, lambda_i is at most what agreement allows,
+
+    log (Phi(z_i) / Phi(-z_i))                          log odds that the better by z_i standard errors is the better
+
+where the errors of the two, slip by slip, differ by z_i standard errors (`block_errors`).
 
 Where the best leaves nothing but the sensor's noise in any of B stretches, luck has mistimed no slip of it, and every
 stretch tells what it tells; but a mistimed slip, which spoils two of them at most, no more than an accident that has
@@ -19,11 +22,10 @@ What slips say (`slip_evidence`) is weighed beside the run: where both speak for
 they come from the same samples; where they disagree the one takes from the other.
 
     lambda = the stronger of lambda_run and lambda_slips, or their sum if they disagree
-    lambda_slips = l - l_i + (k_i - k)/2 log N_slips, at most z^2 / 2      z = sum d / sqrt(N_slips var d)
+    lambda_slips = l - l_i + (k_i - k)/2 log N_slips, at most what agreement allows    z = sum d / sqrt(N_slips var d)
 
 d is the difference from slip to slip, z Vuong's statistic: no rival is the very valve, and what many slips make of a
-small misfit that both have must not name one. Slips say nothing of a rival whose landings its own balance does not
-tell, as those on a stop, which holds the stem in friction's place.
+small misfit that both have must not name one. If one is, z^2 is half of l - l_i.
 
 Nothing is named by a search that failed: rivals that have lost are searched anew from many starts before the best one
 is named, and the best must explain the experiments as well as a model can.
@@ -37,6 +39,7 @@ from math import copysign, exp, inf, log
 from typing import Any, Literal
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
@@ -60,15 +63,13 @@ from workbench.select.block_errors import (
 )
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import Bounds, DesignedExperiment
-from workbench.select.slip_evidence import Slips, needed, slips
+from workbench.select.slip_evidence import Slips, needed_m, slips
 from workbench.select.slip_promise import promised_by_slips
 
 ODDS = 100.0
 """Of the best against all others, that name it."""
 EXPLAINED = (0.5, 0.75)
 """Quantiles of the blocks' errors."""
-UNTOLD = 0.5
-"""Of Coulomb friction: a scatter of its own landings beyond which slips say nothing of a rival."""
 TINY = np.finfo(float).tiny
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
@@ -98,7 +99,7 @@ def log_odds(best: Weighed, rival: Weighed) -> float:
         return max(0.0, float(np.clip(told, -most, most).sum()) + price)
     ratio = log(max(rival.fit.cost, TINY) / max(best.fit.cost, TINY))
     _, z = relative_error_reduction(rival.logs, best.logs)
-    return max(0.0, min(0.5 * n * ratio + price, 0.5 * max(0.0, z) ** 2))
+    return max(0.0, min(0.5 * n * ratio + price, agreed(max(0.0, z))))
 
 
 def slip_odds(one: Weighed, other: Weighed) -> float:
@@ -109,7 +110,12 @@ def slip_odds(one: Weighed, other: Weighed) -> float:
     told = one.slips.log_likelihood - other.slips.log_likelihood + price
     d = one.slips.logs - other.slips.logs
     z = float(d.sum() / max(d.size**0.5 * float(np.std(d)), TINY))
-    return copysign(min(abs(told), 0.5 * z**2), told) if z * told > 0.0 else 0.0
+    return copysign(min(abs(told), agreed(abs(z))), told) if z * told > 0.0 else 0.0
+
+
+def agreed(z: float) -> float:
+    """Return the log odds that what is the better by z standard errors is the better, by a flat prior."""
+    return float(log_ndtr(z) - log_ndtr(-z))
 
 
 def evidence(one: Weighed, other: Weighed) -> float:
@@ -148,12 +154,8 @@ class RivalRace:
     @cached_property
     def _all(self) -> dict[str, Weighed]:
         fits = list(self.fits.values())
-        needs = list(on_threads(lambda each: needed(each, self.record, self._first_rows), fits, self._workers))
-        told = [need.force_n <= UNTOLD * each.valve.valve.coulomb_n for need, each in zip(needs, fits, strict=True)]
-        least_m = max((need.position_m for need, tells in zip(needs, told, strict=True) if tells), default=0.0)
-        weighed = on_threads(
-            lambda i: self._weighed(fits[i], least_m if told[i] else None), range(len(fits)), self._workers
-        )
+        least_m = max(on_threads(lambda each: needed_m(each, self.record, self._first_rows), fits, self._workers))
+        weighed = on_threads(lambda each: self._weighed(each, least_m), fits, self._workers)
         return dict(zip(self.fits, weighed, strict=True))
 
     @cached_property
@@ -313,7 +315,7 @@ class RivalRace:
         cuts = sorted({*self._first_rows, *leaves, len(self.record.time_s)})
         return [slice(*each) for each in pairwise(cuts)]
 
-    def _weighed(self, found: Fit, least_m: float | None) -> Weighed:
+    def _weighed(self, found: Fit, least_m: float) -> Weighed:
         error_m = self._error_m(found)
         negligible_m = NEGLIGIBLE * self.record.floor_or_scale_m
         cost = softs(error_m / self._sigma_m, FINAL)
@@ -324,7 +326,7 @@ class RivalRace:
             found,
             np.log([np.hypot(np.sqrt(np.nanmean(part**2)), negligible_m) for part in by_slips]),
             _independent_share([cost[each] for each in self._parts]),
-            None if least_m is None else slips(found, self.record, self._first_rows, least_m),
+            slips(found, self.record, self._first_rows, least_m),
             np.array([np.nansum(each) for each in stretches]),
             steady=self.record.noise_m is not None
             and all(self._is_noise(each) for each in _stretches(error_m, self.record.period_s)),

@@ -1,20 +1,28 @@
-"""What slips say of a rival: the forces under which they began and ended, whatever came between.
+"""What slips say of a rival: where they ended and under which forces they began, whatever came between.
 
-    e_j = s (A p - k_s x + F) - F_c          at landing j, N; see `workbench.fit.landings`
-    lower_k <= F_s,k - F_s <= upper_k        at break-away k, N: the last sample at rest, the first in motion
+    e(x_j + s dx_j) = 0,  e(x) = s (A p - k_s x + F) - F_c      landing j comes to rest dx_j short of its balance, m
+    lower_k <= F_s,k - F_s <= upper_k                           break-away k, N: the last sample at rest, the first in
+                                                                motion
+    held_i <= F_s,i - F_s                                       a rest that bore this much, N, and did not go that way
 
-    l = sum_j log t(e_j - d_r; S_j) |de_j/dx|             S_j^2 = S_c^2 + sigma_j^2 + (s |de_j/dx|)^2
-      + sum_k log (T(upper_k - g_r; S_s) - T(lower_k - g_r; S_s))
+    l = sum_j log t(dx_j - d_r; S_j)                            S_j^2 = S_c^2 + sigma_j^2 + s^2
+      + sum_k log (T(upper_k - g_r; S_s) - T(lower_k - g_r; S_s)) + sum_i log (1 - T(held_i - g_r; S_s))
       - 2 sum_r (d_r / S_c)^2 + (g_r / S_s)^2
 
 is the log likelihood of where slides landed and under which pressures they began, on a valve whose friction scatters:
-by S_c and S_s, N, from slip to slip, and half as much, by d_r and g_r, from recording to recording r. t is Student's
-density of 4 degrees of freedom, T its distribution function: a slip may be told wrongly. A rival is weighed by the most
-that its parameters, scatters and offsets make of l. A slip mistimed by luck spoils seconds of a free run, and no force.
+by S_c, m, where it ends a slide and S_s, N, where it holds, from slip to slip, and half as much, by d_r and g_r, from
+recording to recording r. t is Student's density of 4 degrees of freedom, T its distribution function: a slip may be
+told wrongly. A rival is weighed by the most that its parameters, scatters and offsets make of l. A slip mistimed by
+luck spoils seconds of a free run, and no balance.
+
+Landings scatter in positions: were it in forces, the stiffer rival would be the likelier, whatever landed where; and on
+a stop, where a sensor's step is worth thousands of newtons, every rest would speak against it. For the same reason
+loads are taken `SHIFT` farther in the direction in which they push: off the stop that the stem rested on, or on the one
+that keeps it from going that way.
 
 Parameters are held loosely to the fit, so that what slips do not tell stays. A rival whose own simulation does not land
 where its static balance says needs a scatter s, m, so large that it does; rivals are compared at the most that any
-needs. It is one of positions: were it one of forces, the stiffer rival would be the likelier, whatever landed where.
+needs.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +39,7 @@ from sim.composition import STATIC, VISCOUS, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import DIFFERENCE, FEWEST, Landings, rests
+from workbench.fit.landings import DIFFERENCE, FEWEST, Landings, Loaded, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -41,7 +49,9 @@ FREEDOM = 4.0
 BETWEEN = 0.5
 """Scatter from recording to recording, over that from slip to slip."""
 LEAST_N, MOST_N = 1.0, 1e4
-"""Scatter."""
+"""S_s."""
+LEAST, MOST = 1e-6, 0.3
+"""S_c, of the stroke."""
 GUESSED_N = 30.0
 """Scatter of static friction to begin with."""
 HELD = 0.5
@@ -49,7 +59,7 @@ HELD = 0.5
 PADDING = 0.05
 """Of the scatter, by which the interval of a break-away is wider either way: noise may have broken it."""
 SHIFT = 2e-3
-"""Of the stroke, over which a landing's slope is taken: wider than a sensor's steps."""
+"""Of the stroke, wider than a sensor's steps: over which a landing's slope is taken, and how far off a load is."""
 TOLD, MOSTLY = 0.5, 0.75
 """So near, in scatters, must so many of its own landings lie where a rival's balance says."""
 NORMAL = lgamma(0.5 * (FREEDOM + 1.0)) - lgamma(0.5 * FREEDOM) - 0.5 * log(FREEDOM * pi)
@@ -58,25 +68,18 @@ TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True, slots=True)
 class Slips:
-    """What slips say of a rival: their log likelihood, of how many landings and break-aways, and their scatters, N."""
+    """What slips say of a rival: their log likelihood, of how many landings and break-aways, and their scatters."""
 
     log_likelihood: float
     count: int
-    coulomb_n: float = nan
+    landing_m: float = nan
     """S_c."""
     static_n: float = nan
     """S_s."""
     least_m: float = 0.0
     """s."""
     logs: Vector = field(default_factory=lambda: np.empty(0))
-    """Of that, what each landing and each break-away says, (slips,); the distance from the fit is not among it."""
-
-
-class Needed(NamedTuple):
-    """Scatter within which most slides of a rival's own simulation land where its balance says."""
-
-    force_n: float
-    position_m: float
+    """Of that, what each landing, break-away and load borne says; the distance from the fit is not among it."""
 
 
 def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_m: float = 0.0) -> Slips | None:
@@ -91,15 +94,13 @@ def slips(fit: Fit, record: Record, first_rows: Sequence[int], least_m: float = 
     forces = SlipForces(fit, record, first_rows, least_m)
     if forces.landings.count < FEWEST:
         return None
-    begin = forces.first()
-    bounds = [*[(None, None)] * (begin.size - 2), *[(log(LEAST_N), log(MOST_N))] * 2]
-    found = minimize(forces.loss_and_slope, begin, jac=True, method="L-BFGS-B", bounds=bounds)
-    coulomb_n, static_n = np.exp(found.x[-2:]).tolist()
-    return Slips(-float(found.fun), forces.count, coulomb_n, static_n, least_m, forces.logs(found.x))
+    found = minimize(forces.loss_and_slope, forces.first(), jac=True, method="L-BFGS-B", bounds=forces.bounds)
+    landing_m, static_n = np.exp(found.x[-2:]).tolist()
+    return Slips(-float(found.fun), forces.count, landing_m, static_n, least_m, forces.logs(found.x))
 
 
-def needed(fit: Fit, record: Record, first_rows: Sequence[int]) -> Needed:
-    """Return the scatter that a rival's landings need, as a force and as a distance.
+def needed_m(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
+    """Return the scatter, m, within which most slides of a rival's own simulation land where its balance says.
 
     A stem that creeps, or whose friction rises as it slows down, ends elsewhere: so much its landings do not tell.
     """
@@ -109,27 +110,22 @@ def needed(fit: Fit, record: Record, first_rows: Sequence[int]) -> Needed:
     own = replace(record, position_m=np.where(np.isfinite(simulated_m), simulated_m, record.position_m))
     lands = SlipForces(fit, own, first_rows)
     if lands.landings.count < FEWEST:
-        return Needed(0.0, 0.0)
-    left = lands.left(lands.fitted)
-    beyond = (left.e_n / TOLD) ** 2 - lands.own_n**2
-    return Needed(_mostly(beyond), _mostly(beyond / left.slope_n_per_m**2))
-
-
-def _mostly(squares: Vector) -> float:
-    return float(np.sqrt(max(0.0, np.quantile(squares, MOSTLY))))
+        return 0.0
+    beyond = (lands.left(lands.fitted).short_m / TOLD) ** 2 - lands.own_m**2
+    return float(np.sqrt(max(0.0, np.quantile(beyond, MOSTLY))))
 
 
 class Left(NamedTuple):
-    """Of each landing e_j and |de_j/dx|; of each break-away the bounds of F_s,k - F_s; or slopes over any of these."""
+    """Of landings dx_j; of break-aways the bounds of F_s,k - F_s; of loads borne held_i; or slopes of these."""
 
-    e_n: Vector
-    slope_n_per_m: Vector
+    short_m: Vector
     lower_n: Vector
     upper_n: Vector
+    held_n: Vector
 
 
 class SlipForces:
-    """The forces of a rival's slips, and their loss over u: coordinates, offsets and log scatters.
+    """The balances of a rival's slips, and their loss over u: coordinates, offsets and log scatters.
 
     u = ((z - z_fit) / HELD of what is free, d_r / (S_c / 2), g_r / (S_s / 2), log S_c, log S_s)
     """
@@ -143,64 +139,78 @@ class SlipForces:
         self.fitted = self.error.coordinates(theta)
         self.landings = Landings(self.error, rests(record))
         pressure_pa = self.error.run.run(theta).pressure_pa
-        self._landed, self.own_n = self.landings.landed(theta, pressure_pa)
-        self._broke = self.landings.breaking(pressure_pa)
-        bore = self.landings.holding(pressure_pa)
-        self._bore = bore.those(bore.directions == bore.leaves_to)
-        self._way = self._landed.directions
-        self._shift_m = SHIFT * composition.valve.stroke_m
-        self._shifted = [self._landed.shifted(np.full(self._way.size, way * self._shift_m)) for way in (1.0, -1.0)]
-        """The landings as if the stem had come to rest elsewhere."""
-        self._landed_in, self._broke_in = (
-            np.searchsorted(first_rows, each.rows, side="right") - 1 for each in (self._landed, self._broke)
+        self._stroke_m = composition.valve.stroke_m
+        self._shift_m = SHIFT * self._stroke_m
+        landed, own_n = self.landings.landed(theta, pressure_pa)
+        self._landed = [_farther(landed, each * self._shift_m) for each in (-1.0, 0.0, 1.0)]
+        """The landings as if the stem had come to rest before, there, and beyond."""
+        bore = _farther(self.landings.holding(pressure_pa), self._shift_m)
+        leaves = bore.directions == bore.leaves_to
+        self._bore, self._held = bore.those(leaves), bore.those(~leaves)
+        self._broke = _farther(self.landings.breaking(pressure_pa), self._shift_m)
+        before_n, _, beyond_n = self._balances_n(theta)
+        self.own_m = own_n * 2.0 * self._shift_m / np.maximum(before_n - beyond_n, TINY)
+        """sigma_j, (landings,)."""
+        self._landed_in, self._broke_in, self._held_in = (
+            np.searchsorted(first_rows, each.rows, side="right") - 1 for each in (landed, self._broke, self._held)
         )
         """In which recording each lies."""
         self._free = [i for i, each in enumerate(parameters) if each.index != VISCOUS]
         self._recordings = len(first_rows)
-        self.count = self._landed.rows.size + self._broke.rows.size
+        self.count = landed.rows.size + self._broke.rows.size
 
     def first(self) -> Vector:
         """Return u to begin with: the fit."""
-        e_n, _, _, _ = self.left(self.fitted)
-        scatters_n = (max(3.0 * LEAST_N, 1.5 * float(np.median(np.abs(e_n)))), GUESSED_N)
-        return np.concatenate([np.zeros(len(self._free) + 2 * self._recordings), np.log(scatters_n)])
+        landing_m = max(3.0 * LEAST * self._stroke_m, 1.5 * float(np.median(np.abs(self.left(self.fitted).short_m))))
+        return np.concatenate([np.zeros(len(self._free) + 2 * self._recordings), np.log([landing_m, GUESSED_N])])
+
+    @property
+    def bounds(self) -> list[tuple[float | None, float | None]]:
+        """Of u."""
+        scatters = (np.log(LEAST * self._stroke_m), np.log(MOST * self._stroke_m)), (log(LEAST_N), log(MOST_N))
+        return [*[(None, None)] * (len(self._free) + 2 * self._recordings), *scatters]
 
     def loss_and_slope(self, u: Vector) -> tuple[float, Vector]:
         """Return -l, and what the parameters' distance from the fit costs; and its slope over u.
 
-        The forces are followed over the parameters by differences, all else by hand: it is cheap, and there are two
+        The balances are followed over the parameters by differences, all else by hand: it is cheap, and there are two
         offsets more for each recording.
         """
         z, left = self._there(u)
-        coulomb_n, static_n = np.exp(u[-2:])
-        d_n, _ = self._offsets_n(u)
-        scale_n, off, lower, upper = self._in_scatters(u, left)
-        landed, broke = _landed(off, left.slope_n_per_m / scale_n), _log_between(lower, upper)
-        value = landed.sum() + broke.sum()
+        landing_m, static_n = np.exp(u[-2:])
+        scatter_m, off, *loads = self._in_scatters(u, left)
+        lower, upper, held = loads
+        broke, bore = _log_between(lower, upper), _log_beyond(held)
+        value = np.sum(_log_density(off) - np.log(scatter_m)) + broke.sum() + bore.sum()
 
         by_off = -(FREEDOM + 1.0) * off / (FREEDOM + off**2)
+        by_scatter = -(by_off * off + 1.0) / scatter_m**2
         by_lower, by_upper = -np.exp(_log_density(lower) - broke), np.exp(_log_density(upper) - broke)
-        by_scale = -(by_off * off + 1.0) / scale_n**2
-        by_slope = 1.0 / left.slope_n_per_m + by_scale * left.slope_n_per_m * self._least_m**2
-        of_forces = Left(by_off / scale_n, by_slope, by_lower / static_n, by_upper / static_n)
-        by_g = -(of_forces.lower_n + of_forces.upper_n)
+        by_held = -np.exp(_log_density(held) - bore)
+        of = Left(by_off / scatter_m, by_lower / static_n, by_upper / static_n, by_held / static_n)
+        by_g = self._by_recording(of.lower_n + of.upper_n, self._broke_in) + self._by_recording(
+            of.held_n, self._held_in
+        )
+        by_d = self._by_recording(of.short_m, self._landed_in)
+        d, _ = self._offsets(u)
         slope = np.concatenate(
             [
-                [sum(of @ by for of, by in zip(of_forces, moved, strict=True)) for moved in self.moved(z, left)],
-                -BETWEEN * coulomb_n * self._by_recording(of_forces.e_n, self._landed_in),
-                BETWEEN * static_n * self._by_recording(by_g, self._broke_in),
-                [coulomb_n**2 * by_scale.sum() - of_forces.e_n @ d_n],
-                [-of_forces.lower_n @ left.lower_n - of_forces.upper_n @ left.upper_n],
+                [sum(by @ each for by, each in zip(of, moved, strict=True)) for moved in self.moved(z, left)],
+                -BETWEEN * landing_m * by_d,
+                -BETWEEN * static_n * by_g,
+                [landing_m**2 * by_scatter.sum() - BETWEEN * landing_m * by_d @ d],
+                [-of.lower_n @ left.lower_n - of.upper_n @ left.upper_n - of.held_n @ left.held_n],
             ]
         )
         slope[:-2] -= u[:-2]
         return float(0.5 * (u[:-2] @ u[:-2]) - value), -slope
 
     def logs(self, u: Vector) -> Vector:
-        """Return what each landing and each break-away adds to l, (slips,)."""
+        """Return what each landing, each break-away and each load borne adds to l."""
         _, left = self._there(u)
-        scale_n, off, lower, upper = self._in_scatters(u, left)
-        return np.concatenate([_landed(off, left.slope_n_per_m / scale_n), _log_between(lower, upper)])
+        scatter_m, off, lower, upper, held = self._in_scatters(u, left)
+        landed = _log_density(off) - np.log(scatter_m)
+        return np.concatenate([landed, _log_between(lower, upper), _log_beyond(held)])
 
     def _there(self, u: Vector) -> tuple[Vector, "Left"]:
         """Return the coordinates at u, and what is left of the balances there."""
@@ -209,26 +219,27 @@ class SlipForces:
         z = np.clip(z, self.error.lower, self.error.upper)
         return z, self.left(z)
 
-    def _offsets_n(self, u: Vector) -> tuple[Vector, Vector]:
-        """Return d_r of each landing and g_r of each break-away, N."""
+    def _offsets(self, u: Vector) -> tuple[Vector, Vector]:
+        """Return d_r / (S_c / 2) and g_r / (S_s / 2) of each recording."""
         d, g = np.split(u[len(self._free) : -2], 2)
-        coulomb_n, static_n = np.exp(u[-2:])
-        return BETWEEN * coulomb_n * d[self._landed_in], BETWEEN * static_n * g[self._broke_in]
+        return d, g
 
-    def _in_scatters(self, u: Vector, left: "Left") -> tuple[Vector, Vector, Vector, Vector]:
-        """Return S_j, N, and in scatters: each e_j - d_r, and the bounds of each F_s,k - F_s - g_r."""
-        coulomb_n, static_n = np.exp(u[-2:])
-        d_n, g_n = self._offsets_n(u)
-        scale_n = self.scatter_n(left, coulomb_n)
-        lower, upper = (left.lower_n - g_n) / static_n - PADDING, (left.upper_n - g_n) / static_n + PADDING
-        return scale_n, (left.e_n - d_n) / scale_n, lower, upper
+    def _in_scatters(self, u: Vector, left: "Left") -> tuple[Vector, Vector, Vector, Vector, Vector]:
+        """Return S_j, m, and in scatters: dx_j - d_r, the bounds of F_s,k - F_s - g_r, and held_i - g_r."""
+        landing_m, static_n = np.exp(u[-2:])
+        d, g = self._offsets(u)
+        scatter_m = self.scatter_m(landing_m)
+        off = (left.short_m - BETWEEN * landing_m * d[self._landed_in]) / scatter_m
+        lower = left.lower_n / static_n - BETWEEN * g[self._broke_in] - PADDING
+        upper = left.upper_n / static_n - BETWEEN * g[self._broke_in] + PADDING
+        return scatter_m, off, lower, upper, left.held_n / static_n - BETWEEN * g[self._held_in]
 
-    def scatter_n(self, left: "Left", coulomb_n: float) -> Vector:
-        """Return S_j, N, (landings,)."""
-        return np.asarray(np.sqrt(coulomb_n**2 + self.own_n**2 + (self._least_m * left.slope_n_per_m) ** 2))
+    def scatter_m(self, landing_m: float) -> Vector:
+        """Return S_j, m, (landings,)."""
+        return np.asarray(np.sqrt(landing_m**2 + self.own_m**2 + self._least_m**2))
 
     def moved(self, z: Vector, left: "Left") -> Iterator["Left"]:
-        """Yield the forces' slopes over each free coordinate, in steps of u; flat beyond a bound."""
+        """Yield the balances' slopes over each free coordinate, in steps of u; flat beyond a bound."""
         for i in self._free:
             there = z.copy()
             there[i] += DIFFERENCE if z[i] + DIFFERENCE <= self.error.upper[i] else -DIFFERENCE
@@ -242,16 +253,27 @@ class SlipForces:
     def left(self, z: Vector) -> "Left":
         """Return what is left of the balances at z."""
         theta = self.error.theta(z)
-        up_n, down_n = (self.landings.balance_n(theta, each) for each in self._shifted)
-        slope_n_per_m = np.maximum(np.abs(up_n - down_n) / (2.0 * self._shift_m), TINY)
-        bounds_n = [self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke)]
-        e_n = self._way * self.landings.balance_n(theta, self._landed)
-        return Left(e_n, slope_n_per_m, np.minimum(*bounds_n), np.maximum(*bounds_n))
+        bore_n, broke_n, held_n = (
+            self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke, self._held)
+        )
+        # A slow stem is at rest, by its samples, for longer than it is; what broke it loose it seems to have borne.
+        lower_n, upper_n = np.minimum(bore_n, broke_n), np.maximum(bore_n, broke_n)
+        return Left(self._short_m(*self._balances_n(theta)), lower_n, upper_n, held_n)
+
+    def _balances_n(self, theta: Vector) -> list[Vector]:
+        """Return e of each landing before, where, and beyond where it came to rest, N."""
+        return [each.directions * self.landings.balance_n(theta, each) for each in self._landed]
+
+    def _short_m(self, before_n: Vector, there_n: Vector, beyond_n: Vector) -> Vector:
+        """Return dx of each landing, m: to where a straight line meets 0, on the side on which it does."""
+        onwards = there_n > 0.0
+        steep_n = np.where(onwards, there_n - beyond_n, before_n - there_n)
+        return np.asarray(self._shift_m * there_n / np.maximum(steep_n, TINY))
 
 
-def _landed(off: Vector, per_m: Vector) -> Vector:
-    """Return the log density of each landing, off by so many scatters, a scatter being 1 / per_m long."""
-    return np.asarray(_log_density(off) + np.log(per_m))
+def _farther(at: Loaded, by_m: float) -> Loaded:
+    """Return rests as if the stem were so much farther in the direction of (impending) motion, m."""
+    return at.shifted(at.directions * by_m)
 
 
 def _log_density(off: Vector) -> Vector:
@@ -264,3 +286,8 @@ def _log_between(lower: Vector, upper: Vector) -> Vector:
     flipped = lower > 0.0
     low, high = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
     return np.asarray(np.log(np.maximum(stdtr(FREEDOM, high) - stdtr(FREEDOM, low), TINY)))
+
+
+def _log_beyond(lower: Vector) -> Vector:
+    """Return log (1 - T(lower))."""
+    return np.asarray(np.log(np.maximum(stdtr(FREEDOM, -lower), TINY)))

@@ -3,7 +3,7 @@
 A rival A answers a course, undisturbed. Where its slides land and break loose its balances are held against those of
 another, B:
 
-    r = ((e_j,B - e_j,A)/S_j, (f_k,B - f_k,A)/T_k)       f_k middle of the interval of F_s,k - F_s, see `slip_evidence`
+    r = ((dx_j,B - dx_j,A)/S_j, (f_k,B - f_k,A)/T_k)     f_k middle of the interval of F_s,k - F_s, see `slip_evidence`
     S_j^2 = S_c^2 + sigma_j^2,  T_k^2 = S_s^2 + w_k^2/12   w_k width of the interval: a large step tells little of F_s
     l = (nu + 1)/(nu + 3) min over u of |r + J u|^2/2 + u' H u/2              H = 1 + J' J over the recordings so far
 
@@ -83,15 +83,15 @@ class _Known:
         self._told = told
         forces = SlipForces(fit, record, first_rows, told.least_m)
         here = forces.left(forces.fitted)
-        J = self._slopes(forces, here) / self._scatter_n(forces, here)[:, None]
+        J = self._slopes(forces, here) / self._scatters(forces, here)[:, None]
         self._information = np.eye(J.shape[1]) + J.T @ J
 
     def told_by(self, forces: SlipForces, here: Left, answered: Left) -> float:
-        """Return l against this valve, of the one that answered, from the forces of both in the answer."""
-        scatter_n = self._scatter_n(forces, here)
-        r = (_middles(here) - _middles(answered)) / scatter_n
-        landings = np.arange(r.size) < forces.own_n.size
-        J = self._slopes(forces, here) / scatter_n[:, None]
+        """Return l against this valve, of the one that answered, from the balances of both in the answer."""
+        scatters = self._scatters(forces, here)
+        r = (_middles(here) - _middles(answered)) / scatters
+        landings = np.arange(r.size) < forces.own_m.size
+        J = self._slopes(forces, here) / scatters[:, None]
         J = np.column_stack([J, -BETWEEN * landings, -BETWEEN * ~landings])
         H = np.eye(J.shape[1])
         H[:-2, :-2] = self._information
@@ -100,17 +100,17 @@ class _Known:
         return float(0.5 * (FREEDOM + 1.0) / (FREEDOM + 3.0) * (left @ left + u @ H @ u))
 
     def _slopes(self, forces: SlipForces, here: Left) -> Matrix:
-        """Return what the forces change by with the coordinates, N, (slips, coordinates)."""
+        """Return what the balances change by with the coordinates, m and N, (slips, coordinates)."""
         return np.column_stack([_middles(each) for each in forces.moved(forces.fitted, here)])
 
-    def _scatter_n(self, forces: SlipForces, here: Left) -> Vector:
-        """Return S_j and T_k, N, (slips,)."""
+    def _scatters(self, forces: SlipForces, here: Left) -> Vector:
+        """Return S_j, m, and T_k, N, (slips,)."""
         widths_n = here.upper_n - here.lower_n
         return np.concatenate(
-            [forces.scatter_n(here, self._told.coulomb_n), np.hypot(self._told.static_n, widths_n / 12.0**0.5)]
+            [forces.scatter_m(self._told.landing_m), np.hypot(self._told.static_n, widths_n / 12.0**0.5)]
         )
 
 
 def _middles(left: Left) -> Vector:
-    """Return e_j and f_k, N, (slips,)."""
-    return np.concatenate([left.e_n, 0.5 * (left.lower_n + left.upper_n)])
+    """Return dx_j, m, and f_k, N, (slips,)."""
+    return np.concatenate([left.short_m, 0.5 * (left.lower_n + left.upper_n)])
