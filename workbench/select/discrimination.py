@@ -258,7 +258,7 @@ def discriminate(
         tell(f"refitting the rivals to experiment {number}", used / budget)
         before = race.relative
         race = race.with_recording(played.recording)
-        if _alike(before, race.relative):
+        if not chosen.by_slips and _alike(before, race.relative):
             silent.add(chosen.course.name)
         rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
@@ -291,7 +291,8 @@ def _chosen(
 
     Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
     promise say much, worked out under few draws of that noise. So experiments go on as long as there are moves left.
-    What promised, was played and told nothing will not by being played again: it waits until nothing else promises.
+    A run that promised, was played and told nothing will not by being played again: it waits until nothing else does.
+    Slips promise a mean, about which luck scatters by as much; what they have told is in their next promise.
     """
     best = None
     for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):

@@ -39,7 +39,7 @@ from sim.composition import STATIC, VISCOUS, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import DIFFERENCE, FEWEST, Landings, Loaded, rests
+from workbench.fit.landings import DIFFERENCE, FEWEST, FORCE_N, Landings, Loaded, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -149,7 +149,7 @@ class SlipForces:
         self._bore, self._held = bore.those(leaves), bore.those(~leaves)
         self._broke = _farther(self.landings.breaking(pressure_pa), self._shift_m)
         before_n, _, beyond_n = self._balances_n(theta)
-        self.own_m = own_n * 2.0 * self._shift_m / np.maximum(before_n - beyond_n, TINY)
+        self.own_m = own_n * 2.0 * self._shift_m / np.maximum(before_n - beyond_n, FORCE_N * SHIFT)
         """sigma_j, (landings,)."""
         self._landed_in, self._broke_in, self._held_in = (
             np.searchsorted(first_rows, each.rows, side="right") - 1 for each in (landed, self._broke, self._held)
@@ -265,10 +265,11 @@ class SlipForces:
         return [each.directions * self.landings.balance_n(theta, each) for each in self._landed]
 
     def _short_m(self, before_n: Vector, there_n: Vector, beyond_n: Vector) -> Vector:
-        """Return dx of each landing, m: to where a straight line meets 0, on the side on which it does."""
+        """Return dx of each landing, m, a stroke at most: where a straight line meets 0, on the side where it does."""
         onwards = there_n > 0.0
         steep_n = np.where(onwards, there_n - beyond_n, before_n - there_n)
-        return np.asarray(self._shift_m * there_n / np.maximum(steep_n, TINY))
+        short_m = self._shift_m * there_n / np.maximum(steep_n, FORCE_N * SHIFT)
+        return np.clip(short_m, -self._stroke_m, self._stroke_m)
 
 
 def _farther(at: Loaded, by_m: float) -> Loaded:
