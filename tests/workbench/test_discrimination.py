@@ -129,8 +129,10 @@ def answering(chosen: DesignedExperiment) -> Played:
 class Design:
     """A designer that says the same whatever it is allowed, or by what it is allowed; it notes that."""
 
-    def __init__(self, separation: float, course: Course = COURSE, otherwise: Course | None = None) -> None:
-        self.separation = separation
+    def __init__(
+        self, separation: float, course: Course = COURSE, otherwise: Course | None = None, by_slips: float = 0.0
+    ) -> None:
+        self.separation, self.by_slips = separation, by_slips
         self.course, self.otherwise = course, otherwise or course
         self.asked: list[int] = []
         self.left_out: list[frozenset[str]] = []
@@ -147,7 +149,8 @@ class Design:
     ) -> DesignedExperiment | None:
         self.asked.append(most_moves)
         self.left_out.append(frozenset(without))
-        return DesignedExperiment(self.course if most_moves <= MOST_MOVES else self.otherwise, self.separation)
+        course = self.course if most_moves <= MOST_MOVES else self.otherwise
+        return DesignedExperiment(course, self.separation, by_slips=self.by_slips)
 
 
 def silent(_: DesignedExperiment) -> Played:
@@ -183,6 +186,14 @@ def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit
     assert (found.outcome, found.moves) == ("budget_spent", 4)
     asked = {len(design.left_out[0]), len(design.left_out[-1])}
     assert asked == {0, 1}, "the first one is left out of what is chosen next"
+
+
+def test_slips_that_told_nothing_may_come_again(fits: dict[str, Fit], recording: Recording) -> None:
+    """They promise a mean, about which luck scatters."""
+    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
+    design = Design(1.0, by_slips=2.0)
+    discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
+    assert set(design.left_out) == {frozenset()}
 
 
 def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], recording: Recording) -> None:

@@ -129,6 +129,53 @@ def test_where_much_is_needed_the_stiffer_valve_is_not_the_likelier(fits: dict[s
     assert landed[1] == pytest.approx(landed[0], abs=0.01)
 
 
+def with_stop(top_m: float) -> ValveFile:
+    return with_effect(
+        BARE, "end_stop", lower_m=-0.2, travel_m=0.2 + top_m, stiffness_n_per_m=1e8, damping_ns_per_m=9000.0
+    )
+
+
+def test_on_a_stop_a_sensors_step_says_nothing(fits: dict[str, Fit]) -> None:
+    """It is worth 2500 N there."""
+    valve = with_stop(0.04)
+    record = ready(dirty(valve, 5))
+    one = fits["preload"]
+    own = {name: each for name, each in one.parameters.items() if "." not in name}
+    step_m = BARE.valve.stroke_m / LEVELS
+    told = [
+        slips(replace(one, valve=valve, parameters=own), replace(record, position_m=record.position_m + each), [0])
+        for each in (-step_m, 0.0, step_m)
+    ]
+    likelihoods = [each.log_likelihood for each in told if each]
+    assert len(likelihoods) == 3
+    assert np.ptp(likelihoods) < 1.0
+
+
+def test_a_stem_that_rests_pressed_on_short_of_a_stop_speaks_against_it() -> None:
+    """A limited supply halts it now here, now there."""
+    valve = with_effect(BARE, "supply_limit", supply_pa=49e3, exhaust_pa=-1e4)
+    whole = joined([dirty(valve, seed) for seed in (5, 6)])
+    record = ready(whole)
+    rivals = local_fit(whole, valve), local_fit(whole, with_stop(float(np.quantile(record.position_m, 0.98))))
+    least_m = max(needed_m(each, record, [0, ROWS]) for each in rivals)
+    limit, stop = (slips(each, record, [0, ROWS], least_m) for each in rivals)
+    assert limit is not None
+    assert stop is not None
+    assert limit.log_likelihood - stop.log_likelihood > np.log(100.0)
+    by_loads_borne = limit.logs[limit.count :].sum() - stop.logs[stop.count :].sum()
+    assert by_loads_borne > 5.0
+
+
+def test_what_a_slow_stem_seems_to_have_borne_is_no_contradiction(fits: dict[str, Fit], record: Record) -> None:
+    """The load at which it broke loose lies between the two, whichever is the larger."""
+    forces = SlipForces(fits["preload"], record, [0, ROWS])
+    left = forces.left(forces.fitted)
+    forces._bore, forces._broke = forces._broke, forces._bore
+    swapped = forces.left(forces.fitted)
+    assert np.all(swapped.lower_n <= swapped.upper_n)
+    assert swapped.upper_n == pytest.approx(left.upper_n)
+
+
 def test_two_slides_tell_nothing(fits: dict[str, Fit], recordings: list[Recording]) -> None:
     short = Recording({name: column[:300] for name, column in recordings[0].columns.items()})
     assert slips(fits["preload"], ready(short), [0]) is None
