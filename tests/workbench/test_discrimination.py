@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import log
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.select.discrimination import Played, Player, discriminate
+from workbench.select.discrimination import Discrimination, Played, Player, Round, discriminate
 from workbench.select.experiment import REST_S
 from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg
 from workbench.select.rival_race import RivalRace, Weighed, _independent_share, log_odds
@@ -188,12 +188,12 @@ def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit
     assert asked == {0, 1}, "the first one is left out of what is chosen next"
 
 
-def test_slips_that_told_nothing_may_come_again(fits: dict[str, Fit], recording: Recording) -> None:
+def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], recording: Recording) -> None:
     """They promise a mean, about which luck scatters."""
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
     design = Design(1.0, by_slips=2.0)
-    discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
-    assert set(design.left_out) == {frozenset()}
+    discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=6)
+    assert [len(each) for each in design.left_out] == [0, 0, 0, 0, 1], "a third time is the first one left out"
 
 
 def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], recording: Recording) -> None:
@@ -209,6 +209,16 @@ def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], record
     assert (found.outcome, found.moves) == ("budget_spent", 4)
     assert frozenset({COURSE.name}) in design.left_out
     assert design.left_out[-1] == frozenset()
+
+
+@pytest.mark.parametrize("outcome", ["not_separable", "budget_spent"])
+def test_who_is_ruled_out_is_said(outcome: Literal["not_separable", "budget_spent"]) -> None:
+    rivals = ("flow_force",), ("sensor_nonlinearity",), ("preload", "sensor_offset")
+    last = Round("staircase", 1.0, 6, {"flow_force": 1.0, "sensor_nonlinearity": 0.4, "preload": 0.009})
+    found = Discrimination(outcome, (), rivals, (last,), 2.4, {}, (), "")
+    assert found.sentence.startswith("flow_force or sensor_nonlinearity: ")
+    assert "ruled out: preload" in found.sentence
+    assert found.as_json()["lost"] == ["preload"]
 
 
 def test_whole_inputs_are_weighed_against_short_ones(fits: dict[str, Fit], recording: Recording) -> None:

@@ -11,6 +11,7 @@ How they are weighed stands in `rival_race`. Members of one class by algebra (`e
 experiment is played for them.
 """
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
@@ -39,6 +40,8 @@ FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
 IMITATED, NOTHING = 1.001, 0.5
 """A separation below it is none; log odds that all moves left together must promise, and one experiment must change."""
+RUN_WAITS, SLIPS_WAIT = 1, 2
+"""How often in succession they have told nothing when they wait."""
 
 Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
 
@@ -121,9 +124,17 @@ class Discrimination(Result):
         return self.rounds[-1].moves if self.rounds else 0
 
     @property
+    def lost(self) -> tuple[str, ...]:
+        """The first of each class against which the experiments have come to `ODDS`."""
+        odds = self.rounds[-1].odds if self.rounds else {}
+        return tuple(each[0] for each in self.rivals if odds.get(each[0], 1.0) < 1.0 / ODDS)
+
+    @property
     def sentence(self) -> str:
         """Say what came of it."""
         who = " or ".join("/".join(each) for each in self.rivals)
+        left = " or ".join("/".join(each) for each in self.rivals if each[0] not in self.lost)
+        lost = f"; ruled out: {', '.join(self.lost)}" if self.lost else ""
         after = f"after {self.moves} moves in {len(self.rounds)} experiments"
         match self.outcome:
             case "resolved":
@@ -132,9 +143,9 @@ class Discrimination(Result):
             case "one_class":
                 return f"{who}: one by algebra, no record of pressure and position tells them apart"
             case "not_separable":
-                return f"{who}: cannot be told apart by this valve within these permissives ({after})"
+                return f"{left}: cannot be told apart by this valve within these permissives ({after}{lost})"
             case "budget_spent":
-                return f"{who}: not told apart {after}, the budget; best odds {_odds(self.odds)}"
+                return f"{left}: not told apart {after}, the budget; best odds {_odds(self.odds)}{lost}"
             case "unexplained":
                 return f"none of {who} explains the experiments: something else is missing ({after})"
         return f"{who}: not told apart, the valve did not play on: {self.problem} ({after})"
@@ -185,6 +196,7 @@ class Discrimination(Result):
             "sentence": self.sentence,
             "named": list(self.named),
             "rivals": [list(each) for each in self.rivals],
+            "lost": list(self.lost),
             "odds": self.odds if self.odds < inf else None,
             "moves": self.moves,
             "problem": self.problem,
@@ -236,6 +248,8 @@ def discriminate(
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
     problem, used = "", 0
+    told_nothing = Counter[str]()
+    """How often in succession, by name."""
     silent: set[str] = set()
     tell = progress or (lambda _what, _done: None)
     while outcome is None:
@@ -245,6 +259,7 @@ def discriminate(
         if chosen is None or _promises_nothing(race, chosen, left):
             if silent:
                 silent.clear()
+                told_nothing.clear()
                 continue
             outcome = "not_separable"
             break
@@ -258,8 +273,10 @@ def discriminate(
         tell(f"refitting the rivals to experiment {number}", used / budget)
         before = race.relative
         race = race.with_recording(played.recording)
-        if not chosen.by_slips and _alike(before, race.relative):
-            silent.add(chosen.course.name)
+        name = chosen.course.name
+        told_nothing[name] = told_nothing[name] + 1 if _alike(before, race.relative) else 0
+        if told_nothing[name] >= (SLIPS_WAIT if chosen.by_slips else RUN_WAITS):
+            silent.add(name)
         rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
         if on_round:
@@ -292,7 +309,7 @@ def _chosen(
     Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
     promise say much, worked out under few draws of that noise. So experiments go on as long as there are moves left.
     A run that promised, was played and told nothing will not by being played again: it waits until nothing else does.
-    Slips promise a mean, about which luck scatters by as much; what they have told is in their next promise.
+    Slips promise a mean, about which luck scatters by as much: they wait when they have told nothing twice.
     """
     best = None
     for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):

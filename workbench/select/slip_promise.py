@@ -8,7 +8,8 @@ another, B:
     l = (nu + 1)/(nu + 3) min over u of |r + J u|^2/2 + u' H u/2              H = 1 + J' J over the recordings so far
 
 u are B's parameters, held as the recordings know them, and an offset of either friction in the new recording; nu is the
-freedom of t. By l the log odds of A against B are to rise. A course promises the least of all pairs.
+freedom of t. By l the log odds of A against B are to rise. A course promises the least of all pairs, but of those that
+no course tells apart, however often repeated: what else is suspected can still be ruled out.
 
 On a valve that scatters a slow ramp of many slips tells more than a large step: each leg is one move.
 """
@@ -27,6 +28,8 @@ from workbench.select.experiment_design import SEARCHED, Bounds, Course, Rivalry
 from workbench.select.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 
 Matrix = NDArray[np.float64]
+HOPELESS = 0.01
+"""Log odds a move: a pair of which no course promises more will not be told apart in any number of moves."""
 
 
 def promised_by_slips(
@@ -57,23 +60,32 @@ def promised_by_slips(
     known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
     inside = [course.within(bounds) for course in courses(record, bounds, most) if course.name not in without]
 
-    def promised(course: Course) -> float:
-        told = np.inf
+    pairs = [(i, j) for i in range(len(fits)) for j in range(len(fits)) if i != j]
+
+    def promised(course: Course) -> Vector:
+        """Return what a course promises of each pair, (pairs,)."""
+        told = np.zeros(len(pairs))
         for i in range(len(fits)):
             answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
             if answer is None:
-                return 0.0
+                return np.zeros(len(pairs))
             forces = [SlipForces(fit, answer, [0], told.least_m) for fit, told in rivals]
             if forces[i].landings.count < FEWEST:
-                return 0.0
+                return np.zeros(len(pairs))
             left = [each.left(each.fitted) for each in forces]
-            others = (j for j in range(len(fits)) if j != i)
-            told = min(told, *(known[j].told_by(forces[j], left[j], left[i]) for j in others))
+            for at, (answers, other) in enumerate(pairs):
+                if answers == i:
+                    told[at] = known[other].told_by(forces[other], left[other], left[i])
         return told
 
-    rated = list(on_threads(promised, inside, workers))
-    best = max(range(len(inside)), key=lambda i: rated[i] / max(1, inside[i].moves), default=None)
-    return None if best is None or not rated[best] > 0.0 else (inside[best], rated[best])
+    rated = np.array(list(on_threads(promised, inside, workers)))
+    moves = np.array([max(1, course.moves) for course in inside])
+    if not rated.size:
+        return None
+    told_apart = (rated / moves[:, None]).max(axis=0) > HOPELESS
+    least = rated[:, told_apart].min(axis=1) if told_apart.any() else rated.min(axis=1)
+    best = int(np.argmax(least / moves))
+    return (inside[best], float(least[best])) if least[best] > 0.0 else None
 
 
 class _Known:
