@@ -15,7 +15,7 @@ Its files:
     experiment, experiment_design                 the input that tells rivals apart: off a menu, or designed
     discrimination                                rivals told apart by one experiment after another
     rival_race                                    the rivals weighed against each other in all recordings so far
-    slip_evidence                                 what slips say of a rival: forces, whatever came between
+    slip_evidence                                 what slips say of a rival: balances, whatever came between
     slip_promise                                  what the slips of an experiment promise to say
     residual_structure                            the meter of what is unexplained
     rest_errors                                   whether slides end where the model says
