@@ -106,8 +106,7 @@ def test_landings_of_a_rival_that_does_not_land_where_its_balance_says_tell_less
     rising = with_effect(
         ValveFile(valve=one.valve.valve), "stribeck", excess_n=120.0, velocity_m_per_s=0.01, exponent=2.0
     )
-    own = {name: each for name, each in one.parameters.items() if "." not in name}
-    most_m = needed_m(replace(one, valve=rising, parameters=own), record, [0, ROWS])
+    most_m = needed_m(unfitted(one, rising), record, [0, ROWS])
     assert most_m > 3.0 * needed_m(one, record, [0, ROWS])
     less = {name: slips(fits[name], record, [0, ROWS], most_m) for name in ("preload", "spring_hardening")}
     assert less["preload"] is not None
@@ -135,15 +134,20 @@ def with_stop(top_m: float) -> ValveFile:
     )
 
 
+def unfitted(one: Fit, valve: ValveFile) -> Fit:
+    """Return a fit that has come to this valve."""
+    return replace(
+        one, valve=valve, parameters={name: each for name, each in one.parameters.items() if "." not in name}
+    )
+
+
 def test_on_a_stop_a_sensors_step_says_nothing(fits: dict[str, Fit]) -> None:
     """It is worth 2500 N there."""
     valve = with_stop(0.04)
     record = ready(dirty(valve, 5))
-    one = fits["preload"]
-    own = {name: each for name, each in one.parameters.items() if "." not in name}
     step_m = BARE.valve.stroke_m / LEVELS
     told = [
-        slips(replace(one, valve=valve, parameters=own), replace(record, position_m=record.position_m + each), [0])
+        slips(unfitted(fits["preload"], valve), replace(record, position_m=record.position_m + each), [0])
         for each in (-step_m, 0.0, step_m)
     ]
     likelihoods = [each.log_likelihood for each in told if each]
@@ -151,12 +155,12 @@ def test_on_a_stop_a_sensors_step_says_nothing(fits: dict[str, Fit]) -> None:
     assert np.ptp(likelihoods) < 1.0
 
 
-def test_a_stem_that_rests_pressed_on_short_of_a_stop_speaks_against_it() -> None:
+def test_a_stem_that_rests_pressed_on_short_of_a_stop_speaks_against_it(fits: dict[str, Fit]) -> None:
     """A limited supply halts it now here, now there."""
     valve = with_effect(BARE, "supply_limit", supply_pa=49e3, exhaust_pa=-1e4)
-    whole = joined([dirty(valve, seed) for seed in (5, 6)])
-    record = ready(whole)
-    rivals = local_fit(whole, valve), local_fit(whole, with_stop(float(np.quantile(record.position_m, 0.98))))
+    record = ready(joined([dirty(valve, seed) for seed in (5, 6)]))
+    stopped = with_stop(float(np.quantile(record.position_m, 0.98)))
+    rivals = [unfitted(fits["preload"], each) for each in (valve, stopped)]
     least_m = max(needed_m(each, record, [0, ROWS]) for each in rivals)
     limit, stop = (slips(each, record, [0, ROWS], least_m) for each in rivals)
     assert limit is not None
