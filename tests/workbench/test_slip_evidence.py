@@ -170,6 +170,18 @@ def test_a_stem_that_rests_pressed_on_short_of_a_stop_speaks_against_it(fits: di
     assert by_loads_borne > 5.0
 
 
+def test_break_aways_scatter_alike_however_lopsided_the_packing(fits: dict[str, Fit], record: Record) -> None:
+    """Pressure noise knows no packing: were scatter in proportion to friction, it would speak against asymmetry."""
+    lopsided = with_effect(ValveFile(valve=fits["preload"].valve.valve), "asymmetric_friction", asymmetry=0.4)
+    forces = SlipForces(unfitted(fits["preload"], lopsided), record, [0, ROWS])
+    left = forces.left(forces.fitted)
+    stiffer = replace(record, command_pa=record.command_pa + 1e3)
+    pressed = SlipForces(unfitted(fits["preload"], lopsided), stiffer, [0, ROWS])
+    more_n = 1e3 * BARE.valve.diaphragm_area_m2
+    moved_n = np.abs(pressed.left(pressed.fitted).upper_n - left.upper_n)
+    assert np.median(np.abs(moved_n - more_n)) < 0.01 * more_n
+
+
 def test_what_a_slow_stem_seems_to_have_borne_is_no_contradiction(fits: dict[str, Fit], record: Record) -> None:
     """The load at which it broke loose lies between the two, whichever is the larger."""
     forces = SlipForces(fits["preload"], record, [0, ROWS])

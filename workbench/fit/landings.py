@@ -336,10 +336,14 @@ class Landings:
         """Return the static friction of the bare valve with which each would be on the verge of breaking away, N."""
         more = theta.copy()
         more[STATIC] *= 1.01
-        forces, changed = self._forces_n(theta, at), self._forces_n(more, at)
-        slope = (changed[:, 2] - forces[:, 2]) / (more[STATIC] - theta[STATIC])
-        slope = np.where(slope > 0.0, slope, 1.0)
-        return np.asarray(theta[STATIC] + (at.directions * forces[:, 0] - forces[:, 2]) / slope)
+        beyond_n = self.beyond_static_n(theta, at)
+        slope = (beyond_n - self.beyond_static_n(more, at)) / (more[STATIC] - theta[STATIC])
+        return np.asarray(theta[STATIC] + beyond_n / np.where(slope > 0.0, slope, 1.0))
+
+    def beyond_static_n(self, theta: Vector, at: Loaded) -> Vector:
+        """Return by how much each load is more than the static friction there, N."""
+        forces = self._forces_n(theta, at)
+        return np.asarray(at.directions * forces[:, 0] - forces[:, 2])
 
     def _forces_n(self, theta: Vector, at: Loaded, speed: float = 0.0) -> Vector:
         """Return (places, 3): A p - k_s x + F, F_c, F_s, N, of a stem at rest or at a speed, m/s, in its direction."""

@@ -1,9 +1,9 @@
 """What slips say of a rival: where they ended and under which forces they began, whatever came between.
 
     e(x_j + s dx_j) = 0,  e(x) = s (A p - k_s x + F) - F_c      landing j comes to rest dx_j short of its balance, m
-    lower_k <= F_s,k - F_s <= upper_k                           break-away k, N: the last sample at rest, the first in
-                                                                motion
-    held_i <= F_s,i - F_s                                       a rest that bore this much, N, and did not go that way
+    lower_k <= dF_s,k <= upper_k                                break-away k, N, by so much beyond F_s(x, p, s, t): the
+                                                                last sample at rest, the first in motion
+    held_i <= dF_s,i                                            a rest that bore this much, N, and did not go that way
 
     l = sum_j log t(dx_j - d_r; S_j)                            S_j^2 = S_c^2 + sigma_j^2 + s^2
       + sum_k log (T(upper_k - g_r; S_s) - T(lower_k - g_r; S_s)) + sum_i log (1 - T(held_i - g_r; S_s))
@@ -18,7 +18,8 @@ luck spoils seconds of a free run, and no balance.
 Landings scatter in positions: were it in forces, the stiffer rival would be the likelier, whatever landed where; and on
 a stop, where a sensor's step is worth thousands of newtons, every rest would speak against it. For the same reason
 loads are taken `SHIFT` farther in the direction in which they push: off the stop that the stem rested on, or on the one
-that keeps it from going that way.
+that keeps it from going that way. And break-aways scatter by as many newtons whichever way the stem is held: were it in
+proportion, pressure noise would speak against a lopsided packing.
 
 Parameters are held loosely to the fit, so that what slips do not tell stays. A rival whose own simulation does not land
 where its static balance says needs a scatter s, m, so large that it does; rivals are compared at the most that any
@@ -35,7 +36,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import stdtr
 
-from sim.composition import STATIC, VISCOUS, Composition
+from sim.composition import VISCOUS, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
@@ -116,7 +117,7 @@ def needed_m(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
 
 
 class Left(NamedTuple):
-    """Of landings dx_j; of break-aways the bounds of F_s,k - F_s; of loads borne held_i; or slopes of these."""
+    """Of landings dx_j; of break-aways the bounds of dF_s,k; of loads borne held_i; or slopes of these."""
 
     short_m: Vector
     lower_n: Vector
@@ -225,7 +226,7 @@ class SlipForces:
         return d, g
 
     def _in_scatters(self, u: Vector, left: "Left") -> tuple[Vector, Vector, Vector, Vector, Vector]:
-        """Return S_j, m, and in scatters: dx_j - d_r, the bounds of F_s,k - F_s - g_r, and held_i - g_r."""
+        """Return S_j, m, and in scatters: dx_j - d_r, the bounds of dF_s,k - g_r, and held_i - g_r."""
         landing_m, static_n = np.exp(u[-2:])
         d, g = self._offsets(u)
         scatter_m = self.scatter_m(landing_m)
@@ -254,7 +255,7 @@ class SlipForces:
         """Return what is left of the balances at z."""
         theta = self.error.theta(z)
         bore_n, broke_n, held_n = (
-            self.landings.static_at_n(theta, each) - theta[STATIC] for each in (self._bore, self._broke, self._held)
+            self.landings.beyond_static_n(theta, each) for each in (self._bore, self._broke, self._held)
         )
         # A slow stem is at rest, by its samples, for longer than it is; what broke it loose it seems to have borne.
         lower_n, upper_n = np.minimum(bore_n, broke_n), np.maximum(bore_n, broke_n)

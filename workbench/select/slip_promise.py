@@ -3,7 +3,7 @@
 A rival A answers a course, undisturbed. Where its slides land and break loose its balances are held against those of
 another, B:
 
-    r = ((dx_j,B - dx_j,A)/S_j, (f_k,B - f_k,A)/T_k)     f_k middle of the interval of F_s,k - F_s, see `slip_evidence`
+    r = ((dx_j,B - dx_j,A)/S_j, (f_k,B - f_k,A)/T_k)     f_k middle of the interval of dF_s,k, see `slip_evidence`
     S_j^2 = S_c^2 + sigma_j^2,  T_k^2 = S_s^2 + w_k^2/12   w_k width of the interval: a large step tells little of F_s
     l = (nu + 1)/(nu + 3) min over u of |r + J u|^2/2 + u' H u/2              H = 1 + J' J over the recordings so far
 
