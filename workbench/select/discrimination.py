@@ -277,7 +277,7 @@ def discriminate(
         told_nothing[name] = told_nothing[name] + 1 if _alike(before, race.relative) else 0
         if told_nothing[name] >= (SLIPS_WAIT if chosen.by_slips else RUN_WAITS):
             silent.add(name)
-        rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
+        rounds.append(Round(name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
         if on_round:
             on_round(rounds[-1])

@@ -60,23 +60,21 @@ def promised_by_slips(
     known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
     inside = [course.within(bounds) for course in courses(record, bounds, most) if course.name not in without]
 
-    pairs = [(i, j) for i in range(len(fits)) for j in range(len(fits)) if i != j]
+    nothing = np.zeros(len(fits) * (len(fits) - 1))
 
     def promised(course: Course) -> Vector:
-        """Return what a course promises of each pair, (pairs,)."""
-        told = np.zeros(len(pairs))
+        """Return what a course promises of each rival that answers against each other one, (pairs,)."""
+        told: list[float] = []
         for i in range(len(fits)):
             answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
             if answer is None:
-                return np.zeros(len(pairs))
-            forces = [SlipForces(fit, answer, [0], told.least_m) for fit, told in rivals]
+                return nothing
+            forces = [SlipForces(fit, answer, [0], slips.least_m) for fit, slips in rivals]
             if forces[i].landings.count < FEWEST:
-                return np.zeros(len(pairs))
+                return nothing
             left = [each.left(each.fitted) for each in forces]
-            for at, (answers, other) in enumerate(pairs):
-                if answers == i:
-                    told[at] = known[other].told_by(forces[other], left[other], left[i])
-        return told
+            told += [known[j].told_by(forces[j], left[j], left[i]) for j in range(len(fits)) if j != i]
+        return np.array(told)
 
     rated = np.array(list(on_threads(promised, inside, workers)))
     moves = np.array([max(1, course.moves) for course in inside])
