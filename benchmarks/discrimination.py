@@ -17,7 +17,7 @@ import argparse
 import json
 import time
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ from workbench.select.discrimination import (
 )
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment
-from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, courses
+from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms, courses
 from workbench.select.rival_race import RivalRace
 
 PERIOD_S = 0.01
@@ -57,21 +57,16 @@ WHOLE = 1000
 """More moves than an input of the menu has."""
 
 
-def menu(
-    race: RivalRace,
-    bounds: Bounds,
-    *,
-    seed: int,
-    most_moves: int,
-    workers: int | None,
-    without: Collection[str] = (),  # noqa: ARG001 -- what told nothing comes again: a diagnosis knows of no round before
-) -> DesignedExperiment | None:
-    """Choose the whole input of the menu as a diagnosis does; there are no shorter ones."""
-    if most_moves in (FEW_MOVES, MOST_MOVES):
+def menu(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+    """Choose the whole input of the menu as a diagnosis does; there are no shorter ones.
+
+    What told nothing comes again: a diagnosis knows of no round before.
+    """
+    if terms.most_moves in (FEW_MOVES, MOST_MOVES):
         return None
-    chosen = experiment(race.alive, race.record, seed=seed, workers=workers)
-    course = next(each for each in courses(race.record, bounds, WHOLE) if each.name == chosen.name)
-    return DesignedExperiment(course.within(bounds), np.inf)
+    chosen = experiment(race.alive, race.record, seed=terms.seed, workers=1)
+    course = next(each for each in courses(race.record, Terms(terms.bounds, WHOLE)) if each.name == chosen.name)
+    return DesignedExperiment(course, np.inf)
 
 
 def player(made: Hidden, dirty: bool, seed: int) -> Player:

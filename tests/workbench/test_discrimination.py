@@ -1,12 +1,12 @@
 """The odds on hand-made fits, the rounds with a scripted designer and player, and one whole journey in virtual time."""
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import log
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.discrimination import Discrimination, Played, Player, Round, discriminate
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg
+from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg, Terms
 from workbench.select.rival_race import RivalRace, Weighed, _independent_share, log_odds
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
@@ -137,19 +137,10 @@ class Design:
         self.asked: list[int] = []
         self.left_out: list[frozenset[str]] = []
 
-    def __call__(
-        self,
-        race: RivalRace,
-        bounds: Bounds,
-        *,
-        seed: int,
-        most_moves: int,
-        workers: int | None,
-        without: Collection[str] = (),
-    ) -> DesignedExperiment | None:
-        self.asked.append(most_moves)
-        self.left_out.append(frozenset(without))
-        course = self.course if most_moves <= MOST_MOVES else self.otherwise
+    def __call__(self, race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+        self.asked.append(terms.most_moves)
+        self.left_out.append(terms.without)
+        course = self.course if terms.most_moves <= MOST_MOVES else self.otherwise
         return DesignedExperiment(course, self.separation, by_slips=self.by_slips)
 
 
@@ -200,9 +191,9 @@ def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], record
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
 
     class Once(Design):
-        def __call__(self, *given: Any, without: Collection[str] = (), **how: Any) -> DesignedExperiment | None:
-            chosen = super().__call__(*given, without=without, **how)
-            return None if without else chosen
+        def __call__(self, race: RivalRace, terms: Terms) -> DesignedExperiment | None:
+            chosen = super().__call__(race, terms)
+            return None if terms.without else chosen
 
     design = Once(2.0)
     found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)

@@ -16,7 +16,7 @@ from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import local_fit
-from workbench.select.experiment_design import Bounds
+from workbench.select.experiment_design import Bounds, Terms
 from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
 from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_m, slips
 from workbench.select.slip_promise import promised_by_slips
@@ -295,7 +295,7 @@ def promised(
 ) -> float:
     low_pa, high_pa = float(record.command_pa.min()), float(record.command_pa.max())
     bounds = Bounds(low_pa, high_pa, 400e3, 26.0, -0.1 * window_m, window_m)
-    found = promised_by_slips([(fits[name], told[name]) for name in names], record, [0, ROWS], bounds, most=4, seed=0)
+    found = promised_by_slips([(fits[name], told[name]) for name in names], record, [0, ROWS], Terms(bounds, 4))
     return 0.0 if found is None else found[1]
 
 

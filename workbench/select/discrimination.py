@@ -12,10 +12,10 @@ experiment is played for them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import exp, inf, log
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import parameters_json
 from workbench.select.effect_search import Progress
 from workbench.select.equivalence import classes
-from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, designed
+from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms
 from workbench.select.rival_race import ODDS, RivalRace
 
 if TYPE_CHECKING:
@@ -58,37 +58,14 @@ Player = Callable[[DesignedExperiment], Played]
 """Plays an experiment on the valve, real or simulated."""
 
 
-class Designer(Protocol):
-    """Chooses the next experiment."""
-
-    def __call__(
-        self,
-        race: RivalRace,
-        bounds: Bounds,
-        *,
-        seed: int,
-        most_moves: int,
-        workers: int | None,
-        without: Collection[str] = (),
-    ) -> DesignedExperiment | None:
-        """Return it, of another name than those; None if none is allowed."""
-        ...
+Designer = Callable[[RivalRace, Terms], DesignedExperiment | None]
+"""Chooses the next experiment; None if none is allowed."""
 
 
-def by_run_or_slips(
-    race: RivalRace,
-    bounds: Bounds,
-    *,
-    seed: int,
-    most_moves: int,
-    workers: int | None,
-    without: Collection[str] = (),
-) -> DesignedExperiment | None:
+def by_run_or_slips(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
     """Return the experiment that its run or its slips recommend, whichever promises more a move."""
-    how: dict[str, Any] = {"seed": seed, "most_moves": most_moves, "without": without}
-    by_run = designed(race.alive, race.record, bounds, workers=workers, **how)
-    both = [each for each in (by_run, race.slip_experiment(bounds, **how)) if each]
-    return max(both, key=lambda each: race.promised_by(each, most_moves), default=None)
+    both = [each for each in (race.run_experiment(terms), race.slip_experiment(terms)) if each]
+    return max(both, key=lambda each: race.promised_by(each, terms.most_moves), default=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,7 +232,7 @@ def discriminate(
     while outcome is None:
         left, number = budget - used, len(rounds) + 1
         tell(f"choosing experiment {number}", used / budget)
-        chosen = _chosen(race, bounds, design, left, seed + len(rounds), workers, silent)
+        chosen = _chosen(race, Terms(bounds, left, seed + len(rounds), frozenset(silent)), design)
         if chosen is None or _promises_nothing(race, chosen, left):
             if silent:
                 silent.clear()
@@ -295,15 +272,7 @@ def _alike(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
     return all(before[name] * exp(-NOTHING) <= odds <= before[name] * exp(NOTHING) for name, odds in after.items())
 
 
-def _chosen(
-    race: RivalRace,
-    bounds: Bounds,
-    design: Designer,
-    left: int,
-    seed: int,
-    workers: int | None,
-    without: Collection[str],
-) -> DesignedExperiment | None:
+def _chosen(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:
     """Return the shortest experiment that promises the odds by itself, or the one that promises most if repeated.
 
     Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
@@ -311,9 +280,9 @@ def _chosen(
     A run that promised, was played and told nothing will not by being played again: it waits until nothing else does.
     Slips promise a mean, about which luck scatters by as much: they wait when they have told nothing twice.
     """
-    best = None
+    best, left = None, terms.most_moves
     for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):
-        chosen = design(race, bounds, seed=seed, most_moves=most, workers=workers, without=without)
+        chosen = design(race, replace(terms, most_moves=most))
         if chosen is None:
             continue
         if race.promised(chosen) >= SURE * log(ODDS):

@@ -19,7 +19,7 @@ valve that answered. A slip that only luck decides mistimes both, and separates 
 Every course stays inside its bounds: pressures, rate, length; and every rival says that the stem stays in its window.
 """
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -69,6 +69,17 @@ class Bounds:
     longest_s: float
     low_m: float
     high_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """On which the next experiment is chosen: its bounds, its moves, and names of what is not to be played."""
+
+    bounds: Bounds
+    most_moves: int = MOST_MOVES
+    seed: int = 0
+    """Of the changes tried, and of the noise under which rivals answer."""
+    without: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,32 +169,25 @@ class DesignedExperiment(Brief):
 def designed(
     fits: Sequence[Fit],
     record: Record,
-    bounds: Bounds,
+    terms: Terms,
     *,
-    seed: int = 0,
-    most_moves: int = MOST_MOVES,
     workers: int | None = None,
-    without: Collection[str] = (),
 ) -> DesignedExperiment | None:
     """Design the experiment that best tells fitted valves apart; None if no course stays inside the bounds.
 
     Args:
         fits: two or more.
         record: of all recordings so far.
-        bounds: to stay inside.
-        seed: of the changes tried, and of the noise.
-        most_moves: of the experiment.
+        terms: to keep to.
         workers: threads, by default one a core.
-        without: names of inputs of the menu that are left out.
     """
-    rivalry = Rivalry(fits, record, bounds, seed)
-    menu = (course for course in courses(record, bounds, most_moves) if course.name not in without)
-    starts = [course.within(bounds) for course in menu]
+    rivalry = Rivalry(fits, record, terms)
+    starts = list(courses(record, terms))
     scores = list(on_threads(rivalry.score, starts, workers))
     order = sorted((i for i, score in enumerate(scores) if score > -np.inf), key=lambda i: -scores[i])
 
     def improved(i: int) -> Course:
-        return _improved(rivalry, starts[i], scores[i], bounds, np.random.default_rng([seed, i]))
+        return _improved(rivalry, starts[i], scores[i], terms.bounds, np.random.default_rng([terms.seed, i]))
 
     kept = order[:KEPT]
     found = [*on_threads(improved, kept, workers), *(starts[i] for i in kept)]
@@ -231,16 +235,17 @@ def _changed(course: Course, bounds: Bounds, generator: np.random.Generator) -> 
     return replace(course, legs=tuple(legs)).within(bounds)
 
 
-def courses(record: Record, bounds: Bounds, most_moves: int) -> Iterator[Course]:
-    """Yield stretches of so many moves of each input of the menu, at its own pace and drawn out to the whole length."""
+def courses(record: Record, terms: Terms) -> Iterator[Course]:
+    """Yield stretches of each input of the menu that keep to the terms, drawn out to the whole length."""
+    bounds = terms.bounds
     least_pa, most_pa = float(record.command_pa.min()), float(record.command_pa.max())
     low_pa, high_pa = max(least_pa, bounds.minimum_pa), min(most_pa, bounds.maximum_pa)
     room_s = min(LENGTH_S, bounds.longest_s - REST_S)
-    for name, shape in MENU.items():
-        first, legs = _legs(shape)
-        most = max(0, len(legs) - most_moves)
+    for name in (each for each in MENU if each not in terms.without):
+        first, legs = _legs(MENU[name])
+        most = max(0, len(legs) - terms.most_moves)
         for begin in sorted({round(most * share) for share in np.linspace(0.0, 1.0, WINDOWS)}):
-            chosen = legs[begin : begin + most_moves]
+            chosen = legs[begin : begin + terms.most_moves]
             level = legs[begin - 1].level_pa if begin else first
             lengths_s = sum(leg.ramp_s + leg.hold_s for leg in chosen)
             drawn_out = room_s / lengths_s
@@ -252,7 +257,7 @@ def courses(record: Record, bounds: Bounds, most_moves: int) -> Iterator[Course]
                 name,
                 pressure(level),
                 tuple(Leg(pressure(leg.level_pa), drawn_out * leg.ramp_s, drawn_out * leg.hold_s) for leg in chosen),
-            )
+            ).within(bounds)
 
 
 def _legs(shape: Shape) -> tuple[float, list[Leg]]:
@@ -276,10 +281,10 @@ def _legs(shape: Shape) -> tuple[float, list[Leg]]:
 class Rivalry:
     """Fitted valves held against each other's answers."""
 
-    def __init__(self, fits: Sequence[Fit], record: Record, bounds: Bounds, seed: int) -> None:
+    def __init__(self, fits: Sequence[Fit], record: Record, terms: Terms) -> None:
         self._record = record
-        self._bounds = bounds
-        self._seed = seed
+        self._bounds = terms.bounds
+        self._seed = terms.seed
         self._compositions = [Composition.from_file(each.valve) for each in fits]
         self._names = [tuple(each.parameters) for each in fits]
         self._sigma_m = max(record.floor_or_scale_m, min(each.rms_m for each in fits))

@@ -31,7 +31,7 @@ Nothing is named by a search that failed: rivals that have lost are searched ane
 is named, and the best must explain the experiments as well as a model can.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -62,7 +62,7 @@ from workbench.select.block_errors import (
     relative_error_reduction,
 )
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import Bounds, DesignedExperiment
+from workbench.select.experiment_design import DesignedExperiment, Terms, designed
 from workbench.select.slip_evidence import Slips, needed_m, slips
 from workbench.select.slip_promise import promised_by_slips
 
@@ -209,24 +209,17 @@ class RivalRace:
         """Return by how much an experiment is to raise the log odds, repeated for so many moves."""
         return self.promised(chosen) * max(1.0, moves / max(1, chosen.course.moves))
 
-    def slip_experiment(
-        self, bounds: Bounds, *, most_moves: int, seed: int, without: Collection[str] = ()
-    ) -> DesignedExperiment | None:
+    def run_experiment(self, terms: Terms) -> DesignedExperiment | None:
+        """Return the experiment designed for the runs of the rivals left; None if no course stays inside the bounds."""
+        return designed(self.alive, self.record, terms, workers=self._workers)
+
+    def slip_experiment(self, terms: Terms) -> DesignedExperiment | None:
         """Return the input of the menu whose slips promise most; None where slips do not tell of all rivals left."""
         left = [self._all[name] for name in self._alive]
         told = [(each.fit, each.slips) for each in left if each.slips]
         if len(told) < len(left):
             return None
-        chosen = promised_by_slips(
-            told,
-            self.record,
-            self._first_rows,
-            bounds,
-            most=most_moves,
-            seed=seed,
-            workers=self._workers,
-            without=without,
-        )
+        chosen = promised_by_slips(told, self.record, self._first_rows, terms, workers=self._workers)
         return None if chosen is None else DesignedExperiment(chosen[0], 1.0, by_slips=chosen[1])
 
     @property

@@ -14,7 +14,7 @@ no course tells apart, however often repeated: what else is suspected can still 
 On a valve that scatters a slow ramp of many slips tells more than a large step: each leg is one move.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
 from workbench.fit.landings import FEWEST
 from workbench.fit.threads import on_threads
-from workbench.select.experiment_design import SEARCHED, Bounds, Course, Rivalry, courses
+from workbench.select.experiment_design import SEARCHED, Course, Rivalry, Terms, courses
 from workbench.select.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 
 Matrix = NDArray[np.float64]
@@ -36,30 +36,23 @@ def promised_by_slips(
     rivals: Sequence[tuple[Fit, Slips]],
     record: Record,
     first_rows: Sequence[int],
-    bounds: Bounds,
+    terms: Terms,
     *,
-    most: int,
-    seed: int,
     workers: int | None = None,
-    without: Collection[str] = (),
 ) -> tuple[Course, float] | None:
-    """Return the course of so many moves at most whose slips promise most a move, and by how much the log odds rise.
+    """Return the course whose slips promise most a move, and by how much the log odds rise.
 
     Args:
         rivals: two or more, and what slips have said of each.
         record: of all recordings so far.
         first_rows: of each recording in the record.
-        bounds: to stay inside.
-        most: moves.
-        seed: of the sensor's noise under which the rivals answer.
+        terms: to keep to.
         workers: threads, by default one a core.
-        without: names of what is not to be played.
     """
     fits = [fit for fit, _ in rivals]
-    rivalry = Rivalry(fits, record, bounds, seed)
+    rivalry = Rivalry(fits, record, terms)
     known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
-    inside = [course.within(bounds) for course in courses(record, bounds, most) if course.name not in without]
-
+    inside = list(courses(record, terms))
     nothing = np.zeros(len(fits) * (len(fits) - 1))
 
     def promised(course: Course) -> Vector:
