@@ -179,6 +179,13 @@ def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit
     assert asked == {0, 1}, "the first one is left out of what is chosen next"
 
 
+def test_what_a_whole_budget_would_tell_is_played_to_its_end(fits: dict[str, Fit], recording: Recording) -> None:
+    """That the last moves alone promise nothing does not say that the valve cannot tell."""
+    twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
+    found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=Design(1.0, by_slips=0.3), budget=4)
+    assert (found.outcome, found.moves) == ("budget_spent", 4)
+
+
 def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], recording: Recording) -> None:
     """They promise a mean, about which luck scatters."""
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}

@@ -39,7 +39,7 @@ BUDGET = 60
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
 IMITATED, NOTHING = 1.001, 0.5
-"""A separation below it is none; log odds that all moves left together must promise, and one experiment must change."""
+"""A separation below it is none; log odds that a whole budget of moves must promise, and one experiment must change."""
 RUN_WAITS, SLIPS_WAIT = 1, 2
 """How often in succession they have told nothing when they wait."""
 
@@ -113,6 +113,7 @@ class Discrimination(Result):
         left = " or ".join("/".join(each) for each in self.rivals if each[0] not in self.lost)
         lost = f"; ruled out: {', '.join(self.lost)}" if self.lost else ""
         after = f"after {self.moves} moves in {len(self.rounds)} experiments"
+        told = f"; best odds {_odds(self.odds)}" if self.rounds else ""
         match self.outcome:
             case "resolved":
                 same = f" ({' and '.join(self.named[1:])} would look the same)" if len(self.named) > 1 else ""
@@ -120,9 +121,9 @@ class Discrimination(Result):
             case "one_class":
                 return f"{who}: one by algebra, no record of pressure and position tells them apart"
             case "not_separable":
-                return f"{left}: cannot be told apart by this valve within these permissives ({after}{lost})"
+                return f"{left}: cannot be told apart by this valve within these permissives ({after}{told}{lost})"
             case "budget_spent":
-                return f"{left}: not told apart {after}, the budget; best odds {_odds(self.odds)}{lost}"
+                return f"{left}: not told apart {after}, the budget{told}{lost}"
             case "unexplained":
                 return f"none of {who} explains the experiments: something else is missing ({after})"
         return f"{who}: not told apart, the valve did not play on: {self.problem} ({after})"
@@ -233,7 +234,7 @@ def discriminate(
         left, number = budget - used, len(rounds) + 1
         tell(f"choosing experiment {number}", used / budget)
         chosen = _chosen(race, Terms(bounds, left, seed + len(rounds), frozenset(silent)), design)
-        if chosen is None or _promises_nothing(race, chosen, left):
+        if chosen is None or _promises_nothing(race, chosen, budget):
             if silent:
                 silent.clear()
                 told_nothing.clear()
@@ -263,8 +264,9 @@ def discriminate(
     return Discrimination(outcome, named, gathered, tuple(rounds), race.odds, race.fits, tuple(experiments), problem)
 
 
-def _promises_nothing(race: RivalRace, chosen: DesignedExperiment, left: int) -> bool:
-    return chosen.separation < IMITATED and race.promised_by(chosen, left) < NOTHING
+def _promises_nothing(race: RivalRace, chosen: DesignedExperiment, budget: int) -> bool:
+    """Whether it would tell nothing, repeated for a whole budget: what is left of it says nothing of the valve."""
+    return chosen.separation < IMITATED and race.promised_by(chosen, budget) < NOTHING
 
 
 def _alike(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
