@@ -14,12 +14,14 @@ from sim.simulation import simulate
 from tests.sim.test_positioner import PA_PER_M, valve_file
 from tests.workbench.valves import with_effect
 from workbench import compare, fit
+from workbench.data.held_out import split
 from workbench.data.record import ready
 from workbench.model.free_run import Accuracy, FreeRun
 from workbench.model.sampling import DYNAMIC
 from workbench.report import Subject, report_comparison
 from workbench.select.effect_acceptance import Gain
-from workbench.select.positioner_or_packing import PositionerOrPacking, cause
+from workbench.select.effect_search import evaluated
+from workbench.select.positioner_or_packing import PositionerOrPacking, cause, positioner_or_packing
 
 KNOWN = valve_file(200.0, gain_pa_per_ms=0.4 * PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
 
@@ -162,3 +164,48 @@ def test_evidence_of_samples_that_hang_together_is_none() -> None:
     """A slip that comes late is off for all samples until the next."""
     late = Gain(500.0, 0.4, 8.0, 0.01)
     assert cause(late, late) == "not told"
+
+
+SMALL = {
+    "both": valve_file(300.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.006, filling_pa_per_s=9e3, venting_pa_per_s=6e3),
+    "positioner": valve_file(
+        5.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.008, filling_pa_per_s=9e3, venting_pa_per_s=6e3
+    ),
+}
+
+
+def small_moves(valve: ValveFile) -> Recording:
+    """Two minutes of small changes of the set point, in which the stem moves a few times."""
+    generator = np.random.default_rng(3)
+    setpoint_m, here, k = np.empty(130), 0.05, 0
+    while k < setpoint_m.size:
+        here += 0.004 * generator.standard_normal()
+        holds = int(generator.integers(3, 12))
+        setpoint_m[k : k + holds] = here
+        k += holds
+    whole = simulate(valve, np.arange(130.0), setpoint_m, noise_std_m=2e-4, seed=3)
+    measured_pa = whole.columns["pressure_pa"] + 100.0 * generator.standard_normal(130)
+    return Recording({**whole.columns, "pressure_pa": measured_pa})
+
+
+def asked(recording: Recording) -> PositionerOrPacking:
+    known = valve_file(200.0, gain_pa_per_ms=PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
+    parts = split([recording])
+    both = evaluated(fit(parts.train.recording, known, profile=False), parts)
+    return positioner_or_packing(parts, both, seed=0, workers=2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("held_by", ["both", "positioner"])
+def test_a_measured_pressure_tells_what_holds_the_stem(held_by: str) -> None:
+    found = asked(small_moves(SMALL[held_by]))
+    assert found.cause == held_by
+    assert "from the measured pressure" in found.sentence
+
+
+@pytest.mark.long
+def test_that_few_moves_do_without_friction_does_not_say_that_there_is_none() -> None:
+    columns = small_moves(SMALL["both"]).columns
+    found = asked(Recording({name: column for name, column in columns.items() if name != "pressure_pa"}))
+    assert found.cause == "at least positioner"
+    assert "whether friction holds the stem besides is not told" in found.sentence

@@ -87,9 +87,18 @@ class Fit(Result):
 
     def indicated_m(self, record: Record) -> Column:
         """Return the same of a recording made ready."""
+        run, theta = self._run_through(record)
+        return run.position_m(theta)
+
+    def pressure_pa(self, record: Record) -> Column:
+        """Return the actuator's pressure in a free run through a recording made ready, Pa; NaN as above."""
+        run, theta = self._run_through(record)
+        return run.run(theta).pressure_pa
+
+    def _run_through(self, record: Record) -> tuple[FreeRun, Vector]:
         composition = Composition.from_file(self.valve)
         by = self.by.of(record, self.valve.valve)
-        return FreeRun(composition, record, from_pressure=self.from_pressure, by=by).position_m(composition.theta)
+        return FreeRun(composition, record, from_pressure=self.from_pressure, by=by), composition.theta
 
     def score(self, recording: Recording) -> float:
         """Return 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than the mean."""

@@ -6,6 +6,7 @@ Its files:
     effect_search, effect_candidates              the library refitted step by step; one step
     forward_selection, candidate_table            shared with the balance of forces; what was tried, shown
     effect_acceptance, block_errors               the rule by which an effect is accepted; its statistics
+    pressure_errors                               how far a fit's pressure is off the measured one
     knife_edges                                   held-out slips that are narrowly mistimed, by name
     verdict, verdict_sentence                     what follows, and how it is said
     equivalence                                   what no recording tells apart

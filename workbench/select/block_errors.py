@@ -103,8 +103,8 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     fitted_m = residual_m(train, fit.indicated_m(train.record))
     held_out_m = residual_m(test, fit.indicated_m(test.record))
     rows = np.isfinite(held_out_m)
-    fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m, _block_s(train))
-    logs = block_logs(test.record.time_s, held_out_m, negligible_m, _block_s(test))
+    fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m, block_s(train))
+    logs = block_logs(test.record.time_s, held_out_m, negligible_m, block_s(test))
     test_rmse_m = float(np.sqrt(np.mean(held_out_m[rows] ** 2)))
     fitted_structure = structure(train.record, fitted_m, negligible_m)
     found = BlockErrors(
@@ -134,7 +134,8 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     return replace(found, knife_edges=edges, test_rest_rmse_m=rms(rest_m), structure=left)
 
 
-def _block_s(part: Part) -> float:
+def block_s(part: Part) -> float:
+    """Return the length of a block of a part, s."""
     return max(BLOCK_S, BLOCK_SAMPLES * part.record.period_s)
 
 

@@ -64,6 +64,11 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         return tuple(each.name for each in self.steps[-1].suspected)
 
     @property
+    def contradicted(self) -> tuple[str, ...]:
+        """Effects that do as well as what was added but for a pressure that was not measured."""
+        return tuple(each.name for step in self.steps for each in step.contradicted)
+
+    @property
     def choices(self) -> tuple[tuple[str, ...], ...]:
         """The sets of effects that may be added: what was found first, then one a rival; none where nothing helps."""
         added = self.missing

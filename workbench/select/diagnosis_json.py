@@ -26,6 +26,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "missing": list(diagnosis.missing),
         "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
         "suspected": list(diagnosis.suspected),
+        "contradicted": list(diagnosis.contradicted),
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,
@@ -46,6 +47,7 @@ def _model(model: EvaluatedModel) -> dict[str, Any]:
         "structure_r2": model.errors.structure,
         "rests_off_m": model.errors.rests.off_m if model.errors.rests else None,
         "rests_scatter_m": model.errors.rests.scatter_m if model.errors.rests else None,
+        "pressure_off_pa": model.pressure.rms_pa if model.pressure else None,
         "parameters": parameters_json(model.fit),
     }
 

@@ -20,6 +20,7 @@ from workbench.select.candidate_table import Tried
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, bic, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
+from workbench.select.pressure_errors import PressureErrors
 from workbench.select.residual_structure import STRUCTURED
 
 AT_END = 0.2
@@ -38,6 +39,8 @@ class EvaluatedModel(Brief):
     errors: BlockErrors
     floor_m: float | None
     """What no model explains, m; None if it is unknown."""
+    pressure: PressureErrors | None = None
+    """How far its pressure is off, where that was measured."""
 
     @property
     def at_floor(self) -> bool:
@@ -111,9 +114,11 @@ def judged_step(
     candidates = tuple(_after_first(each, tried.get(library[each.name].after)) for each in tried.values())
     equivalent = _bare_equivalent(candidates, before.at_floor, library)
     candidates, added = _best(_better_than(equivalent, candidates) if equivalent else candidates, library)
+    added = added and _backed_by_pressure(added, candidates, library)
     suspect = None if added or equivalent else _suspect(candidates, library)
     rivals, suspected = (_rivals(candidates, each, library) if each else () for each in (added, suspect))
-    return ForwardStep(before, candidates, added, rivals, equivalent, suspected)
+    contradicted = _contradicted(candidates, added, library) if added else ()
+    return ForwardStep(before, candidates, added, rivals, equivalent, suspected, contradicted)
 
 
 def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectCandidate, ...]:
@@ -121,13 +126,15 @@ def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectC
 
     The best of the held-out errors, if there it is no worse than the added one; then, in the first step, after which
     the most is still missing, the one with the most evidence, if that is `NEARLY_AS_EVIDENT`. One of the added one's
-    class is none: no recording tells them apart.
+    class is none: no recording tells them apart; nor is one that a measured pressure speaks against.
     """
     added = step.added
     if added is None or added.model is None:
         return ()
-    own = algebraic_class(added.name, library)
-    others = {each.name: each for each in step.candidates if each.accepted and each.model and each.name not in own}
+    no_others = algebraic_class(added.name, library) | {each.name for each in step.contradicted}
+    others = {
+        each.name: each for each in step.candidates if each.accepted and each.model and each.name not in no_others
+    }
     logs = {name: each.model.errors.logs for name, each in others.items() if each.model}
     held_out = min(logs, key=lambda name: float(logs[name].mean()), default=None)
     fitted = max(others, key=lambda name: others[name].evidence, default=None)
@@ -142,7 +149,12 @@ def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectC
 
 def with_added(step: EffectStep, candidate: EffectCandidate, library: Mapping[str, Effect]) -> EffectStep:
     """Return a step with another of its candidates added."""
-    return replace(step, added=candidate, indistinguishable=_rivals(step.candidates, candidate, library))
+    return replace(
+        step,
+        added=candidate,
+        indistinguishable=_rivals(step.candidates, candidate, library),
+        contradicted=_contradicted(step.candidates, candidate, library),
+    )
 
 
 def leads_farther(one: EvaluatedModel, other: EvaluatedModel) -> bool:
@@ -228,23 +240,57 @@ def _suspect(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect
 def _rivals(
     candidates: Sequence[EffectCandidate], best: EffectCandidate, library: Mapping[str, Effect]
 ) -> tuple[EffectCandidate, ...]:
-    """Return what is not told from the best, accepted or not: what narrowly passes the rule proves no more."""
-    assert best.model
+    """Return what is not told from the best, accepted or not: what narrowly passes the rule proves no more.
+
+    Where the pressure was measured it must not speak against them.
+    """
     refitted = {each.name: each for each in candidates if each.model}
-    as_good = [
-        each.name
-        for each in refitted.values()
-        if _may_be_there(each, library)
-        and each.model
-        and indistinguishable(best.model.errors.all_logs, each.model.errors.all_logs)
-    ]
+    as_good = _as_good(candidates, best, library)
+    models = [each.model for each in as_good if each.model]
+    backed = [each.name for each in as_good if each.model and not pressure_speaks_against(each.model, models)]
     # A class is one by algebra, whether or not the search for each of its members succeeded.
     return tuple(
         refitted[name]
-        for each in classes(as_good, library)
+        for each in classes(backed, library)
         for name in sorted(algebraic_class(min(each), library))
         if name in refitted
     )
+
+
+def _as_good(
+    candidates: Sequence[EffectCandidate], best: EffectCandidate, library: Mapping[str, Effect]
+) -> list[EffectCandidate]:
+    """Return what the position does not tell from the best."""
+    assert best.model
+    logs = best.model.errors.all_logs
+    return [
+        each
+        for each in candidates
+        if each.model and _may_be_there(each, library) and indistinguishable(logs, each.model.errors.all_logs)
+    ]
+
+
+def _backed_by_pressure(
+    best: EffectCandidate, candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]
+) -> EffectCandidate:
+    """Return the best, or what does as well on the position, if the measured pressure speaks for that one."""
+    backed = _rivals(candidates, best, library)
+    return best if best.name in {each.name for each in backed} else max(backed, key=_evidence, default=best)
+
+
+def _contradicted(
+    candidates: Sequence[EffectCandidate], added: EffectCandidate, library: Mapping[str, Effect]
+) -> tuple[EffectCandidate, ...]:
+    """Return what does as well on the position as the added one, and has a pressure that was not measured."""
+    as_good = _as_good(candidates, added, library)
+    models = [each.model for each in as_good if each.model]
+    return tuple(each for each in as_good if each.model and pressure_speaks_against(each.model, models))
+
+
+def pressure_speaks_against(model: EvaluatedModel, others: Sequence[EvaluatedModel]) -> bool:
+    """Whether the pressure was measured, and one of the others has it so much better that it is no chance."""
+    known = [each.pressure for each in others if each.pressure]
+    return model.pressure is not None and any(each.speaks_against(model.pressure) for each in known)
 
 
 def _may_be_there(candidate: EffectCandidate, library: Mapping[str, Effect]) -> bool:

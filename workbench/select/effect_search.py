@@ -40,12 +40,14 @@ from workbench.select.effect_candidates import (
     EvaluatedModel,
     judged_step,
     leads_farther,
+    pressure_speaks_against,
     runners_up,
     with_added,
 )
 from workbench.select.equivalence import algebraic_class, bare_imitation, classes
 from workbench.select.experiment import Experiment, experiment
 from workbench.select.forward_selection import MOST_ADDED, without_missing
+from workbench.select.pressure_errors import pressure_errors
 
 MOST_STEPS = 5
 """Steps made at most: a step that is judged anew is followed by others."""
@@ -194,7 +196,9 @@ class EffectSearch:
         as_good = {
             member
             for name, each in beside.items()
-            if isinstance(each, EvaluatedModel) and indistinguishable(last.errors.all_logs, each.errors.all_logs)
+            if isinstance(each, EvaluatedModel)
+            and indistinguishable(last.errors.all_logs, each.errors.all_logs)
+            and not pressure_speaks_against(each, [last])
             for member in algebraic_class(name, self._library)
         }
         own_rivals = {each.name for each in step.indistinguishable if each.name in own}
@@ -408,7 +412,7 @@ class EffectSearch:
 
 def evaluated(fit: Fit, split: Split) -> EvaluatedModel:
     """Return a fit with how it does on what was held out."""
-    return EvaluatedModel(fit, block_errors(fit, split), split.floor_m)
+    return EvaluatedModel(fit, block_errors(fit, split), split.floor_m, pressure_errors(fit, split))
 
 
 def _parted(racers: Mapping[str, BegunFit]) -> tuple[dict[str, BegunFit], dict[str, BegunFit]]:

@@ -51,6 +51,8 @@ class ForwardStep(Brief, Generic[FittedT, CandidateT]):
     """What would be accepted but that it is the bare valve by another name: a parameter that is kept is off."""
     suspected: tuple[CandidateT, ...] = ()
     """Where nothing is added: what would be if more were left to explain, and all that is not told from it."""
+    contradicted: tuple[CandidateT, ...] = ()
+    """Those that do as well as the added one but for a pressure that was not measured."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -8,15 +8,21 @@ out.
     no second search came as low        not told
     friction needed, dead band not      the packing
     dead band needed, friction not      the positioner
+    the same, but the other may be      at least that one: a few moves do without much that is there
+    there, half as large
     both needed                         both
     neither needed                      one stands in for the other, or none is there: not told
+
+Where the actuator's pressure was measured, each is asked on its own side of it: friction from the pressure to the stem,
+with the positioner out of the path; the dead band from the set point to the stem, with spring and friction kept as they
+were found there. What the pressure's noise makes of friction is none: its play, 2 F_c / k_s, must be `WORTH` times what
+the valve with friction leaves. Where that does not tell, the set point is asked alone.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import inf
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from config.results.result import Brief
 from config.valve_file import EffectTable, ValveFile
@@ -26,13 +32,18 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.fit.setpoint_starts import FREE
 from workbench.select.block_errors import block_errors
-from workbench.select.effect_acceptance import Gain, gain
+from workbench.select.effect_acceptance import LEAST_BIC, Gain, gain
 from workbench.select.effect_candidates import EvaluatedModel
 
-Cause = Literal["packing", "positioner", "both", "not told"]
+Cause = Literal["packing", "positioner", "both", "at least packing", "at least positioner", "not told"]
 DEAD_BAND = "dead_band_m"
 AS_LOW = 1.25
 """Factor on the cost of the best search."""
+HALF = 0.5
+"""Of what is needed: so much of the other must be excluded, where that is not needed."""
+WORTH = 4.0
+"""Times what is left, that friction found from a measured pressure must be worth."""
+NOTHING = Gain(0.0, 0.0, 0.0, 1.0)
 NO_FRICTION = 1e-3
 """Of the fitted one: what a stem without friction has left, by which it comes to rest."""
 
@@ -54,34 +65,48 @@ class PositionerOrPacking(Brief):
     """What friction alone leaves unanswered, 2 F_c / k_s."""
     found_twice: bool
     """Whether a second search came as low."""
+    with_friction_m: float | None = None
+    """Held-out rms error from the measured pressure; None where none was measured, and all are from the set point."""
 
     @property
     def sentence(self) -> str:
         """Say it."""
-        held = (
-            f"held-out errors: {1e3 * self.with_both_m:.3g} mm with friction and dead band, "
-            f"{1e3 * self.without_dead_band_m:.3g} without dead band, {1e3 * self.without_friction_m:.3g} without "
-            "friction"
-        )
+        return f"{self._said} ({self._held})."
+
+    @property
+    def _said(self) -> str:
+        """Say it, but for the errors."""
         friction = f"friction that is worth {1e3 * self.play_m:.3g} mm of the spring ({self.friction_n:.3g} N)"
         band = f"a dead band of {1e3 * self.dead_band_m:.3g} mm"
-        match self.cause:
-            case "packing":
-                return f"It is the packing, not the positioner: {friction}; no dead band is needed ({held})."
-            case "positioner":
-                return f"It is the positioner, not the packing: {band}; no friction is needed ({held})."
-            case "both":
-                return f"It is both, packing and positioner: {friction}, and {band} ({held})."
-            case "not told" if not self.found_twice:
-                return (
-                    f"Whether positioner or packing holds the stem is not told: no second search came as low ({held})."
-                )
-            case "not told":
-                return (
-                    "This recording does not tell the positioner's dead band from the packing's friction: either does "
-                    f"without the other ({held}). Measured actuator pressure would: a dead band leaves it still, "
-                    "friction lets it rise until the stem jumps."
-                )
+        besides = "holds the stem besides is not told"
+        if self.cause == "not told" and not self.found_twice:
+            return "Whether positioner or packing holds the stem is not told: no second search came as low"
+        said: dict[Cause, str] = {
+            "packing": f"It is the packing, not the positioner: {friction}; no dead band is needed",
+            "positioner": f"It is the positioner, not the packing: {band}; no friction is needed",
+            "both": f"It is both, packing and positioner: {friction}, and {band}",
+            "at least packing": f"It is the packing: {friction}; whether a dead band {besides}",
+            "at least positioner": f"It is the positioner: {band}; whether friction {besides}",
+            "not told": "This recording does not tell the positioner's dead band from the packing's friction, either "
+            "does without the other; measured actuator pressure would: a dead band leaves it still, friction lets it "
+            "rise until the stem jumps",
+        }
+        return said[self.cause]
+
+    @property
+    def _held(self) -> str:
+        """Say the held-out errors."""
+        without_mm, both_mm = 1e3 * self.without_friction_m, 1e3 * self.with_both_m
+        band = f"{1e3 * self.without_dead_band_m:.3g} without dead band"
+        if self.with_friction_m is None:
+            return (
+                f"held-out errors: {both_mm:.3g} mm with friction and dead band, {band}, {without_mm:.3g} without "
+                "friction"
+            )
+        return (
+            f"held-out errors: from the measured pressure {1e3 * self.with_friction_m:.3g} mm with friction, "
+            f"{without_mm:.3g} without; from the set point {both_mm:.3g} mm with dead band too, {band}"
+        )
 
 
 def positioner_or_packing(
@@ -97,30 +122,85 @@ def positioner_or_packing(
         progress: called with the fraction done.
     """
     tell = progress or (lambda _: None)
-    name = positioner_of(both.fit.valve).name
-    free = [each for each in both.fit.parameters if each != f"{name}.{DEAD_BAND}"]
     refit = partial(fit, split.train.recording, seed=seed, workers=workers, profile=False)
-    no_band = refit(_with(both.fit.valve, name, {DEAD_BAND: 0.0}), free=free, progress=lambda done: tell(0.5 * done))
-    frictionless = refit(
-        _frictionless(both.fit.valve),
-        free=[each for each in both.fit.parameters if each not in FREE],
-        progress=lambda done: tell(0.5 + 0.5 * done),
-    )
-    bare = {each: block_errors(found, split) for each, found in (("band", no_band), ("friction", frictionless))}
-    friction = gain(frictionless, both.fit, bare["friction"], both.errors)
-    dead_band = gain(no_band, both.fit, bare["band"], both.errors)
+    if all(each.record.pressure_pa is not None for each in (split.train, split.test)):
+        stem = refit(both.fit.valve, from_pressure=True)
+        banded = refit(stem.valve, free=[each for each in both.fit.parameters if each not in FREE], progress=tell)
+        found = _asked(split, stem, banded, refit, tell)
+        if found.cause != "not told":
+            return found
+    return _asked(split, both.fit, both.fit, refit, tell)
+
+
+def _asked(
+    split: Split, stem: Fit, banded: Fit, refit: Callable[..., Fit], tell: Callable[[float], None]
+) -> PositionerOrPacking:
+    """Hold the valve against itself without friction, and without the dead band.
+
+    Args:
+        split: the recording.
+        stem: with friction, fitted from the set point or from the measured pressure.
+        banded: with the dead band, from the set point; the same if that tells.
+        refit: fits a valve to what is fitted.
+        tell: called with the fraction done.
+    """
+    positioner = positioner_of(banded.valve).name
+    dead_band = f"{positioner}.{DEAD_BAND}"
+
+    def with_friction(n: float, done: float) -> Fit:
+        free = [each for each in stem.parameters if each not in FREE]
+        valve = _with_friction(stem.valve, n)
+        return refit(valve, from_pressure=stem.from_pressure, free=free, progress=lambda part: tell(done + 0.3 * part))
+
+    def with_dead_band(m: float, done: float) -> Fit:
+        free = [each for each in banded.parameters if each != dead_band]
+        valve = _with(banded.valve, positioner, {DEAD_BAND: m})
+        return refit(valve, free=free, progress=lambda part: tell(done + 0.3 * part))
+
+    valve, band_m = stem.valve.valve, _value(banded, dead_band)
+    n_per_m = 0.5 * valve.spring_n_per_m
+    play_m = valve.coulomb_n / n_per_m if n_per_m else 0.0
+    friction = _worth(with_friction(NO_FRICTION * valve.coulomb_n, 0.0), stem, split)
+    band = _worth(with_dead_band(0.0, 0.3), banded, split)
+    if stem.from_pressure and play_m < WORTH * friction.with_m:
+        friction = friction._replace(gain=NOTHING)
+    found = cause(friction.gain, band.gain) if _found_twice(banded) else "not told"
+    if found == "packing" and not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split):
+        found = "at least packing"
+    if found == "positioner" and not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split):
+        found = "at least positioner"
     return PositionerOrPacking(
-        cause(friction, dead_band) if _found_twice(both.fit) else "not told",
-        friction,
-        dead_band,
-        bare["friction"].test_rmse_m,
-        bare["band"].test_rmse_m,
-        both.errors.test_rmse_m,
-        _value(both.fit, "coulomb_n"),
-        _value(both.fit, f"{name}.{DEAD_BAND}"),
-        2.0 * _value(both.fit, "coulomb_n") / (both.fit.valve.valve.spring_n_per_m or inf),
-        _found_twice(both.fit),
+        found,
+        friction.gain,
+        band.gain,
+        friction.without_m,
+        band.without_m,
+        band.with_m,
+        valve.coulomb_n,
+        band_m,
+        play_m,
+        _found_twice(banded),
+        friction.with_m if stem.from_pressure else None,
     )
+
+
+def _excluded(other: Fit, found: Fit, split: Split) -> bool:
+    """Whether the recording speaks against another valve, by as many of its samples as are independent."""
+    against = _worth(other, found, split).gain
+    return against.independent_share * against.bic > LEAST_BIC
+
+
+class _Worth(NamedTuple):
+    """What something is worth, and the held-out rms errors with and without it, m."""
+
+    gain: Gain
+    with_m: float
+    without_m: float
+
+
+def _worth(bare: Fit, full: Fit, split: Split) -> _Worth:
+    without, there = block_errors(bare, split), block_errors(full, split)
+    return _Worth(gain(bare, full, without, there), there.test_rmse_m, without.test_rmse_m)
 
 
 def cause(friction: Gain, dead_band: Gain) -> Cause:
@@ -150,9 +230,12 @@ def _with(valve: ValveFile, name: str, changes: Mapping[str, float]) -> ValveFil
     return ValveFile(valve=valve.valve, effect=tuple(tables))
 
 
-def _frictionless(valve: ValveFile) -> ValveFile:
-    left_n = NO_FRICTION * valve.valve.coulomb_n
-    return valve.model_copy(update={"valve": valve.valve.model_copy(update={"coulomb_n": left_n, "static_n": left_n})})
+def _with_friction(valve: ValveFile, coulomb_n: float) -> ValveFile:
+    base = valve.valve
+    static_n = coulomb_n * (base.static_n / base.coulomb_n if base.coulomb_n else 1.0)
+    return valve.model_copy(
+        update={"valve": base.model_copy(update={"coulomb_n": coulomb_n, "static_n": static_n})},
+    )
 
 
 def _found_twice(found: Fit) -> bool:

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 
-from config.drive import Scale
+from config.drive import Kind, Scale
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
+from workbench.select.pressure_errors import PressureErrors
 from workbench.select.verdict import Verdict, by_another_name
 
 SCATTERS = 3.0
@@ -37,6 +38,7 @@ def _said(
     repeat = "" if parts.repeats else REPEAT
     or_another = ", or another that does as well" if verdict == "one_of" else ""
     apart = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
+    by_pressure = "".join(_by_pressure(step, best.fit.kind) for step in steps)
     off = _kept_off(by_another_name(steps), best)
     if off and verdict in ("adequate", "missing", "one_of"):
         begun = f"Missing: {names}{or_another}; {fell}. But" if names else "No effect is missing, but"
@@ -47,11 +49,11 @@ def _said(
         return said + suspicion + _scatter(parts, length)
     if verdict == "missing":
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
-        return said + knife_edges_sentence(best.errors, length) + suspicion
+        return said + by_pressure + knife_edges_sentence(best.errors, length) + suspicion
     if verdict == "one_of":
         all_known = _floors_left(best.errors, parts) <= NOISE_KNOWN_TO
         left = "" if all_known else f", and {_left(best.errors, parts, steps[-1].suspected)}"
-        said = f"Missing: {names}{or_another}; {fell}{left}.{apart}"
+        said = f"Missing: {names}{or_another}; {fell}{left}.{apart}{by_pressure}"
         return said + knife_edges_sentence(best.errors, length) + suspicion
     several = sum(step.added is not None for step in steps) > 1
     lowers, explains = ("lower", "explain") if several else ("lowers", "explains")
@@ -141,6 +143,22 @@ def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:
         if distinguishing_record(name, other, library) or len(classes((name, other), library)) == 1
     ]
     return "".join(texts) or f" Equally good: {', '.join(names)}."
+
+
+def _by_pressure(step: EffectStep, kind: Kind) -> str:
+    """Say what the measured pressure speaks against, with a leading space; empty where it need not be asked."""
+    added = step.added and step.added.model and step.added.model.pressure
+    off = [f"{each.name}'s by {kind.command.read.said(of.rms_pa)}" for each in step.contradicted if (of := _of(each))]
+    if not added or not step.added or not off:
+        return ""
+    return (
+        f" The measured {kind.command.word} tells them apart: {step.added.name}'s is off by "
+        f"{kind.command.read.said(added.rms_pa)} rms, {', '.join(off)}."
+    )
+
+
+def _of(candidate: EffectCandidate) -> PressureErrors | None:
+    return candidate.model.pressure if candidate.model else None
 
 
 def _elsewhere(best: EvaluatedModel, names: str, length: Scale) -> str:

@@ -1,0 +1,90 @@
+"""A measured actuator pressure: what does as well on the position, and commands another pressure, is no rival."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from config.recording import Column, Recording
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from sim.open_loop import respond
+from tests.workbench.hand_made import LIBRARY, model_of
+from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, pressures, with_effect
+from workbench.data.held_out import split
+from workbench.fit.fitting import fit
+from workbench.select.diagnosis import diagnose
+from workbench.select.effect_candidates import EvaluatedModel, judged_step
+from workbench.select.pressure_errors import PressureErrors, pressure_errors
+
+COUNT = 3000
+COMMAND_PA: Column = pressures(np.random.default_rng(2), COUNT)
+BARE = drawn_valve(np.random.default_rng(11))
+LIMITED = with_effect(BARE, "supply_limit", supply_pa=0.8 * float(COMMAND_PA.max()), exhaust_pa=-101325.0)
+SPAN, ZERO_PA, NOISE_PA = 1.02, 900.0, 200.0
+"""Of the pressure transmitter."""
+
+
+def recorded(valve: ValveFile, *, measured: bool = True) -> Recording:
+    generator = np.random.default_rng(3)
+    composition = Composition.from_file(valve)
+    begin_m = float(COMMAND_PA[0]) * BARE.valve.diaphragm_area_m2 / BARE.valve.spring_n_per_m
+    answer = respond(
+        composition,
+        composition.theta,
+        COMMAND_PA[:-1],
+        PERIOD_S,
+        position_m=begin_m,
+        pressure_pa=float(COMMAND_PA[0]),
+    )
+    position_m = answer.indicated_m + NOISE_M * generator.standard_normal(COUNT)
+    pressure_pa = SPAN * answer.pressure_pa + ZERO_PA + NOISE_PA * generator.standard_normal(COUNT)
+    time_s: Column = PERIOD_S * np.arange(COUNT, dtype=np.float64)
+    columns: dict[str, Column] = {"time_s": time_s, "command_pa": COMMAND_PA, "position_m": position_m}
+    return Recording(columns | ({"pressure_pa": pressure_pa} if measured else {}))
+
+
+def with_pressure(model: EvaluatedModel, off_pa: float) -> EvaluatedModel:
+    return replace(model, pressure=PressureErrors(off_pa, np.log(np.full(30, off_pa))))
+
+
+def test_a_supply_limit_is_told_from_a_stop_by_the_measured_pressure() -> None:
+    """Without it either is as good: `supply_limit or end_stop`."""
+    found = diagnose(recorded(LIMITED), BARE, effects=("supply_limit", "end_stop"), workers=1)
+    assert (found.verdict, found.missing, found.contradicted) == ("missing", ("supply_limit",), ("end_stop",))
+    assert "The measured pressure tells them apart: supply_limit's is off by 0." in found.sentence
+    assert "end_stop's by" in found.sentence
+
+
+def test_zero_and_span_of_the_transmitter_are_not_held_against_a_valve() -> None:
+    recording = recorded(BARE)
+    errors = pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording]))
+    assert errors is not None
+    assert errors.rms_pa == pytest.approx(NOISE_PA, rel=0.1)
+
+
+def test_without_a_measured_pressure_nothing_is_said_of_it() -> None:
+    recording = recorded(BARE, measured=False)
+    assert pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording])) is None
+
+
+def test_the_one_with_the_most_evidence_gives_way_to_the_one_whose_pressure_was_measured() -> None:
+    before = model_of(cost=4e5, error_m=1e-3)
+    stop, limit = model_of("end_stop", cost=990.0), model_of("supply_limit", cost=1010.0)
+    models = {"end_stop": with_pressure(stop, 2500.0), "supply_limit": with_pressure(limit, 200.0)}
+    step = judged_step(before, models, 1, LIBRARY)
+    assert step.added
+    assert step.added.name == "supply_limit"
+    assert [each.name for each in step.indistinguishable] == ["supply_limit"]
+    assert [each.name for each in step.contradicted] == ["end_stop"]
+
+
+def test_a_pressure_that_is_as_far_off_by_chance_tells_nothing() -> None:
+    before = model_of(cost=4e5, error_m=1e-3)
+    stop, limit = model_of("end_stop", cost=990.0), model_of("supply_limit", cost=1010.0)
+    models = {"end_stop": with_pressure(stop, 201.0), "supply_limit": with_pressure(limit, 200.0)}
+    step = judged_step(before, models, 1, LIBRARY)
+    assert step.added
+    assert step.added.name == "end_stop"
+    assert {each.name for each in step.indistinguishable} == {"supply_limit", "end_stop"}
+    assert step.contradicted == ()

@@ -1,0 +1,64 @@
+"""How far a fit's pressure is off the measured one, second by second: what lies before the actuator, what at the stem.
+
+    p_measured = c_0 + c_1 p + e     c_0, c_1 by least squares: zero and span of a transmitter are nobody's effect
+    l_b = log rms of e in block b    the blocks of `block_errors`
+
+Effects that do as well on the position may do it by different pressures: a supply limit cuts the pressure, a stop
+does not. Where the actuator's pressure was measured, it tells them apart. The transmitter is taken at its word: a lag
+of its own is a lag of the pressure.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from config.recording import Column
+from config.results.result import Brief
+from workbench.data.held_out import Part, Split
+from workbench.fit.fit_result import Fit
+from workbench.select.block_errors import block_logs, block_s, indistinguishable
+
+NEGLIGIBLE = 1e-3
+"""Of the standard deviation of the measured pressure: what an error below it is does not matter."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PressureErrors(Brief):
+    """How far a fit's pressure is off the measured one, zero and span of the transmitter apart."""
+
+    rms_pa: float
+    logs: Column
+    """l_b of the fitted and the held-out blocks, (blocks,)."""
+
+    def speaks_against(self, other: "PressureErrors") -> bool:
+        """Whether another's pressure is off by more than this one's, and not by chance."""
+        return not indistinguishable(self.logs, other.logs)
+
+
+def pressure_errors(fit: Fit, split: Split) -> PressureErrors | None:
+    """Return how far a fit's pressure is off; None where none was measured, or the fit begins with the measured one."""
+    parts = (split.train, split.test)
+    if fit.from_pressure or any(each.record.pressure_pa is None for each in parts):
+        return None
+    errors_pa = [_error_pa(fit, each) for each in parts]
+    scale_pa = NEGLIGIBLE * max(float(np.nanstd(_measured_pa(each))) for each in parts)
+    logs = [
+        block_logs(part.record.time_s, error_pa, scale_pa, block_s(part))
+        for part, error_pa in zip(parts, errors_pa, strict=True)
+    ]
+    return PressureErrors(float(np.sqrt(np.nanmean(np.concatenate(errors_pa) ** 2))), np.concatenate(logs))
+
+
+def _measured_pa(part: Part) -> Column:
+    assert part.record.pressure_pa is not None
+    return np.where(part.counted, part.record.pressure_pa, np.nan)
+
+
+def _error_pa(fit: Fit, part: Part) -> Column:
+    """Return e, Pa, (n,), NaN where it does not count."""
+    measured_pa, pressure_pa = _measured_pa(part), fit.pressure_pa(part.record)
+    rows = np.isfinite(measured_pa) & np.isfinite(pressure_pa)
+    A = np.column_stack([np.ones(rows.sum()), pressure_pa[rows]])
+    error_pa = np.full(rows.size, np.nan)
+    error_pa[rows] = measured_pa[rows] - A @ np.linalg.lstsq(A, measured_pa[rows])[0]
+    return error_pa
