@@ -260,8 +260,11 @@ class Landings:
 
     def landed(self, theta: Vector, pressure_pa: Column) -> tuple[Loaded, Vector]:
         """Return each landing, under the pressure in which it came to rest, and sigma_j, N, (landings,)."""
-        # From the last motion to when the rest has settled.
-        ranges = [_range(pressure_pa[each.moved : each.first + SETTLING]) for each in self._landed]
+        # From the last motion to when the rest has settled; a pressure that jumps at a sample has jumped before a slide
+        # that was over by the next one.
+        by = self._error.run.by
+        later = 1 if by.slow and by.held and not self.behind_path else 0
+        ranges = [_range(pressure_pa[each.moved + later : each.first + SETTLING]) for each in self._landed]
         landed = self._loaded(
             (each, each.first, pressures[each.direction > 0], each.direction)
             for each, pressures in zip(self._landed, ranges, strict=True)

@@ -47,6 +47,8 @@ EXCESSES = (1.0, 0.5, 0.1)
 """Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
 AT_BEST, EACH_SEED = 2, 1
 """Strengths begun at the best base fit, and at each other."""
+AS_GOOD = 1.1
+"""Times the least cost of landings, within which they do not tell one solution from another."""
 LANDED_BASE, LANDED_EFFECT = 1, 2
 """Searches begun at each half of the landings."""
 ENOUGH_RESTS = 6
@@ -209,25 +211,32 @@ def told_starts(
     """Return the same where samples lie farther apart than slides last: each landing by itself, then static friction.
 
     Told which way the stem went, the model lands by the static balance whatever static friction is: no stairs, so that
-    every strength leads down to the landings' solution. Where landings are all that is judged, that is the search.
+    most strengths lead down to the landings' solution. Which did is told by the landings too, and by the simulation
+    only once static friction is there: while that is off, the solution misses slips that a worse one happens to make.
+    Where landings are all that is judged, that is the search.
     """
     if not error.run.by.held:
         return []
     run = FreeRun(error.composition, error.run.record, from_pressure=error.run.from_pressure, by=TOLD)
     landing = tuple(each for each in error.parameters if each.index != STATIC)
-    solved = []
+    solved: list[tuple[float, Vector]] = []
     for theta in seeds:
         there = SimulationError(run, error.composition, landing, theta)
         if there.count < FEWEST_JUDGED:
             return []
-        for values in points:
+        for values in dict.fromkeys(points):
             begin = there.coordinates(_changed(theta, added, values))
-            solved.append(there.theta(descended(there, descended(there, begin, WIDE), MIDDLING)))
+            z = descended(there, descended(there, begin, WIDE), MIDDLING)
+            solved.append((there.cost(z), there.theta(z)))
+    least = min((cost for cost, _ in solved), default=0.0)
+    best = [theta for cost, theta in solved if cost <= AS_GOOD * least]
     static = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
-    ratios = [scaled(theta, STATIC, factor) for theta in solved for factor in STATIC_FACTORS]
-    return [
-        Place(_in_motion(error, z, static), "landings") for z in error.screened(map(error.coordinates, ratios), count)
+    broken_loose = [
+        _in_motion(error, z, static)
+        for theta in best
+        for z in error.screened([error.coordinates(scaled(theta, STATIC, each)) for each in STATIC_FACTORS], count)
     ]
+    return [Place(z, "landings") for z in error.screened(broken_loose, count)]
 
 
 def _changed(theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:
