@@ -10,6 +10,7 @@ Its files:
     knife_edges                                   held-out slips that are narrowly mistimed, by name
     verdict, verdict_sentence                     what follows, and how it is said
     equivalence                                   what no recording tells apart
+    moved_parameters                              what the file's own effects are by the recording
     kept_mass                                     what another mass than the valve file's would leave
     positioner_or_packing                         what holds a stem behind its positioner
     tangent_preview                               the quick first ranking

@@ -28,6 +28,7 @@ from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable, unseen_without_spring
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
+from workbench.select.moved_parameters import Moved, moved_parameters
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
 from workbench.select.verdict import Verdict, verdict
@@ -52,6 +53,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Effects that were not tried, and why a recording sampled like this one cannot show them."""
     positioner: PositionerOrPacking | None = None
     """Of a recording of set point and travel: what holds the stem."""
+    moved: tuple[Moved, ...] = ()
+    """Parameters of the file's own effects that the recording wants elsewhere."""
 
     @property
     def kind(self) -> Kind:
@@ -208,6 +211,8 @@ def diagnose(
         except (BrokenOff, KeyboardInterrupt):
             steps, found, chosen = search.so_far(base), "unfinished", None
             base, best = steps[0].before, _last(steps)
+    own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
+    moved = moved_parameters(valve, best.fit, library | own)
     return Diagnosis(
         steps=steps,
         verdict=found,
@@ -216,9 +221,11 @@ def diagnose(
         preview=scores,
         experiment=chosen,
         split=parts,
-        sentence=verdict_sentence(found, best, steps, library, parts),
+        sentence=verdict_sentence(found, best, steps, library, parts)
+        + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved),
         unseen=unseen,
         positioner=held,
+        moved=moved,
     )
 
 

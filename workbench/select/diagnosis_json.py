@@ -27,6 +27,17 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "indistinguishable": [list(names) for names in diagnosis.indistinguishable],
         "suspected": list(diagnosis.suspected),
         "contradicted": list(diagnosis.contradicted),
+        "moved": [
+            {
+                "name": each.name,
+                "before": each.before,
+                "value": each.fitted.value,
+                "lower": _finite(each.fitted.lower),
+                "upper": _finite(each.fitted.upper),
+                "like": list(each.like),
+            }
+            for each in diagnosis.moved
+        ],
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,

@@ -1,0 +1,37 @@
+"""A parameter of the valve file that the recording wants elsewhere is said, with what may look the same."""
+
+import pytest
+
+from config.drive import KINDS
+from config.valve_file import EffectTable, ValveFile
+from tests.workbench.hand_made import LIBRARY, fit_of
+from tests.workbench.valves import SEED
+from workbench.fit.fitted_parameter import Fitted
+from workbench.select.moved_parameters import Moved, moved_parameters
+
+
+def moved(before_n: float, lower_n: float, upper_n: float) -> tuple[Moved, ...]:
+    preload = EffectTable.model_validate({"name": "preload", "force_n": before_n})
+    value_n = 0.5 * (lower_n + upper_n)
+    found = Fitted(value_n, 1.0, lower_n, upper_n, at_bound=False, physical=True)
+    fit = fit_of("preload", found={"preload.force_n": found})
+    return moved_parameters(ValveFile(valve=SEED.valve, effect=(preload,)), fit, LIBRARY)
+
+
+def test_a_preload_that_the_recording_excludes_is_said_with_what_may_look_the_same() -> None:
+    (found,) = moved(900.0, 938.0, 941.0)
+    assert found.name == "preload.force_n"
+    assert {"asymmetric_friction", "sensor_offset"} <= {*found.like}
+    said = found.sentence(KINDS["valve"])
+    assert "by the recording preload.force_n is 939.5 (95 %: 938 to 941), not 900 as in the valve file; " in said
+    assert "asymmetric_friction" in said
+
+
+@pytest.mark.parametrize(("lower_n", "upper_n"), [(850.0, 960.0), (901.0, 905.0)], ids=["unsure", "next to nothing"])
+def test_one_that_is_not_excluded_or_hardly_moved_is_no_news(lower_n: float, upper_n: float) -> None:
+    assert moved(900.0, lower_n, upper_n) == ()
+
+
+def test_what_the_file_leaves_at_nothing_counts_however_little_it_moves() -> None:
+    (found,) = moved(0.0, 2.0, 4.0)
+    assert found.before == 0.0

@@ -1,0 +1,67 @@
+"""What a valve file says of its own effects, and a fit says otherwise: a preload of the data sheet that was moved.
+
+A file's effects are free in every fit. What is missing may be made up for by one of them: an asymmetric friction by
+another preload. So where a fitted parameter excludes the file's value, that is said, with the effects that it may stand
+in for, by their files' `CONFOUNDED`. What a positioner is set to is a guess to begin with.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from config.drive import Kind
+from config.valve_file import ValveFile
+from sim.effect import Effect
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitted_parameter import Fitted
+from workbench.select.equivalence import algebraic_class, distinguishing_record
+
+WORTH_SAYING = 0.01
+"""Of the file's value: a smaller shift is no news, however narrow the interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A parameter of one of the file's effects, before and as it was fitted, and what it may stand in for."""
+
+    name: str
+    before: float
+    fitted: Fitted
+    like: tuple[str, ...]
+
+    def sentence(self, kind: Kind) -> str:
+        """Say so."""
+        after = self.fitted
+        same = f"; {' or '.join(self.like)} may look the same" if self.like else ""
+        return kind.text(
+            f"by the recording {self.name} is {after.value:.4g} (95 %: {after.lower:.4g} to {after.upper:.4g}), "
+            f"not {self.before:.4g} as in the valve file{same}"
+        )
+
+
+def moved_parameters(file: ValveFile, fit: Fit, library: Mapping[str, Effect]) -> tuple[Moved, ...]:
+    """Return the parameters of a file's effects whose value the fit excludes.
+
+    Args:
+        file: where the fit began.
+        fit: with intervals.
+        library: all effects by name, the file's too.
+    """
+    there = {each.name for each in fit.valve.effect}
+    return tuple(
+        Moved(f"{table.name}.{key}", before, found, _like(table.name, library, there))
+        for table in file.effect
+        if table.name in library and not library[table.name].by_setpoint
+        for key, before in table.parameters.items()
+        if (found := fit.parameters.get(f"{table.name}.{key}")) and _excluded(before, found)
+    )
+
+
+def _excluded(before: float, found: Fitted) -> bool:
+    outside = not found.lower <= before <= found.upper
+    return outside and abs(found.value - before) > WORTH_SAYING * abs(before)
+
+
+def _like(name: str, library: Mapping[str, Effect], there: set[str]) -> tuple[str, ...]:
+    same = algebraic_class(name, library)
+    others = [each for each in library if each not in there]
+    return tuple(each for each in others if each in same or distinguishing_record(name, each, library))
