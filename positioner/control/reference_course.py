@@ -14,7 +14,8 @@ and the reference has come to rest when it has stood for 1.5 Δ. Until then, of 
 What two slides correct in a run that goes nowhere, abs(sum d_i) <= 0.7 sum abs(d_i), is the error from the median r_m
 of the last references: an excursion that lands at the reference of the moment lands a scatter off, and the next
 references ask for another one. Where one slide reaches the reference itself, it goes there. A small step within such a
-run is corrected when half of the references kept have confirmed it, or when it has come to rest.
+run is corrected when half of the references kept have confirmed it, or when it has come to rest. References as far
+apart as one slide goes, max r_i - min r_i >= m, are no scatter but steps to and fro, and each of them is meant.
 
 A ramp followed by slides of a way m, for no shorter one breaks the stem loose, leaves a sawtooth. Slides that land at
 the reference leave errors of 0 to m, rms m/sqrt(3), those that land ahead of it by half of m
@@ -86,12 +87,16 @@ class ReferenceCourse:
             return 0
         return 1 if min(last_m) > 0.0 else -1 if max(last_m) < 0.0 else 0
 
-    def middle_m(self, now_s: float) -> float:
-        """Return r_m, m: what the references scatter about; of one that rests, or goes somewhere, itself."""
+    def middle_m(self, now_s: float, way_m: float) -> float:
+        """Return r_m, m: what the references scatter about; of one that rests, goes somewhere, or steps, itself.
+
+        They step where they lie a slide of way_m, the shortest, or more apart.
+        """
         net_m, sum_m = abs(sum(self.changes_m)), sum(abs(each) for each in self.changes_m)
         if len(self.changes_m) < A_TREND or net_m > GOES_ON * sum_m or self.rests(now_s):
             return self.value_m
-        return median(accumulate(self.changes_m, sub, initial=self.value_m))
+        last_m = tuple(accumulate(self.changes_m, sub, initial=self.value_m))
+        return median(last_m) if max(last_m) - min(last_m) < way_m else self.value_m
 
     def lead_m(self, now_s: float, way_m: float) -> float:
         """Return how far ahead of the reference, m, signed, a slide is to land, the shortest of which is way_m."""

@@ -155,15 +155,22 @@ def step(
 
 
 def _asked_m(memory: SlideMemory, observation: StemObservation, settings: SlideSettings) -> float:
-    """Return where the stem is to be, m: the reference, or, where that takes two slides, what it scatters about."""
+    """Return where the stem is to be, m: the reference, or, where that takes two slides, what it scatters about.
+
+    A stem that stands on its reference stays there.
+    """
     course = memory.course
     if not course.changes_m:
         return course.value_m
-    error_m = course.value_m - observation.position_m
+    stands_m = observation.position_m if observation.rest is None else observation.rest.position_m
+    error_m = course.value_m - stands_m
     margin = memory.margins.of(1 if error_m > 0 else -1, turning=True)
-    if not memory.excursion and abs(error_m) >= _way_m(memory, margin, settings):
+    reached = not memory.excursion and abs(error_m) >= _way_m(memory, margin, settings)
+    if reached or abs(error_m) <= settings.dead_band_m:
         return course.value_m
-    return course.middle_m(observation.now_s)
+    kinds = ((s, turning) for s in (1, -1) for turning in (True, False))
+    shortest_m = min(_way_m(memory, memory.margins.of(s, turning=turning), settings) for s, turning in kinds)
+    return course.middle_m(observation.now_s, shortest_m)
 
 
 def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: float, settings: SlideSettings) -> bool:

@@ -39,11 +39,18 @@ def test_errors_of_a_few_changes_are_left_until_the_reference_rests() -> None:
 
 def test_what_scatters_is_corrected_to_its_middle_and_what_goes_somewhere_to_itself() -> None:
     course, now_s = written((*NOISE_M, 0.0606))
-    assert course.middle_m(now_s) == pytest.approx(0.06015)
-    assert course.middle_m(now_s + 0.8) == 0.0606, "none came: it stays"
+    assert course.middle_m(now_s, WAY_M) == pytest.approx(0.06015)
+    assert course.middle_m(now_s + 0.8, WAY_M) == 0.0606, "none came: it stays"
     for somewhere in (RAMP_M, (*NOISE_M, 0.0650)):
         course, now_s = written(somewhere)
-        assert course.middle_m(now_s) == somewhere[-1]
+        assert course.middle_m(now_s, WAY_M) == somewhere[-1]
+
+
+def test_steps_to_and_fro_have_no_middle() -> None:
+    """As far apart as one slide goes: each of them is meant."""
+    course, now_s = written((0.050, 0.040, 0.055, 0.045, 0.060), every_s=1.0)
+    assert course.middle_m(now_s, WAY_M) == 0.060
+    assert course.middle_m(now_s, 0.021) == 0.050, "of a stem that no shorter slide moves they are a scatter"
 
 
 def test_the_same_reference_again_is_none() -> None:

@@ -12,6 +12,7 @@ from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller_memory import Decision
+from positioner.control.reference_course import ReferenceCourse
 from positioner.control.requests import Requests
 from positioner.control.slide_law import Balance, step
 from positioner.control.slide_margins import Margin, Margins
@@ -245,6 +246,27 @@ def test_noise_of_a_reference_is_not_chased_and_what_stays_of_it_is_reached() ->
     assert np.ptp(path) < 1e-3
     assert loop.decision.inhibit_reason is InhibitReason.REFERENCE_COMES
     assert abs(loop.step_to(0.603)[-1] - 0.603) < 1e-3
+
+
+@pytest.mark.parametrize("law", ["slides", "moves"])
+def test_steps_to_and_fro_within_the_scan_of_a_dcs_are_each_reached_once(law: str) -> None:
+    """The last of them stands: the stem does not leave it for the middle of those before."""
+    loop = Loop(0.02, law=law)
+    for at in (0.5, 0.4, 0.55, 0.45):
+        assert abs(loop.step_to(at, cycles=50)[-1] - at) < 1e-3
+    path = loop.step_to(0.6, cycles=350)
+    assert np.abs(np.diff(path)).sum() < 0.16
+    assert abs(path - 0.6)[25:].max() < 1e-3
+
+
+def test_a_stem_on_its_reference_is_not_moved_to_what_the_references_scatter_about() -> None:
+    """Their middle lies 0.6 mm off, and going on in the direction of the last slide 0.55 mm would break it loose."""
+    margins = replace(KNOWN, onward_up=Margin(5.4e-4, 5.5e-4))
+    course = ReferenceCourse()
+    for index, value_m in enumerate((0.0605, 0.06061, 0.0606, 0.06061, 0.0606, 0.0607, 0.06)):
+        course = course.after(0.5 * index, value_m)
+    memory = SlideMemory(target_m=0.06, course=course, anchor=Anchor(0.06, 1), margins=margins, level_pa=60e3)
+    assert within(0.06, 3.1, True, memory).level_pa == 60e3
 
 
 def test_the_staircase_stays_in_its_window_and_leaves_what_it_found_when_it_fails() -> None:
