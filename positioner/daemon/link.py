@@ -92,7 +92,7 @@ class Link:
         """The pressure that acts from the last sample on, if it is known."""
         self._commanded_s = math.inf
         """When the last command set out, or the device was looked at, on the gateway's clock."""
-        self._returned_s = math.inf
+        self._begun_s = self._returned_s = math.inf
         self._unattended_s = 0.0
         self._backoff = Backoff()
         self._sayings = Sayings()
@@ -161,9 +161,11 @@ class Link:
         return self._sample
 
     def begin(self) -> None:
-        """Be called regularly from now on. What took long before that is no stall, but the device is looked at."""
-        self._connected &= awake_s() - self._commanded_s <= self._longest_unattended_s
-        self._returned_s = math.inf
+        """Be called regularly from now on. What took long before that is no stall, but the device is looked at.
+
+        Whether it was too long the next exchange finds: until then the device goes on being without commands.
+        """
+        self._begun_s, self._returned_s = awake_s(), math.inf
 
     def leave(self, command_pa: float) -> None:
         """Give the device its last command, in Pa, and say so when it cannot be reached; none if it is only read."""
@@ -181,18 +183,20 @@ class Link:
         self._driver.close()
 
     def _notice_a_stall(self, now_s: float, command_pa: float) -> None:
-        """Have the device looked at before it is commanded, where this daemon stood still."""
-        since_s = self._commanded_s if self._connected else self._returned_s
-        if now_s - since_s <= self._longest_unattended_s:
+        """Have a device that was left alone looked at before it is commanded; say so where this daemon stood still."""
+        since_s, allowed_s = self._commanded_s if self._connected else self._returned_s, self._longest_unattended_s
+        if now_s - since_s <= allowed_s:
+            return
+        self._connected = False
+        if 0.0 <= now_s - self._begun_s <= allowed_s:  # it was set up meanwhile
             return
         self._unattended_s = now_s - since_s
-        self._connected = False
         log_event(
             log,
             logging.ERROR,
             "the daemon stood still",
             unattended_s=round(self._unattended_s, 4),
-            allowed_s=self._longest_unattended_s,
+            allowed_s=allowed_s,
             commanded_pa=command_pa,
         )
 

@@ -158,6 +158,41 @@ def test_a_daemon_that_stood_still_looks_at_the_device_before_it_commands_it(
     assert "the daemon stood still" in caplog.text
 
 
+@pytest.mark.parametrize("setting_up_s", [0.3, 0.49, 0.7])
+def test_a_set_up_that_took_long_is_no_stall_but_the_device_is_looked_at_before_it_is_commanded_again(
+    setting_up_s: float, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """One that took a little less than is allowed is more than that by the first cycle."""
+    clock = Stopwatch(monkeypatch)
+    driver = Scripted(reading(1), reading(3), reading(5), held_pa=0.0)
+    link = Link(driver, DevicePace(), LinkSettings(longest_unattended_s=0.5))
+    link.open()
+    link.exchange(5e4)
+    clock.now_s += setting_up_s
+    link.begin()
+    clock.now_s += 0.1
+    driver.shown = reading(2)
+    sample = link.exchange(5e4)
+    too_long = setting_up_s + 0.1 > 0.5
+    assert (sample.quality, sample.unattended_s) == (Quality.GOOD, 0.0)
+    assert sample.held_pa == (0.0 if too_long else None), "what it holds tells whether it acted by itself"
+    assert driver.sent_pa == ([5e4] if too_long else [5e4, 5e4])
+    assert "the daemon stood still" not in caplog.text
+    link.exchange(0.0)
+    clock.now_s += 0.6
+    assert link.exchange(0.0).unattended_s == pytest.approx(0.6), "from then on a stall is one"
+
+
+def test_a_daemon_that_stood_still_before_its_first_cycle_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Stopwatch(monkeypatch)
+    link = Link(Scripted(reading(1)), DevicePace(), LinkSettings(longest_unattended_s=0.5))
+    link.open()
+    link.exchange(5e4)
+    link.begin()
+    clock.now_s += 0.6
+    assert link.exchange(5e4).unattended_s == pytest.approx(0.6)
+
+
 def test_a_stall_is_told_even_where_the_device_is_found_only_later(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Stopwatch(monkeypatch)
     driver = Scripted(reading(1), reading(4))
