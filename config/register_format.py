@@ -42,16 +42,20 @@ class Format:
         """Whether the value is a floating-point number."""
         return self.type in ("float32", "float64")
 
+    def holds(self, value: float) -> bool:
+        """Return whether a value is whole where it must be."""
+        return self.is_float or (math.isfinite(value) and value == int(value))
+
     def encode(self, value: float) -> list[int]:
-        """Return the registers of a value; whole-number types are rounded to nearest.
+        """Return the registers of a value; nothing is rounded to a whole number, which may mean something else.
 
         Raises:
-            ValueError: the type cannot hold the value (out of range, or not a number where it must be one).
+            ValueError: the type cannot hold the value (out of range, no number or none that is whole).
         """
         if not self.is_float:
-            if not math.isfinite(value):
+            if not self.holds(value):
                 raise ValueError(f"{value} does not fit {self.type}")
-            value = round(value)
+            value = int(value)
         try:
             packed = struct.pack(">" + LETTER[self.type], value)
         except (struct.error, OverflowError):

@@ -69,9 +69,11 @@ class Register:
         # Written so that NaN, for which no comparison holds, is outside.
         low = self.minimum is None or value >= self.minimum
         high = self.maximum is None or value <= self.maximum
-        if low and high:
-            return None
-        return f"{self.name}: allowed is {self.minimum:g} to {self.maximum:g} {self.unit}, got {value:g}"
+        if not (low and high):
+            return f"{self.name}: allowed is {self.minimum:g} to {self.maximum:g} {self.unit}, got {value:g}"
+        if not self.format.holds(value):
+            return f"{self.name}: allowed is a whole number, {self.minimum:g} to {self.maximum:g}, got {value}"
+        return None
 
 
 def _writable(

@@ -140,7 +140,7 @@ class SupervisoryRegisters:
         if register.format.is_float:
             return register.format.encode(value)
         low, high = (-32768, 32767) if register.type == "int16" else (0, (1 << 16 * register.format.words) - 1)
-        return register.format.encode(min(max(value, low), high) if math.isfinite(value) else 0)
+        return register.format.encode(round(min(max(value, low), high)) if math.isfinite(value) else 0)
 
     def _decoded(self, address: int, words: Sequence[int]) -> dict[str, float]:
         """Return the values written, by name, in the order of their addresses."""

@@ -33,7 +33,15 @@ def test_known_numbers_lie_as_the_specification_has_them(
 
 @pytest.mark.parametrize(
     ("kind", "value"),
-    [("uint16", 65536), ("uint16", -1), ("int16", 32768), ("float32", 1e39), ("int32", math.nan), ("uint64", math.inf)],
+    [
+        ("uint16", 65536),
+        ("uint16", -1),
+        ("int16", 32768),
+        ("float32", 1e39),
+        ("int32", math.nan),
+        ("uint64", math.inf),
+        ("uint16", 1.5),
+    ],
 )
 def test_what_does_not_fit_is_refused(kind: WireType, value: float) -> None:
     with pytest.raises(ValueError, match="does not fit"):

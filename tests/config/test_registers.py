@@ -36,6 +36,12 @@ def test_a_reference_beyond_the_stroke_is_named() -> None:
     assert BY_NAME["state"].problem_with(1) == "state is read-only"
 
 
+def test_a_register_of_whole_numbers_refuses_others() -> None:
+    assert BY_NAME["mode"].problem_with(1.5) == "mode: allowed is a whole number, 0 to 2, got 1.5"
+    assert BY_NAME["eta_1"].problem_with(0.4)
+    assert BY_NAME["mode"].problem_with(2.0) is None
+
+
 def test_an_unknown_name_is_answered_with_near_ones() -> None:
     with pytest.raises(InputError, match="allowed: position, position_m"):
         register_named("position_m_raw")
