@@ -164,13 +164,11 @@ def _asked_m(memory: SlideMemory, observation: StemObservation, settings: SlideS
         return course.value_m
     stands_m = observation.position_m if observation.rest is None else observation.rest.position_m
     error_m = course.value_m - stands_m
-    margin = memory.margins.of(1 if error_m > 0 else -1, turning=True)
-    reached = not memory.excursion and abs(error_m) >= _way_m(memory, margin, settings)
+    ways_m = {s: _way_m(memory, memory.margins.of(s, turning=True), settings) for s in (1, -1)}
+    reached = not memory.excursion and abs(error_m) >= ways_m[1 if error_m > 0 else -1]
     if reached or abs(error_m) <= settings.dead_band_m:
         return course.value_m
-    kinds = ((s, turning) for s in (1, -1) for turning in (True, False))
-    shortest_m = min(_way_m(memory, memory.margins.of(s, turning=turning), settings) for s, turning in kinds)
-    return course.middle_m(observation.now_s, shortest_m)
+    return course.middle_m(observation.now_s, min(ways_m.values()))
 
 
 def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: float, settings: SlideSettings) -> bool:
