@@ -63,6 +63,18 @@ def test_a_stem_that_answers_late_is_waited_for() -> None:
     assert [(each.landing, each.command_pa) for each in then] == [(True, 60e3), (True, 70e3), (True, 80e3)]
 
 
+def test_a_stem_set_free_long_after_the_command_is_not_waited_for_so_long_again() -> None:
+    """It sat for 40 s; the next step is answered at once, and judged within two seconds."""
+
+    def freed(elapsed_s: float, before_m: float, to_m: float) -> float:
+        return to_m if to_m != 0.06 or elapsed_s > 40.0 else before_m
+
+    held, landed = outcomes((50e3, 0.05), (60e3, 0.06), (70e3, 0.07), path=freed, hold_s=50.0)
+    assert not held.moved
+    assert (landed.landing, landed.command_pa) == (True, 70e3)
+    assert landed.time_s - 100.0 < 2.0
+
+
 @pytest.mark.parametrize(("answer_s", "waited_s"), [(0.1, 0.6), (1.5, 2.5)], ids=["at once", "at a limited rate"])
 def test_a_large_step_says_how_long_large_steps_take(answer_s: float, waited_s: float) -> None:
     """Small steps took 0.3 s each. By their rate a step ten times as large would take 3 s; it may, or it may not."""

@@ -9,7 +9,8 @@ of the moving stem holds where it rests. No landing is
 
 How long a stem takes to answer is learnt: a stem that has not moved may yet, so it is waited for as long as the longest
 answer seen, for the size of the step (a rate limit), or, where the pressure is measured, from its arrival on
-(`pressure_arrival`). One that answers later still corrects what was learnt.
+(`pressure_arrival`). One that answers later still corrects what was learnt, but one that moves when ten times the
+longest answer has gone by has been set free by something else: that says nothing of how long it takes.
 """
 
 from math import isnan, nan, sqrt
@@ -33,6 +34,8 @@ FIRST_ANSWER_S = 1.0
 """Longest answer, until one was seen."""
 PATIENCE = 1.5
 """Longest answers for which a stem must have rested."""
+LATE = 10.0
+"""Longest answers, or first ones, after which a stem that moves has not answered the command."""
 FORGOTTEN = 0.9
 """Factor from answer to answer, so that one slow answer is not waited for ever."""
 SAME = 1e-9
@@ -118,9 +121,13 @@ class LandingDetector:
         """Return for how long a stem must have been waited for: longer, if it has not moved after a large step."""
         if self._known or abs(rest.position_m - self._from_m) > self._visible_m(rest):
             return PATIENCE * self.answers.longest_s
+        return PATIENCE * min(self._answers_s or FIRST_ANSWER_S, self._arrival.answered_s)
+
+    @property
+    def _answers_s(self) -> float:
+        """How long the stem takes to answer the last change of the command, as far as is learnt, s; 0: it is not."""
         longest_s, slowness_s_per_pa, _ = self.answers
-        waited_s = max(longest_s, slowness_s_per_pa * self._step_pa) or FIRST_ANSWER_S
-        return PATIENCE * min(waited_s, self._arrival.answered_s)
+        return max(longest_s, slowness_s_per_pa * self._step_pa)
 
     def _visible_m(self, rest: Rest) -> float:
         noise_m, least_m = VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m
@@ -210,8 +217,9 @@ class LandingDetector:
         if self._away < DISTURBED:
             return
         self.rest = None
-        if self._known:
-            self._level_s = time_s
+        late = time_s - self._level_s > LATE * max(self._answers_s, FIRST_ANSWER_S)
+        if self._known or late:
+            self._known, self._level_s = True, time_s
             self._window.restart(time_s)
         else:
             self._learn_answer(time_s - self._level_s)
