@@ -346,6 +346,9 @@ def read_effect(path: Path) -> Effect:
         source = path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError(str(path), f"line {line}: is not UTF-8 text, as Python is") from None
     return _declared(path, source)
 
 
@@ -395,7 +398,7 @@ def execute(source: str, path: Path, namespace: dict[str, Any]) -> None:
         exec(compile(source, path, "exec", dont_inherit=True), namespace)
     except SyntaxError as error:
         raise InputError(str(path), f"line {error.lineno}: {error.msg}") from None
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # an exit would be that of the command, with its status
         lines = [each.lineno for each in extract_tb(error.__traceback__) if each.filename == str(path)]
         where = f"line {lines[-1]}: " if lines else ""
         raise InputError(str(path), f"{where}{type(error).__name__}: {error}") from None

@@ -202,6 +202,21 @@ def test_what_it_says_of_itself_is_text(tmp_path: Path, text: str, expected: str
         read_effect(path)
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"import sys\nsys.exit(0)\n", "line 2: SystemExit: 0"),
+        (b"# weight\n# of 5 \xb5g\n", "line 2: is not UTF-8 text, as Python is"),
+    ],
+)
+def test_a_program_that_ends_or_is_no_text_is_one_line(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "own.py"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refusal:
+        read_effect(path)
+    assert str(refusal.value) == f"{path}: {said}"
+
+
 def test_an_effect_without_starts_can_be_simulated_but_not_fitted(tmp_path: Path) -> None:
     path = tmp_path / "weight.py"
     path.write_text(
