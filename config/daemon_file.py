@@ -13,16 +13,36 @@ from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, IPvAnyNetwork, model_validator
+from pydantic import BeforeValidator, Field, IPvAnyNetwork, model_validator
 
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import FolderName, Fraction, NearFile, NonNegative, Positive, Schema, read_toml, validated
+from config.loading import (
+    FolderName,
+    Fraction,
+    Many,
+    NearFile,
+    NonNegative,
+    Pair,
+    Positive,
+    Schema,
+    read_toml,
+    validated,
+)
 from config.record_tables import HistoryTable, RecorderTable
 from config.supervision_table import SafetyTable, SupervisionTable
 from config.tls_table import Tls
+
+
+def _written(network: object) -> object:
+    if isinstance(network, int | float):  # which would be an address by its number
+        raise ValueError("must be the address of a host or a network")
+    return network
+
+
+Network = Annotated[IPvAnyNetwork, BeforeValidator(_written)]
 
 
 class ValveTable(Schema):
@@ -91,11 +111,11 @@ class ExcitationTable(Schema):
     limit_s: Positive = 10.0
     kind: Literal["sine", "staircase"] | None = None
     """A sine for a fast loop, a staircase of slides for any; where nobody says, the law chooses."""
-    travel_window: tuple[Fraction, Fraction] = (0.1, 0.9)
+    travel_window: Pair[Fraction] = (0.1, 0.9)
     """Where the staircase may take the stem, as shares of the stroke."""
     staircase_limit_s: Positive = 600.0
     """The staircase ends by itself after this."""
-    permitted_travel: tuple[Fraction, Fraction] | None = None
+    permitted_travel: Pair[Fraction] | None = None
     """S3 begins inside it and is broken off beyond it, as shares of the stroke; wherever it is where nobody says."""
     consent: bool = False
     """Whether S3 needs register `experiment_consent` beside eta_1 = 0."""
@@ -112,7 +132,7 @@ class ExcitationTable(Schema):
 class ExperimentTable(Schema):
     """Table `[experiment]`: what an experiment that the DCS consents to must stay inside."""
 
-    travel_window: tuple[Fraction, Fraction] = (0.05, 0.95)
+    travel_window: Pair[Fraction] = (0.05, 0.95)
     """Beyond it the experiment is broken off, as shares of the stroke."""
     minimum_pa: NonNegative | None = None
     """Those of `[pressure]` where nobody says."""
@@ -177,9 +197,9 @@ class SupervisoryTable(Schema):
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     most_clients: Annotated[int, Field(ge=1, le=1000)] = 64
     clients_per_host: Annotated[int, Field(ge=1, le=1000)] = 56
-    allowed_networks: tuple[IPvAnyNetwork, ...] = ()
+    allowed_networks: Many[Network] = ()
     """Addresses or networks whence clients may come; empty: from anywhere."""
-    reserved_hosts: tuple[Host, ...] = ()
+    reserved_hosts: Many[Host] = ()
     """Addresses of the DCS: where all places are taken, another's is made free for them."""
     requests_per_s: NonNegative = 1000.0
     """Of each reserved host, and of all others together, who share it evenly; more wait. 0 is no limit."""

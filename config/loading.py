@@ -11,6 +11,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    Strict,
     Tag,
     ValidationError,
     ValidationInfo,
@@ -24,9 +25,12 @@ SHIPPED = Path(str(resources.files("config")))
 
 
 class Schema(BaseModel):
-    """A table a person writes: immutable, no unknown keys, finite numbers only."""
+    """A table a person writes: immutable, no unknown keys, finite numbers only, and nothing taken for a number.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    Arrays (`Many`, `Pair`) and paths (`NearFile`) alone are made of what TOML has in their place.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 Positive = Annotated[float, Field(gt=0)]
@@ -41,6 +45,12 @@ def _named(path: str) -> str:
     return path
 
 
+T = TypeVar("T")
+Many = Annotated[tuple[T, ...], Strict(False)]
+"""An array, of any length or"""
+Pair = Annotated[tuple[T, T], Strict(False)]
+"""of two."""
+
 FolderName = Annotated[str, AfterValidator(_named)]
 """A folder, from that of the file it is written in."""
 
@@ -50,8 +60,13 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     return Path((info.context or {}).get("folder", ""), path)
 
 
-NearFile = Annotated[Path, AfterValidator(_beside)]
+NearFile = Annotated[Path, Strict(False), AfterValidator(_beside)]
 """A path that counts from the folder of the file it is written in."""
+
+ARRAYS = ("tuple_type", "list_type")
+"""What is wrong where an array is wanted, as pydantic calls it."""
+SAID = {"path_type": "must be a path", "model_type": "must be a table"}
+"""What is said in place of pydantic's words, which name classes."""
 
 S = TypeVar("S", bound=Schema)
 
@@ -116,7 +131,11 @@ def _one_line(schema: type[BaseModel], error: ValidationError) -> str:
         return f"{key}: is required and missing{more}"
     if fault["type"] == "union_tag_invalid":
         return f"{key}.{_choice(error, fault['loc'])}{more}"
-    message = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] in ARRAYS:
+        tables = isinstance(fault["input"], dict)
+        message = f"must be an array of tables, [[{key}]]" if tables else f"must be an array, got {fault['input']!r}"
+        return f"{key}: {message}{more}"
+    message = SAID.get(fault["type"], fault["msg"].removeprefix("Value error, "))
     # A fault of a whole table says itself what is wrong in it.
     got = "" if isinstance(fault["input"], dict) else f", got {fault['input']!r}"
     return f"{key}: {message}{got}{more}"

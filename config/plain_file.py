@@ -31,7 +31,7 @@ def read_plain(path: Path, what: str = "text") -> str:
             raise InputError(source, "is not a regular file")
         if found.st_size > MOST_BYTES:
             raise InputError(source, f"has {found.st_size} bytes, allowed are {MOST_BYTES}")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # Windows' editors put a byte order mark before it
     except UnicodeDecodeError:
         raise InputError(source, f"is not {what}: it is not UTF-8 text") from None
     except OSError as error:

@@ -25,7 +25,7 @@ class SerialPort(Schema):
     """Of the serial device, such as /dev/ttyUSB0."""
     baud: Baud = 19200
     parity: Literal["none", "even", "odd"] = "even"
-    stop_bits: Literal[1, 2] = 1
+    stop_bits: Annotated[int, Field(ge=1, le=2)] = 1
     local_echo: bool = False
     """Whether a two-wire adapter hands back all that is sent."""
 

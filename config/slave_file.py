@@ -10,7 +10,7 @@ from config.canopen_device import CanBus
 from config.device import Host
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import NonNegative, Port, Positive, Schema, chosen_by, read_toml, validated
+from config.loading import Many, NonNegative, Port, Positive, Schema, chosen_by, read_toml, validated
 from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
@@ -164,8 +164,8 @@ class SlaveFile(Schema):
     initial: Initial = Initial()
     supply: Supply = Supply()
     communication: CommunicationTimeout = CommunicationTimeout()
-    change: tuple[Change, ...] = ()
-    fault: tuple[DeviceFault, ...] = ()
+    change: Many[Change] = ()
+    fault: Many[DeviceFault] = ()
 
     @model_validator(mode="after")
     def _bus_can_show_its_faults(self) -> Self:

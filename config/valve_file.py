@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from config.drive import KINDS, VALVE, Kind, KindName
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import SHIPPED, NonNegative, Positive, Schema, read_toml, validated
+from config.loading import SHIPPED, Many, NonNegative, Positive, Schema, read_toml, validated
 
 
 class ValveParameters(Schema):
@@ -60,7 +60,7 @@ class EffectTable(BaseModel):
     A name that ends in `.py` is the path of an engineer's own effect, as seen from the valve file's folder.
     """
 
-    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False, strict=True)
 
     name: str
 
@@ -80,7 +80,7 @@ class ValveFile(Schema):
     """A whole valve file."""
 
     valve: ValveParameters
-    effect: tuple[EffectTable, ...] = ()
+    effect: Many[EffectTable] = ()
 
 
 def load_valve(path: Path | str) -> ValveFile:

@@ -14,18 +14,18 @@ from pydantic import Field
 
 from config.errors import InputError
 from config.exports.column_mapping import read_mapping, read_status
-from config.loading import Positive, Schema, load
+from config.loading import Many, Pair, Positive, Schema, load
 
 
 class MappingTable(Schema):
     """Table `[export]`: the options of a command line by their names."""
 
-    column: Annotated[tuple[str, ...], Field(min_length=1)]
+    column: Annotated[Many[str], Field(min_length=1)]
     stroke_m: Positive | None = None
-    range_pa: tuple[float, float] | None = None
+    range_pa: Pair[float] | None = None
     decimal: Literal[".", ","] | None = None
     time_format: str | None = None
-    status: tuple[str, ...] = ()
+    status: Many[str] = ()
     sheet: str | None = None
 
 

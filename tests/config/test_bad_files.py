@@ -30,7 +30,7 @@ DAEMON_FILES = {
     "no folder": (VALVE + '[memory]\nfolder = ""\n', "memory.folder: must be the name"),
     "no host": (VALVE + '[supervisory]\nhost = ""\n', "supervisory.host: must be a host name or an IP address, got ''"),
     "a host of two lines": (VALVE + '[supervisory]\nhost = "a\\nb"\n', "supervisory.host: must be a host name"),
-    "a table that is a number": (f"supervisory = 1\n{VALVE}", "supervisory: Input should be a valid dictionary"),
+    "a table that is a number": (f"supervisory = 1\n{VALVE}", "supervisory: must be a table"),
     "the same for several": (
         "supervisory = 1\n[[valve]]\nname = 'a'\nunit = 1\nstroke_m = 0.1\n",
         "supervisory: must be a table, got 1",

@@ -81,7 +81,7 @@ def test_the_valves_are_found_by_name(tmp_path: Path) -> None:
         (FIRST + SECOND.replace("port = 2", "prt = 2"), "valve 2 (B): device.prt: unknown key; allowed here: bus,"),
         ("[supervisory]\nunit = 3\n" + FIRST, "valve 1 (A): supervisory.unit: each of several valves has its own"),
         ("valve = [1]\n", "valve 1: is not a table"),
-        ("valve = []\n", "valve: Input should be a valid dictionary"),
+        ("valve = []\n", "valve: must be a table"),
         (COMMON.replace("'vent'", "'open'") + FIRST, "valve 1 (A): safety.action: Input should be 'hold'"),
     ],
 )

@@ -45,6 +45,8 @@ def test_the_seed_valve_has_the_corrected_static_friction() -> None:
         ("mass_lb = 3.0", "mass_kg = 1.0", "valve.mass_lb: unknown key; allowed here: coulomb_n, deadzone_ratio,"),
         ("mass_kg = -1.0", "mass_kg = 1.0", "valve.mass_kg: Input should be greater than 0, got -1.0"),
         ('mass_kg = "heavy"', "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number"),
+        ("mass_kg = true", "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number, got True"),
+        ('mass_kg = "5"', "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number, got '5'"),
         ("mass_kg = nan", "mass_kg = 1.0", "valve.mass_kg: Input should be a finite number, got nan"),
         ("", "mass_kg = 1.0", "valve.mass_kg: is required and missing"),
         ("static_n = 1000.0", "static_n = 1700.0", "valve: static_n must be at least coulomb_n (1400 N), it is 1000 N"),
@@ -54,9 +56,26 @@ def test_a_wrong_key_or_value_is_named(tmp_path: Path, wrong: str, right: str, s
     assert problem(tmp_path / "valve.toml", SEED.replace(right, wrong)).startswith(said)
 
 
+def test_a_table_in_place_of_an_array_of_tables_is_named(tmp_path: Path) -> None:
+    said = problem(tmp_path / "valve.toml", SEED + '[effect]\nname = "backlash"\n')
+    assert said == "effect: must be an array of tables, [[effect]]"
+
+
+def test_a_whole_number_is_a_number(tmp_path: Path) -> None:
+    path = tmp_path / "valve.toml"
+    path.write_text(SEED.replace("mass_kg = 1.0", "mass_kg = 2"))
+    assert load_valve(path).valve.mass_kg == 2.0
+
+
 def test_what_is_no_toml_names_the_line(tmp_path: Path) -> None:
     assert "is not valid TOML" in problem(tmp_path / "valve.toml", SEED.replace("= 1.0", "1.0"))
     assert "line 3" in problem(tmp_path / "valve.toml", SEED.replace("= 1.0", "1.0"))
+
+
+def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "valve.toml"
+    path.write_text(SEED, encoding="utf-8-sig")
+    assert load_valve(path).valve.name == "v"
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -78,6 +97,16 @@ def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> Non
         ("[valve]\nstroke_m = 0.1\n[cycle]\nperiod_s = 1\npace = 'fast'\n", "cycle.pace: Input should be 'real_time'"),
         ("[valve]\nstroke_m = 0.1\n[pressure]\nminimum_pa = 5e5\n", "pressure: minimum_pa must be below maximum_pa"),
         ("[valve]\nstroke_m = 0.1\n[device.map]\nposition_m = {address = 0}\n", "device.map.command_pa: is required"),
+        ("[valve]\nstroke_m = 0.1\n[cycle]\nshadow = 0\n", "cycle.shadow: Input should be a valid boolean, got 0"),
+        ("[valve]\nstroke_m = 0.1\n[device]\nport = true\n", "device.port: Input should be a valid integer, got True"),
+        (
+            "[valve]\nstroke_m = 0.1\n[supervisory]\nallowed_networks = [1]\n",
+            "supervisory.allowed_networks.0: must be the address of a host or a network, got 1",
+        ),
+        (
+            "[valve]\nstroke_m = 0.1\n[device]\nbus = 'rtu'\nserial = {path = 'x', stop_bits = true}\n",
+            "device.serial.stop_bits: Input should be a valid integer, got True",
+        ),
         (
             "[valve]\nstroke_m = 0.1\n[safety]\naction = 'open'\n",
             "safety.action: Input should be 'hold', 'vent', 'fill' or 'safe'",

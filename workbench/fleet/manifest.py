@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from os.path import normpath
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, Strict
 
 from config.errors import InputError
-from config.loading import FolderName, Schema, read_toml, validated
+from config.loading import FolderName, Many, Schema, read_toml, validated
 from config.plain_file import read_plain
 
 KEYS = ("valve", "file", "recording", "when")
@@ -33,7 +33,7 @@ class Entry(Schema):
     valve: FolderName
     file: FolderName
     recording: FolderName
-    when: datetime | date = Field(union_mode="left_to_right")
+    when: Annotated[datetime, Strict(False)] | Annotated[date, Strict(False)] = Field(union_mode="left_to_right")
 
     @property
     def time(self) -> datetime:
@@ -44,7 +44,7 @@ class Entry(Schema):
 class Entries(Schema):
     """A whole manifest."""
 
-    recording: tuple[Entry, ...] = Field(min_length=1)
+    recording: Many[Entry] = Field(min_length=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
-    lines = read_plain(path).removeprefix("\ufeff").splitlines()
+    lines = read_plain(path).splitlines()
     head = lines[0] if lines else ""
     reader = csv.DictReader(lines, delimiter=";" if ";" in head else ",")
     columns = [each.strip() for each in reader.fieldnames or ()]
