@@ -68,9 +68,11 @@ def _done(words: Sequence[str] | None) -> int:
     """Run one command, now that what it imports is known to be ours."""
     from config.errors import CommandFailed, InputError
     from config.extras import told
+    from positioner.cli.parts.output_files import refuse_own_inputs
 
     arguments = command_parser().parse_args(words)
     try:
+        refuse_own_inputs(arguments)
         status = int(arguments.run(arguments))
         sys.stdout.flush()
         return status

@@ -147,6 +147,27 @@ def test_an_output_to_nowhere_is_one_line(out: str, tmp_path: Path, capsys: pyte
         Recording({}).write(path)
 
 
+def test_an_output_that_is_the_input_is_refused_and_left_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = "time_s,command_pa,position_m\n0,4e4,0\n0.001,4e4,0\n"
+    Path("in.csv").write_text(text)
+    Path("alias.csv").symlink_to("in.csv")
+    for words, said in (
+        (["simulate", "seed", "--input", "in.csv", "-o", "./in.csv"], "-o in.csv: is read by this command as well"),
+        (["import", "in.csv", "-o", "alias.csv"], "-o alias.csv: is read by this command as well"),
+        (
+            ["diagnose", "in.csv", "--valve", "seed", "--json", "in.csv"],
+            "--json in.csv: is read by this command as well",
+        ),
+        (["compare", "in.csv", "--valve", "seed", "--json", "x", "--report", "x"], "--report x: is written by --json"),
+    ):
+        assert main(words) == 2
+        assert capsys.readouterr().err.startswith(f"positioner {words[0]}: {said}")
+    assert Path("in.csv").read_text() == text
+
+
 def test_what_a_library_says_in_lines_or_at_length_is_one_line_of_bounded_length(tmp_path: Path) -> None:
     """Found by fuzzing: a data sheet, a cell and a Parquet file whose reader's complaint went through as it was."""
     sheet = tmp_path / "node.eds"

@@ -1,16 +1,45 @@
 """What a command writes because an option asks for it: `--out` a folder, `--json` a file.
 
 A path that cannot be written is bad input: one line that names the option, before the work begins (`writable`) where it
-can be known.
+can be known. So is one that the same command reads, whose only copy would be gone (`refuse_own_inputs`).
 """
 
+import argparse
 import errno
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from config.errors import InputError
+
+OPTIONS: Mapping[str, str] = {"out": "-o", "json": "--json", "report": "--report", "picture": "--picture"}
+"""By which files are written, by their names among a command's arguments."""
+
+
+def refuse_own_inputs(arguments: argparse.Namespace) -> None:
+    """Refuse an output that is one of the command's inputs, or another of its outputs; of any command.
+
+    Raises:
+        InputError: names the option and the file.
+    """
+    said = vars(arguments)
+    written = {name: said[name] for name in OPTIONS if isinstance(said.get(name), Path)}
+    read = [path for name, value in said.items() if name not in written for path in _files(value)]
+    for name, path in written.items():
+        if path.is_file() and any(path.samefile(each) for each in read):
+            raise InputError(f"{OPTIONS[name]} {path}", "is read by this command as well; allowed is another file")
+        alike = next((each for each in written if os.path.realpath(written[each]) == os.path.realpath(path)), name)
+        if alike != name and (path.is_file() or not path.exists()):
+            problem = f"is written by {OPTIONS[alike]} as well; allowed is another file"
+            raise InputError(f"{OPTIONS[name]} {path}", problem)
+
+
+def _files(value: object) -> Iterator[Path]:
+    """Yield the files that an argument names."""
+    for each in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(each, str | Path) and os.path.isfile(each):  # a name of a shipped valve may be one, too
+            yield Path(each)
 
 
 def make_folder(folder: Path, option: str = "--out") -> None:
