@@ -32,7 +32,7 @@ from workbench.fit.landings import Landings, Rest, rests
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import Parameter, strengths
-from workbench.model.sampling import TOLD, Sampling, landings, sampling
+from workbench.model.sampling import TOLD, Sampling, landings, sampling, slide_time_s
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
@@ -311,7 +311,7 @@ def _with(error: SimulationError, theta: Vector, added: Iterable[Parameter], val
 def forces_regressed(theta: Vector, record: Record, valve: ValveParameters, from_pressure: bool) -> Vector:
     """Return theta with k_s, F_v and F_c from the regression where it gives positive ones, F_s in proportion."""
     by = sampling(record, valve)
-    if by.slow:
+    if by.slow or record.period_s > slide_time_s(valve, record.scale_m):
         return _landings_regressed(theta, record, valve, by)
     regressed = theta.copy()
     matrix, force_n = _moving(theta[AREA], record, from_pressure)

@@ -3,7 +3,12 @@
     t_s = tau log(L / sigma)      a slide over the stroke L comes to within the noise sigma of its end in that time
     tau = F_v / k_s, or 2 m / F_v where that is longer
 
-dynamic       samples closer than t_s: with inertia
+    s = exp(-pi zeta / sqrt(1 - zeta^2)),  zeta = F_v / (2 sqrt(k_s m))
+                                  the share of its way by which a stem with little damping swings past its balance, to
+                                  stick there
+
+dynamic       samples closer than t_s: with inertia; and where s L is more than the noise, for where a slide ends hangs
+              on it, whether or not the slide is seen
 quasi-static  samples farther apart: without (`sim.quasi_static`), a step a sample; of a set point in shorter ones, for
               its positioner acts between samples
 landings      the same, and the command changed between samples, perhaps several times: a stem that moves in the very
@@ -17,7 +22,7 @@ two before together: as a held command that acts from its sample on never makes 
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import log
+from math import exp, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +35,8 @@ from workbench.data.record import Record
 
 EARLY, FEWEST_EARLY = 0.3, 3
 """Share and number of movements that begin early, from which the command changed between samples."""
+MOST_WITH_INERTIA = 20_000
+"""Samples: a longer record, seen so slowly, is simulated without."""
 MOVED = 6.0
 """Noises by which a stem that left its rest has moved."""
 NEGLIGIBLE_N = 0.02
@@ -92,6 +99,8 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
         return Sampling(Motion.QUASI_STATIC, f"simulated without inertia: {why}", True, period_s)
     early, begun = _early(record, valve)
     if early < max(FEWEST_EARLY, EARLY * begun):
+        if swing_m(valve) > record.scale_m and len(record) <= MOST_WITH_INERTIA:
+            return with_inertia(record)
         return Sampling(Motion.QUASI_STATIC, f"simulated without inertia, a step a sample: {why}", True, period_s)
     found = landings(record, valve)
     judged = sum(each.settled for each in found)
@@ -111,6 +120,19 @@ def slide_time_s(valve: ValveParameters, noise_m: float) -> float:
         return np.inf
     slowest_s = max(valve.viscous_ns_per_m / valve.spring_n_per_m, 2.0 * valve.mass_kg / valve.viscous_ns_per_m)
     return slowest_s * log(max(valve.stroke_m / (noise_m or 1e-6 * valve.stroke_m), np.e))
+
+
+def with_inertia(record: Record) -> Sampling:
+    """Return how a record is simulated whose stem swings, as far as it was commanded by what is held."""
+    return replace(DYNAMIC, period_s=record.period_s)
+
+
+def swing_m(valve: ValveParameters) -> float:
+    """Return s L, m; none for what has no spring to swing on."""
+    if not valve.spring_n_per_m > 0.0:
+        return 0.0
+    zeta = valve.viscous_ns_per_m / (2.0 * sqrt(valve.spring_n_per_m * valve.mass_kg))
+    return valve.stroke_m * exp(-pi * zeta / sqrt(1.0 - zeta**2)) if zeta < 1.0 else 0.0
 
 
 def _early(record: Record, valve: ValveParameters) -> tuple[int, int]:
