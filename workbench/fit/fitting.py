@@ -55,6 +55,7 @@ def fit(
     workers: int | None = None,
     from_pressure: bool = False,
     base: Fit | None = None,
+    by: Sampling | None = None,
     profile: bool = True,
     progress: Progress | None = None,
 ) -> Fit:
@@ -71,6 +72,7 @@ def fit(
         workers: threads, by default one a core.
         from_pressure: simulate from the measured pressure instead of the command, without the pressure path.
         base: the fit without `effects`, if it is there already.
+        by: how the recording is simulated; by default, with `effects` as for the base, as this valve asks for.
         profile: follow the cost for the intervals; without, they are those of the derivatives, at half the time.
         progress: called with the fraction done.
 
@@ -80,15 +82,14 @@ def fit(
     record = _fittable(recording, valve)
     if effects:
         ground = base or fit(
-            recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free)
+            recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free), by=by
         )
         begun = _begun(record, valve, effects, ground, free, workers, progress)
         return begun.landed().carried().finished(profile=profile)
-    by = sampling(record, valve.valve)
     searched = partial(_base, record, valve, free, seed, workers, from_pressure, profile=profile)
-    found = searched(by, progress or (lambda _: None))
-    if free is None and _may_swing(found, record):
-        swinging = searched(with_inertia(record), lambda _: None)
+    found = searched(by or sampling(record, valve.valve), progress or (lambda _: None))
+    if by is None and free is None and _may_swing(found, record):
+        swinging = searched(with_inertia(record, valve.valve), lambda _: None)
         found = swinging if _told(swinging, found, record) else found
     return found
 

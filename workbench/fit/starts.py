@@ -32,7 +32,7 @@ from workbench.fit.landings import Landings, Rest, rests
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import Parameter, strengths
-from workbench.model.sampling import TOLD, Sampling, landings, sampling, slide_time_s
+from workbench.model.sampling import Sampling, landings, sampling, slide_time_s
 
 SPREAD = {SPRING: 0.1, VISCOUS: 0.7, COULOMB: 0.3}
 """Standard deviation of the draws, of the logarithm."""
@@ -217,7 +217,7 @@ def told_starts(
     """
     if not error.run.by.held:
         return []
-    run = FreeRun(error.composition, error.run.record, from_pressure=error.run.from_pressure, by=TOLD)
+    run = FreeRun(error.composition, error.run.record, from_pressure=error.run.from_pressure, by=error.run.by.told())
     landing = tuple(each for each in error.parameters if each.index != STATIC)
     solved: list[tuple[float, Vector]] = []
     for theta in seeds:

@@ -17,7 +17,8 @@ landings      the same, and the command changed between samples, perhaps several
               it lands, by the pressure of the rest. Only rests are judged.
 
 A movement that begins from rest is early if the recorded command goes its way by more in this sample than it did in the
-two before together: as a held command that acts from its sample on never makes it.
+two before together: as a held command that acts from its sample on never makes it. A command that ramps evenly, as that
+of an integrating controller, never does that; there where slides end tells (`command_between_samples`).
 """
 
 from dataclasses import dataclass, replace
@@ -32,6 +33,7 @@ from config.valve_file import ValveParameters
 from sim.effect import Effect
 from workbench.data.plateaus import Plateau, plateaus
 from workbench.data.record import Record
+from workbench.model.command_between_samples import PartOfTheWay, part_of_the_way
 
 EARLY, FEWEST_EARLY = 0.3, 3
 """Share and number of movements that begin early, from which the command changed between samples."""
@@ -64,7 +66,9 @@ class Sampling:
     held: bool = True
     """Whether a command acts from its sample on until the next; else it is known at its sample alone."""
     period_s: float = 0.0
-    """Of the record that it was chosen for."""
+    """Of the record that it was chosen for,"""
+    valve: ValveParameters | None = None
+    """and by whose numbers: not those that a fit comes to, lest two models be judged by other rows."""
 
     @property
     def slow(self) -> bool:
@@ -73,7 +77,12 @@ class Sampling:
 
     def of(self, other: Record, valve: ValveParameters) -> "Sampling":
         """Return how another record is simulated: as this one if it is sampled alike."""
-        return self if abs(other.period_s - self.period_s) <= ALIKE * self.period_s else sampling(other, valve)
+        alike = abs(other.period_s - self.period_s) <= ALIKE * self.period_s
+        return self if alike else sampling(other, self.valve or valve)
+
+    def told(self) -> "Sampling":
+        """Return that of a held command by which the stem lands if it went as the measured one did."""
+        return replace(self, motion=Motion.LANDINGS, sentence="every rest judged by itself", held=True)
 
     def left_out(self, effect: Effect) -> str:
         """Say why an effect cannot show in a record of such a sampling; empty if it can."""
@@ -85,32 +94,49 @@ class Sampling:
 
 
 DYNAMIC = Sampling(Motion.DYNAMIC, "")
-TOLD = Sampling(Motion.LANDINGS, "every rest judged by itself")
-"""Of a held command: where the stem lands if it went as the measured one did."""
 
 
 def sampling(record: Record, valve: ValveParameters) -> Sampling:
     """Choose how a record of a valve is simulated."""
     period_s, slide_s = record.period_s, slide_time_s(valve, record.scale_m)
     if not period_s > slide_s:
-        return replace(DYNAMIC, period_s=period_s)
+        return replace(DYNAMIC, period_s=period_s, valve=valve)
     why = f"samples every {period_s:.3g} s cannot see slides of {slide_s:.2g} s"
     if record.by_setpoint:
-        return Sampling(Motion.QUASI_STATIC, f"simulated without inertia: {why}", True, period_s)
-    early, begun = _early(record, valve)
-    if early < max(FEWEST_EARLY, EARLY * begun):
+        return Sampling(Motion.QUASI_STATIC, f"simulated without inertia: {why}", True, period_s, valve)
+    changed = _changed_between(record, valve)
+    if not changed:
         if swing_m(valve) > record.scale_m and len(record) <= MOST_WITH_INERTIA:
-            return with_inertia(record)
-        return Sampling(Motion.QUASI_STATIC, f"simulated without inertia, a step a sample: {why}", True, period_s)
+            return with_inertia(record, valve)
+        sentence = f"simulated without inertia, a step a sample: {why}"
+        return Sampling(Motion.QUASI_STATIC, sentence, True, period_s, valve)
     found = landings(record, valve)
     judged = sum(each.settled for each in found)
     return Sampling(
         Motion.LANDINGS,
-        f"the command changed between samples ({early} of {begun} movements began before the command that is recorded "
-        f"with their start): the pressure in between is not known, so the model is held against {judged} landings of "
-        f"{len(found)}, by the pressure at rest, without inertia: {why}",
+        f"the command changed between samples ({changed}): the pressure in between is not known, so the model is held "
+        f"against {judged} landings of {len(found)}, by the pressure at rest, without inertia: {why}",
         False,
         period_s,
+        valve,
+    )
+
+
+def _changed_between(record: Record, valve: ValveParameters) -> str:
+    """Say by what the command changed between samples; empty if nothing shows that it did."""
+    early, begun = _early(record, valve)
+    if early >= max(FEWEST_EARLY, EARLY * begun):
+        return f"{early} of {begun} movements began before the command that is recorded with their start"
+    part = part_of_the_way(record)
+    if part is not None and part.between:
+        return _ends_ahead(part)
+    return ""
+
+
+def _ends_ahead(part: PartOfTheWay) -> str:
+    return (
+        f"{part.moves} movements end {part.part:.2g} of the way, give or take {part.std:.1g}, from where the command "
+        "before them puts the stem to where the one after them does"
     )
 
 
@@ -122,9 +148,9 @@ def slide_time_s(valve: ValveParameters, noise_m: float) -> float:
     return slowest_s * log(max(valve.stroke_m / (noise_m or 1e-6 * valve.stroke_m), np.e))
 
 
-def with_inertia(record: Record) -> Sampling:
+def with_inertia(record: Record, valve: ValveParameters) -> Sampling:
     """Return how a record is simulated whose stem swings, as far as it was commanded by what is held."""
-    return replace(DYNAMIC, period_s=record.period_s)
+    return replace(DYNAMIC, period_s=record.period_s, valve=valve)
 
 
 def swing_m(valve: ValveParameters) -> float:

@@ -32,6 +32,7 @@ from workbench.fit.objective import SimulationError
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
+from workbench.model.sampling import Sampling
 from workbench.select.block_errors import block_errors, indistinguishable
 from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
 from workbench.select.effect_candidates import (
@@ -99,6 +100,8 @@ class EffectSearch:
         self._progress = progress
         self._race = race or (lambda _step, _name, _rms_m: None)
         self._known = _Known()
+        self._by: Sampling | None = None
+        """As the first fit came out; of all models alike, lest one be judged by landings that another is not."""
 
     def base(self, valve: ValveFile) -> EvaluatedModel:
         """Fit a valve as it is, without intervals.
@@ -106,16 +109,17 @@ class EffectSearch:
         Raises:
             InputError: the recording holds too little.
         """
-        return self._evaluated(
-            fit(
-                self._split.train.recording,
-                valve,
-                seed=self._seed,
-                workers=self._workers,
-                profile=False,
-                progress=lambda done: self._progress("fitting the valve as it is", done),
-            )
+        found = fit(
+            self._split.train.recording,
+            valve,
+            seed=self._seed,
+            workers=self._workers,
+            by=self._by,
+            profile=False,
+            progress=lambda done: self._progress("fitting the valve as it is", done),
         )
+        self._by = found.by
+        return self._evaluated(found)
 
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""

@@ -1,0 +1,99 @@
+"""Whether a command changed between samples, where it ramps so evenly that no movement begins early."""
+
+import numpy as np
+import pytest
+
+from config.recording import Column, Recording
+from config.valve_file import ValveFile
+from sim.composition import Composition
+from sim.open_loop import respond
+from tests.workbench.slow_records import SPAN_PA, once_a_second
+from tests.workbench.valves import NOISE_M, SEED, with_effect
+from workbench.data.held_out import split
+from workbench.data.noise_floor import with_noise
+from workbench.data.record import ready
+from workbench.model.command_between_samples import part_of_the_way
+from workbench.model.free_run import FreeRun
+from workbench.model.sampling import Motion, sampling
+from workbench.select.effect_search import EffectSearch
+
+CALM = SEED.model_copy(update={"valve": SEED.valve.model_copy(update={"coulomb_n": 300.0, "static_n": 400.0})})
+STUCK = SEED.valve.model_copy(update={"coulomb_n": 3.0 * SEED.valve.coulomb_n, "static_n": 3.0 * SEED.valve.static_n})
+SECONDS, ACTS_S = 300, 0.05
+HELD = [
+    CALM,
+    with_effect(CALM, "asymmetric_friction", asymmetry=0.15),
+    with_effect(CALM, "spring_hardening", cubic_n_per_m3=8e5),
+    with_effect(CALM, "position_friction", growth=0.4, travel_m=0.1016),
+    with_effect(CALM, "ip_lag", time_constant_s=0.4),
+]
+NAMES = ["nothing", "asymmetric_friction", "spring_hardening", "position_friction", "ip_lag"]
+
+
+def ramping(file: ValveFile, acts_s: float) -> Recording:
+    """Record a command that goes evenly from level to level, changed every `acts_s`, and the stem, once a second."""
+    generator = np.random.default_rng(3)
+    time_s = acts_s * np.arange(round(SECONDS / acts_s))
+    turns_s = np.cumsum(generator.uniform(4.0, 14.0, SECONDS))
+    command_pa: Column = SPAN_PA * np.interp(time_s, turns_s, generator.uniform(0.1, 0.9, SECONDS))
+    composition = Composition.from_file(file)
+    response = respond(composition, composition.theta, command_pa[:-1], acts_s, step_s=0.05)
+    rows = slice(None, None, round(1.0 / acts_s))
+    position_m: Column = response.indicated_m[rows] + NOISE_M * generator.standard_normal(SECONDS)
+    columns = {"time_s": np.arange(float(SECONDS)), "command_pa": command_pa[rows], "position_m": position_m}
+    return with_noise(Recording(columns), NOISE_M)
+
+
+@pytest.mark.parametrize("file", HELD[:-1], ids=NAMES[:-1])
+def test_a_command_that_ramps_between_samples_is_seen_to(file: ValveFile) -> None:
+    found = sampling(ready(ramping(file, ACTS_S)), CALM.valve)
+    assert (found.motion, found.held) == (Motion.LANDINGS, False)
+    assert "of the way" in found.sentence
+
+
+@pytest.mark.parametrize("file", HELD, ids=NAMES)
+def test_a_command_that_ramps_by_steps_held_from_sample_to_sample_is_held(file: ValveFile) -> None:
+    """Whatever the valve file lacks: what is missing is no sign of the next command."""
+    record = ready(ramping(file, 1.0))
+    assert sampling(record, CALM.valve).motion is Motion.QUASI_STATIC
+    part = part_of_the_way(record)
+    assert part is not None
+    assert part.part < 2.0 * part.std + 0.02
+
+
+def test_a_command_that_hardly_ever_goes_on_says_nothing() -> None:
+    recording = ramping(CALM, 1.0)
+    few = {name: column[:30] for name, column in recording.columns.items()}
+    assert part_of_the_way(ready(Recording(few, recording.metadata))) is None
+
+
+def test_one_swing_again_and_again_says_nothing() -> None:
+    """Its few movements are told by seven numbers as well as by any."""
+    recording = ramping(CALM, 1.0)
+    lap = {name: np.tile(column[:20], 15) for name, column in recording.columns.items()} | {"time_s": np.arange(300.0)}
+    assert part_of_the_way(ready(Recording(lap, recording.metadata))) is None
+
+
+def test_models_of_one_record_are_judged_by_the_same_landings() -> None:
+    """Of friction thrice as high a pressure that still moves shifts less: by its own numbers it had more landings."""
+    recording = once_a_second(SEED, 100, offset_s=0.5)
+    stirred_pa = recording.command_pa + np.random.default_rng(2).uniform(0.0, 1500.0, 100)
+    record = ready(Recording({**recording.columns, "command_pa": stirred_pa}, recording.metadata))
+    valves = [ValveFile(valve=each) for each in (SEED.valve, STUCK)]
+    by = sampling(record, SEED.valve)
+    assert by.motion is Motion.LANDINGS
+    own, stuck = (FreeRun(Composition.from_file(each), record).judged for each in valves)
+    assert own.sum() < stuck.sum()
+    alike = FreeRun(Composition.from_file(valves[1]), record, by=by).judged
+    np.testing.assert_array_equal(own, alike)
+
+
+def test_a_valve_fitted_again_is_judged_by_the_landings_of_the_search() -> None:
+    """Where a search begins anew from what it has come to, the rows stay those of the valve that it was given."""
+    recording = once_a_second(SEED, 150, offset_s=0.5)
+    stirred_pa = recording.command_pa + np.random.default_rng(2).uniform(0.0, 1500.0, 150)
+    parts = split([Recording({**recording.columns, "command_pa": stirred_pa}, recording.metadata)])
+    search = EffectSearch(parts, {}, SEED.valve, seed=0, workers=1, progress=lambda _what, _done: None)
+    one, other = (search.base(ValveFile(valve=each)) for each in (SEED.valve, STUCK))
+    assert one.errors.logs.size == other.errors.logs.size
+    assert one.fit.count == other.fit.count
