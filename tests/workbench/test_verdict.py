@@ -11,6 +11,7 @@ from workbench.data.held_out import Split, split
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import as_json
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
+from workbench.select.judged_landings import JudgedLandings
 from workbench.select.rest_errors import RestErrors
 from workbench.select.verdict import verdict
 from workbench.select.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
@@ -244,3 +245,26 @@ def test_the_json_has_the_verdict_and_every_candidate(parts: Split) -> None:
     }
     (unfitted,) = as_json(diagnosed(parts, broken))["candidates"]
     assert (unfitted["why_not"], unfitted["test_rmse_m"]) == ("the recording holds too little", None)
+
+
+def test_landings_that_are_too_few_prove_nothing() -> None:
+    """More than two fitted and one held out a parameter; else nothing is named, nothing missing, nothing adequate."""
+    found, left = step(POOR, ip_lag=model_of("ip_lag")), step(POOR, ip_lag=POOR)
+    few = [JudgedLandings(6, 9, 3), JudgedLandings(9, 3, 3), JudgedLandings(0, 0, 3)]
+    for best, steps in (
+        (EXPLAINED, [step(EXPLAINED, ip_lag=EXPLAINED)]),
+        (model_of("ip_lag"), [found]),
+        (POOR, [left]),
+    ):
+        assert {verdict(best, steps, 1.0, FLOOR_M, each) for each in few} == {"unjudged"}
+    assert "6 landings fitted and 9 held out are too few for 3 parameters, more than 6 and 3" in few[0].sentence
+
+
+def test_what_landings_leave_is_no_proof_that_something_is_missing() -> None:
+    """What the pressure did between samples is not known; but what explains them all is there."""
+    many = JudgedLandings(40, 20, 3)
+    assert verdict(POOR, [step(POOR, ip_lag=POOR)], 1.0, FLOOR_M) == "unexplained"
+    assert verdict(POOR, [step(POOR, ip_lag=POOR)], 1.0, FLOOR_M, many) == "unjudged"
+    assert "may be what the pressure did between samples" in many.sentence
+    assert verdict(EXPLAINED, [step(EXPLAINED, ip_lag=EXPLAINED)], 1.0, FLOOR_M, many) == "adequate"
+    assert verdict(model_of("ip_lag"), [step(POOR, ip_lag=model_of("ip_lag"))], 1.0, FLOOR_M, many) == "missing"

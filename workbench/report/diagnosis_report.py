@@ -41,6 +41,7 @@ from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
+from workbench.select.judged_landings import MORE_LANDINGS
 
 DIAGNOSIS_WORDS = {
     "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "
@@ -328,7 +329,9 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
             "record again with slow ramps, steps of several heights and restarts in the same direction after holds"
         )
         advice.append("write the missing effect as a file of your own, where the section above says what is left")
-    if diagnosis.verdict == "unjudged":
+    if diagnosis.verdict == "unjudged" and diagnosis.split.floor_m is not None:
+        advice.append(MORE_LANDINGS)
+    elif diagnosis.verdict == "unjudged":
         advice.append(
             "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
         )

@@ -16,7 +16,7 @@ VERDICTS = {
     "missing": ("good", "The missing effect is found."),
     "one_of": ("open", "It is one of several effects; this recording does not tell which."),
     "unexplained": ("bad", "Something is missing that the library of effects does not have."),
-    "unjudged": ("open", "The noise of this recording is unknown: nobody can say whether anything is missing."),
+    "unjudged": ("open", "Of this recording nobody can say whether anything is missing."),
     "unfinished": ("open", "Broken off: this is what was known by then."),
     "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
 }

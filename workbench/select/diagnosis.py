@@ -28,6 +28,7 @@ from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable, unseen_without_spring
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
+from workbench.select.judged_landings import judged_landings
 from workbench.select.moved_parameters import Moved, moved_parameters
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
@@ -206,7 +207,8 @@ def diagnose(
                 on_preview(scores)
             steps = search.steps(base)
             base, best = search.with_intervals((steps[0].before, _last(steps)))
-            found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
+            landed = judged_landings(best.fit, parts)
+            found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
             chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):
             steps, found, chosen = search.so_far(base), "unfinished", None

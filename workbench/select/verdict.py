@@ -7,7 +7,9 @@ one_of        as missing, but a set of effects does equally well: the experiment
 unexplained   something is missing that the library does not have; what lowered the error so far is still named.
               Or slides end elsewhere, so that what explains the rest stands in for it; or the valve scatters so much
               that a tenth of the motion is left, which no model could explain
-unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named
+unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named.
+              Or landings alone are judged, and they are too few, or do not lie where any model has them: what the
+              pressure did between samples is not known (`judged_landings`)
 unfinished    broken off before the search was through; what was known by then is named
 untrusted     the searches disagree, and the best of them explains nothing
 """
@@ -16,11 +18,18 @@ from collections.abc import Sequence
 from typing import Literal
 
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
+from workbench.select.judged_landings import JudgedLandings
 
 Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "unfinished", "untrusted"]
 
 
-def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float, floor_m: float | None) -> Verdict:
+def verdict(
+    best: EvaluatedModel,
+    steps: Sequence[EffectStep],
+    motion_std_m: float,
+    floor_m: float | None,
+    landed: JudgedLandings | None = None,
+) -> Verdict:
     """Return the verdict of a search that is through.
 
     Args:
@@ -28,9 +37,15 @@ def verdict(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: flo
         steps: the forward steps made.
         motion_std_m: standard deviation of the position that was fitted, m.
         floor_m: what no model undercuts; None: unknown.
+        landed: the landings of the best model, where they alone are judged.
     """
-    if floor_m is None:
+    if floor_m is None or (landed and not landed.enough):
         return "unjudged"
+    found = _verdict_of_all(best, steps, motion_std_m)
+    return "unjudged" if landed and found == "unexplained" else found
+
+
+def _verdict_of_all(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float) -> Verdict:
     equivalent = by_another_name(steps)
     best = equivalent.model if equivalent and equivalent.model and equivalent.model.explained else best
     if best.explained and not (best.complete and best.errors.follows(motion_std_m)):

@@ -9,6 +9,7 @@ from workbench.data.noise_floor import UNKNOWN
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
+from workbench.select.judged_landings import judged_landings
 from workbench.select.pressure_errors import PressureErrors
 from workbench.select.verdict import Verdict, by_another_name
 
@@ -62,7 +63,7 @@ def _said(
     if verdict == "unexplained":
         said = f"Something is missing that the library does not have.{begun}"
         return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
-    return _unproved(verdict, steps, library) + begun + (suspicion if verdict == "untrusted" else "")
+    return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
 
 
 def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
@@ -101,10 +102,13 @@ def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate
     return f"what is left, {floors:.2g} floors, no other effect here explains"
 
 
-def _unproved(verdict: Verdict, steps: Sequence[EffectStep], library: Mapping[str, Effect]) -> str:
+def _unproved(
+    verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
+) -> str:
     """Say why nothing is judged."""
     if verdict == "unjudged":
-        return f"Not judged: {UNKNOWN}."
+        landed = judged_landings(best.fit, parts)
+        return f"Not judged: {landed.sentence}" if landed and parts.floor_m is not None else f"Not judged: {UNKNOWN}."
     if verdict == "untrusted":
         return "Not to be trusted: searches from independent starts do not come to the same."
     tried = sum(each.model is not None for each in steps[-1].candidates)

@@ -50,7 +50,7 @@ def not_written(path: Path, diagnosis: "Diagnosis") -> str:
         "adequate": "nothing is missing",
         "one_of": "several effects do as well; choose by one of the commands",
         "unexplained": "what was found does not explain the recordings",
-        "unjudged": "the noise is unknown, and with it whether anything is missing",
+        "unjudged": "of these recordings nobody can say whether anything is missing",
         "unfinished": "the diagnosis was broken off",
         "untrusted": "what was found is not to be trusted",
     }

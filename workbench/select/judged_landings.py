@@ -1,0 +1,68 @@
+"""How many landings a verdict rests on, where the command changed between samples and nothing else is judged.
+
+    n_f > 2 k,   n_h > k        n_f, n_h landings fitted and held out, k parameters fitted
+
+So many landings as parameters are met whatever the valve is; only those beyond tell whether a model holds. Held out,
+there are to be more than could be met by chance if each parameter were free once more.
+
+However many there are: what the pressure did between samples is not known. A controller that pushes and lets go again
+within a sample leaves the stem where no balance does, which looks like an effect that no library has. So of what is
+left there nobody can say that something is missing.
+"""
+
+from dataclasses import dataclass
+
+from workbench.data.held_out import Part, Split
+from workbench.fit.fit_result import Fit
+from workbench.model.sampling import Sampling, landings
+
+A_PARAMETER_FITTED, A_PARAMETER_HELD_OUT = 2, 1
+"""Landings that each parameter takes; more are needed."""
+MORE_LANDINGS = (
+    "export the command's changes with their times, or record samples closer than slides last, or steps held until the "
+    "stem has rested for some samples"
+)
+"""What record would tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedLandings:
+    """Landings under a settled pressure, by which a model of so many parameters is fitted and judged."""
+
+    fitted: int
+    held_out: int
+    parameters: int
+
+    @property
+    def enough(self) -> bool:
+        """Whether a verdict can rest on them."""
+        held_out = self.held_out > A_PARAMETER_HELD_OUT * self.parameters
+        return self.fitted > A_PARAMETER_FITTED * self.parameters and held_out
+
+    @property
+    def sentence(self) -> str:
+        """Say why nothing is judged by them, and what would tell."""
+        if self.enough:
+            why = "what is left where the stem lands may be what the pressure did between samples, which is not known"
+        else:
+            why = (
+                f"{self.fitted} landings fitted and {self.held_out} held out are too few for {self.parameters} "
+                f"parameters, more than {A_PARAMETER_FITTED * self.parameters} and "
+                f"{A_PARAMETER_HELD_OUT * self.parameters} are needed"
+            )
+        return f"{why}. To know, {MORE_LANDINGS}."
+
+
+def judged_landings(fit: Fit, split: Split) -> JudgedLandings | None:
+    """Return how many landings a fit rests on; None where more than landings is judged."""
+    if fit.by.held:
+        return None
+    fitted, held_out = (_settled(part, fit.by.of(part.record, fit.valve.valve)) for part in (split.train, split.test))
+    return JudgedLandings(fitted, held_out, len(fit.parameters))
+
+
+def _settled(part: Part, by: Sampling) -> int:
+    if by.held or by.valve is None:
+        return 0
+    found = landings(part.record, by.valve)
+    return sum(settled and bool(part.counted[each.first]) for each, settled in found)
