@@ -56,22 +56,36 @@ def test_a_command_that_ramps_by_steps_held_from_sample_to_sample_is_held(file: 
     """Whatever the valve file lacks: what is missing is no sign of the next command."""
     record = ready(ramping(file, 1.0))
     assert sampling(record, CALM.valve).motion is Motion.QUASI_STATIC
+    assert sampling(record, SEED.valve).sure
     part = part_of_the_way(record)
     assert part is not None
+    assert part.held
     assert part.part < 2.0 * part.std + 0.02
 
 
-def test_a_command_that_hardly_ever_goes_on_says_nothing() -> None:
-    recording = ramping(CALM, 1.0)
-    few = {name: column[:30] for name, column in recording.columns.items()}
-    assert part_of_the_way(ready(Recording(few, recording.metadata))) is None
+def test_a_command_that_stands_still_as_the_stem_moves_was_held() -> None:
+    record = ready(once_a_second(SEED))
+    assert part_of_the_way(record) is None
+    assert sampling(record, SEED.valve).sure
+
+
+@pytest.mark.parametrize("acts_s", [1.0, ACTS_S])
+def test_a_few_movements_leave_it_open_and_that_is_said(acts_s: float) -> None:
+    recording = ramping(CALM, acts_s)
+    few = {name: column[:22] for name, column in recording.columns.items()}
+    found = sampling(ready(Recording(few, recording.metadata)), CALM.valve)
+    assert (found.held, found.sure) == (True, False)
+    assert "which the recording does not tell" in found.sentence
 
 
 def test_one_swing_again_and_again_says_nothing() -> None:
     """Its few movements are told by seven numbers as well as by any."""
     recording = ramping(CALM, 1.0)
     lap = {name: np.tile(column[:20], 15) for name, column in recording.columns.items()} | {"time_s": np.arange(300.0)}
-    assert part_of_the_way(ready(Recording(lap, recording.metadata))) is None
+    part = part_of_the_way(ready(Recording(lap, recording.metadata)))
+    assert part is not None
+    assert not part.held
+    assert not part.between
 
 
 def test_models_of_one_record_are_judged_by_the_same_landings() -> None:

@@ -8,6 +8,7 @@ import pytest
 from config.recording import Column, Recording
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, model_of
 from workbench.data.held_out import Split, split
+from workbench.model.sampling import Motion, Sampling
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.diagnosis_json import as_json
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
@@ -268,3 +269,12 @@ def test_what_landings_leave_is_no_proof_that_something_is_missing() -> None:
     assert "may be what the pressure did between samples" in many.sentence
     assert verdict(EXPLAINED, [step(EXPLAINED, ip_lag=EXPLAINED)], 1.0, FLOOR_M, many) == "adequate"
     assert verdict(model_of("ip_lag"), [step(POOR, ip_lag=model_of("ip_lag"))], 1.0, FLOOR_M, many) == "missing"
+
+
+def test_of_a_command_that_may_have_changed_between_samples_nothing_left_is_proof() -> None:
+    doubted = replace(POOR, fit=replace(POOR.fit, by=Sampling(Motion.QUASI_STATIC, "", sure=False)))
+    assert verdict(doubted, [step(doubted, ip_lag=doubted)], 1.0, FLOOR_M) == "unjudged"
+    held = replace(POOR, fit=replace(POOR.fit, by=Sampling(Motion.QUASI_STATIC, "")))
+    assert verdict(held, [step(held, ip_lag=held)], 1.0, FLOOR_M) == "unexplained"
+    found = replace(EXPLAINED, fit=replace(EXPLAINED.fit, by=doubted.fit.by))
+    assert verdict(found, [step(found, ip_lag=found)], 1.0, FLOOR_M) == "adequate", "what explains it has told"

@@ -10,9 +10,11 @@ of the way to the next one that is recorded: w is above 0. A controller that see
 far, so that its answer makes w smaller, never larger. The other terms are what springs, friction and areas that vary
 leave over the stroke and in time, lest they be taken for w.
 
-The line is fitted robustly (soft L1), w with its standard deviation.
+The line is fitted robustly (soft L1), w with its standard deviation. Where that leaves both open nobody knows which it
+was, as where movements are few, or the same again and again: then its deviation is infinite.
 """
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -23,10 +25,14 @@ from workbench.data.record import Record
 
 MOVED = 6.0
 """Noises by which a stem moves from one sample to the next."""
+GOES_ON = 0.2
+"""Share of the movements with which the command goes on at least, where it ramps."""
 FEWEST_MOVES, FEWEST_AHEAD = 20, 10
 """Of movements, and of those with which the command goes on: seven numbers are fitted."""
 DEVIATIONS, LEAST_PART = 3.0, 0.05
 """By so many standard deviations w must be more than this, for the command to have changed between samples."""
+HELD_DEVIATIONS, HELD_PART = 2.0, 0.3
+"""And less than this, for it to have been held."""
 LEAST_ALONE = 0.3
 """Part of d that the other terms must not imitate: a few movements, again and again, tell no seven numbers."""
 LINEAR_FROM = 2.0
@@ -48,25 +54,34 @@ class PartOfTheWay(NamedTuple):
         """Whether the command changed between samples, beyond doubt."""
         return self.part - DEVIATIONS * self.std > LEAST_PART
 
+    @property
+    def held(self) -> bool:
+        """Whether it did not, beyond doubt."""
+        return self.part + HELD_DEVIATIONS * self.std < HELD_PART
+
 
 def part_of_the_way(record: Record) -> PartOfTheWay | None:
-    """Return w of a record; None where the command hardly ever goes on as the stem moves, or too little moves."""
+    """Return w of a record; None where the command stands still as the stem moves, so that it was held."""
     rows, way = _moved_to(record)
     u = record.command_pa
     before_pa: Column = u[rows - 1]
     ahead_pa: Column = way * np.maximum(way * (u[rows] - before_pa), 0.0)
-    if rows.size < FEWEST_MOVES or np.count_nonzero(ahead_pa) < FEWEST_AHEAD:
+    ahead_count = int(np.count_nonzero(ahead_pa))
+    if ahead_count <= GOES_ON * rows.size:
         return None
+    untold = PartOfTheWay(0.0, inf, rows.size)
+    if rows.size < FEWEST_MOVES or ahead_count < FEWEST_AHEAD:
+        return untold
     span_pa, span_s = float(np.ptp(u)), float(np.ptp(record.time_s))
     z = (before_pa - float(np.mean(u))) / span_pa
     t = (record.time_s[rows] - record.time_s[0]) / span_s
     b, ahead = 0, 1
     matrix = np.column_stack([z, ahead_pa / span_pa, np.ones(rows.size), way, way * z, z**2, t])
     if _left_alone(matrix, ahead) < LEAST_ALONE:
-        return None
+        return untold
     found, covariance = _robust_line(matrix, record.position_m[rows], record.scale_m)
     if not found[b] > 0.0:
-        return None
+        return untold
     return PartOfTheWay(float(found[ahead] / found[b]), float(covariance[ahead, ahead] ** 0.5 / found[b]), rows.size)
 
 

@@ -69,6 +69,8 @@ class Sampling:
     """Of the record that it was chosen for,"""
     valve: ValveParameters | None = None
     """and by whose numbers: not those that a fit comes to, lest two models be judged by other rows."""
+    sure: bool = True
+    """Whether the record tells that its command was held, or that it was not; else it is taken for held."""
 
     @property
     def slow(self) -> bool:
@@ -104,12 +106,23 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
     why = f"samples every {period_s:.3g} s cannot see slides of {slide_s:.2g} s"
     if record.by_setpoint:
         return Sampling(Motion.QUASI_STATIC, f"simulated without inertia: {why}", True, period_s, valve)
-    changed = _changed_between(record, valve)
-    if not changed:
-        if swing_m(valve) > record.scale_m and len(record) <= MOST_WITH_INERTIA:
-            return with_inertia(record, valve)
-        sentence = f"simulated without inertia, a step a sample: {why}"
-        return Sampling(Motion.QUASI_STATIC, sentence, True, period_s, valve)
+    early, begun = _early(record, valve)
+    if early >= max(FEWEST_EARLY, EARLY * begun):
+        changed = f"{early} of {begun} movements began before the command that is recorded with their start"
+        return _by_landings(record, valve, changed, why)
+    part = part_of_the_way(record)
+    if part is not None and part.between:
+        return _by_landings(record, valve, _ends_ahead(part), why)
+    if swing_m(valve) > record.scale_m and len(record) <= MOST_WITH_INERTIA:
+        return with_inertia(record, valve)
+    sentence, sure = f"simulated without inertia, a step a sample: {why}", part is None or part.held
+    if not sure:
+        sentence += "; the command is taken for held from each sample to the next, which the recording does not tell"
+    return Sampling(Motion.QUASI_STATIC, sentence, True, period_s, valve, sure)
+
+
+def _by_landings(record: Record, valve: ValveParameters, changed: str, why: str) -> Sampling:
+    """Return that of a command which changed between samples, as so much shows."""
     found = landings(record, valve)
     judged = sum(each.settled for each in found)
     return Sampling(
@@ -117,20 +130,9 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
         f"the command changed between samples ({changed}): the pressure in between is not known, so the model is held "
         f"against {judged} landings of {len(found)}, by the pressure at rest, without inertia: {why}",
         False,
-        period_s,
+        record.period_s,
         valve,
     )
-
-
-def _changed_between(record: Record, valve: ValveParameters) -> str:
-    """Say by what the command changed between samples; empty if nothing shows that it did."""
-    early, begun = _early(record, valve)
-    if early >= max(FEWEST_EARLY, EARLY * begun):
-        return f"{early} of {begun} movements began before the command that is recorded with their start"
-    part = part_of_the_way(record)
-    if part is not None and part.between:
-        return _ends_ahead(part)
-    return ""
 
 
 def _ends_ahead(part: PartOfTheWay) -> str:

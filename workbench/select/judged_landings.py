@@ -7,7 +7,7 @@ there are to be more than could be met by chance if each parameter were free onc
 
 However many there are: what the pressure did between samples is not known. A controller that pushes and lets go again
 within a sample leaves the stem where no balance does, which looks like an effect that no library has. So of what is
-left there nobody can say that something is missing.
+left there nobody can say that something is missing. Nor where a record does not tell whether its command was held.
 """
 
 from dataclasses import dataclass
@@ -23,6 +23,9 @@ MORE_LANDINGS = (
     "stem has rested for some samples"
 )
 """What record would tell."""
+UNTOLD = (
+    "whether the command changed between samples the recording does not tell, and what is left may be what it did there"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +44,22 @@ class JudgedLandings:
 
     @property
     def sentence(self) -> str:
-        """Say why nothing is judged by them, and what would tell."""
+        """Say why nothing is judged by them."""
         if self.enough:
-            why = "what is left where the stem lands may be what the pressure did between samples, which is not known"
-        else:
-            why = (
-                f"{self.fitted} landings fitted and {self.held_out} held out are too few for {self.parameters} "
-                f"parameters, more than {A_PARAMETER_FITTED * self.parameters} and "
-                f"{A_PARAMETER_HELD_OUT * self.parameters} are needed"
-            )
-        return f"{why}. To know, {MORE_LANDINGS}."
+            return "what is left where the stem lands may be what the pressure did between samples, which is not known"
+        return (
+            f"{self.fitted} landings fitted and {self.held_out} held out are too few for {self.parameters} parameters, "
+            f"more than {A_PARAMETER_FITTED * self.parameters} and {A_PARAMETER_HELD_OUT * self.parameters} are needed"
+        )
+
+
+def unknown_between_samples(fit: Fit, split: Split) -> str:
+    """Say that what happened between samples is not known, so that nothing is judged, and what would tell; or empty."""
+    landed = judged_landings(fit, split)
+    if landed is None and fit.by.sure:
+        return ""
+    why = landed.sentence if landed else UNTOLD
+    return f"{why}. To know, {MORE_LANDINGS}."
 
 
 def judged_landings(fit: Fit, split: Split) -> JudgedLandings | None:

@@ -9,7 +9,7 @@ unexplained   something is missing that the library does not have; what lowered 
               that a tenth of the motion is left, which no model could explain
 unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named.
               Or landings alone are judged, and they are too few, or do not lie where any model has them: what the
-              pressure did between samples is not known (`judged_landings`)
+              pressure did between samples is not known (`judged_landings`). Or that the command was held there is not
 unfinished    broken off before the search was through; what was known by then is named
 untrusted     the searches disagree, and the best of them explains nothing
 """
@@ -42,7 +42,8 @@ def verdict(
     if floor_m is None or (landed and not landed.enough):
         return "unjudged"
     found = _verdict_of_all(best, steps, motion_std_m)
-    return "unjudged" if landed and found == "unexplained" else found
+    known_between = landed is None and best.fit.by.sure
+    return "unjudged" if found == "unexplained" and not known_between else found
 
 
 def _verdict_of_all(best: EvaluatedModel, steps: Sequence[EffectStep], motion_std_m: float) -> Verdict:

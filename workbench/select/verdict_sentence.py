@@ -9,7 +9,7 @@ from workbench.data.noise_floor import UNKNOWN
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
-from workbench.select.judged_landings import judged_landings
+from workbench.select.judged_landings import unknown_between_samples
 from workbench.select.pressure_errors import PressureErrors
 from workbench.select.verdict import Verdict, by_another_name
 
@@ -107,8 +107,7 @@ def _unproved(
 ) -> str:
     """Say why nothing is judged."""
     if verdict == "unjudged":
-        landed = judged_landings(best.fit, parts)
-        return f"Not judged: {landed.sentence}" if landed and parts.floor_m is not None else f"Not judged: {UNKNOWN}."
+        return f"Not judged: {f'{UNKNOWN}.' if parts.floor_m is None else unknown_between_samples(best.fit, parts)}"
     if verdict == "untrusted":
         return "Not to be trusted: searches from independent starts do not come to the same."
     tried = sum(each.model is not None for each in steps[-1].candidates)
