@@ -22,12 +22,15 @@ from config.file_kinds import require_kind
 from config.loading import (
     FolderName,
     Fraction,
+    Label,
     Many,
     NearFile,
     NonNegative,
     Pair,
     Positive,
+    Pressure,
     Schema,
+    Stroke,
     read_toml,
     validated,
 )
@@ -48,9 +51,9 @@ Network = Annotated[IPvAnyNetwork, BeforeValidator(_written)]
 class ValveTable(Schema):
     """Table `[valve]`: what the controller must know of the valve before it identifies anything."""
 
-    name: str = "valve"
-    stroke_m: Positive
-    breakaway_pa: Positive | None = None
+    name: Label = "valve"
+    stroke_m: Stroke
+    breakaway_pa: Pressure | None = None
     """F_s / A where it is known: the excitation's constant part must exceed it."""
 
 
@@ -68,7 +71,7 @@ class PressureTable(Schema):
     """Table `[pressure]`: every command lies between these."""
 
     minimum_pa: NonNegative = 0.0
-    maximum_pa: Positive = 420e3
+    maximum_pa: Pressure = 420e3
 
     @model_validator(mode="after")
     def _minimum_is_below_maximum(self) -> Self:

@@ -39,6 +39,33 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 
 
+def between(least: float, most: float, *, or_zero: bool = False) -> AfterValidator:
+    """Let a number be in a range, both ends included, or 0 where that means none; what is allowed is said at once."""
+
+    def checked(value: float) -> float:
+        if not (least <= value <= most or (or_zero and value == 0)):
+            raise ValueError(f"allowed is {'0, or ' if or_zero else ''}{least:g} to {most:g}")
+        return value
+
+    return AfterValidator(checked)
+
+
+Stroke = Annotated[float, between(1e-9, 1e6)]
+"""Of a valve, m, or of a drive, rad: generous, but what is beyond it was no length."""
+Pressure = Annotated[float, between(1e-3, 1e9)]
+"""Pa: generous, but what is beyond it overflows a register, or was no pressure."""
+
+
+def _label(name: str) -> str:
+    if not name or name != name.strip() or not name.isprintable():
+        raise ValueError("must be printable characters, none of them a space at its ends")
+    return name
+
+
+Label = Annotated[str, AfterValidator(_label)]
+"""A name by which people, files and logs call something."""
+
+
 def _named(path: str) -> str:
     if "\0" in path or not path:
         raise ValueError("must be the name of a file or a folder")

@@ -10,7 +10,7 @@ from config.canopen_device import CanBus
 from config.device import Host
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import Many, NonNegative, Port, Positive, Schema, chosen_by, read_toml, validated
+from config.loading import Many, NonNegative, Port, Positive, Pressure, Schema, chosen_by, read_toml, validated
 from config.modbus_map import SIMULATED_MAP, ModbusMap
 from config.quantities import ActionName
 from config.serial_port import RtuUnit, SerialPort
@@ -91,7 +91,7 @@ class Initial(Schema):
 class Supply(Schema):
     """Table `[supply]`: what the I/P can deliver; vent gives 0, fill gives the maximum."""
 
-    maximum_pa: Positive = 420e3
+    maximum_pa: Pressure = 420e3
 
 
 class CommunicationTimeout(Schema):

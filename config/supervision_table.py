@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from config.loading import Fraction, NonNegative, Positive, Schema
+from config.loading import Fraction, NonNegative, Schema, between
 
 SafeActionName = Literal["hold", "vent", "fill", "safe"]
 """What is done on a fault: `safe` is the pressure `[safety] safe_pressure_pa`."""
@@ -24,7 +24,7 @@ class SafetyTable(Schema):
     action: SafeActionName = "hold"
     """On a fault of the device or its bus, and when the daemon ends."""
     lost_after_cycles: Annotated[int, Field(ge=1)] = 3
-    stale_after_s: Positive = 0.1
+    stale_after_s: Annotated[float, between(1e-6, 3600.0)] = 0.1
     """Without a new measurement, or later than its cycle was due: then the daemon stood still."""
     travel_margin: Fraction = 0.1
     """A position farther than this fraction of the stroke outside the stroke is implausible."""

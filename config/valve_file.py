@@ -10,30 +10,36 @@ table `[drive]`, with the names and units of its kind (`config.drive`).
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from config.drive import KINDS, VALVE, Kind, KindName
 from config.errors import InputError
 from config.file_kinds import require_kind
-from config.loading import SHIPPED, Many, NonNegative, Positive, Schema, read_toml, validated
+from config.loading import SHIPPED, Many, Schema, Stroke, between, read_toml, validated
+
+Strength = Annotated[float, between(1e-12, 1e12, or_zero=True)]
+"""Of a spring or a friction, N/m, N s/m, N, or what a drive has in their place."""
 
 
 class ValveParameters(Schema):
-    """Table `[valve]`: the base model."""
+    """Table `[valve]`: the base model.
+
+    Its ranges hold whatever is a valve or a drive, and no number with which the equations overflow or never end.
+    """
 
     name: str
-    mass_kg: Positive
-    diaphragm_area_m2: Positive
-    spring_n_per_m: NonNegative
+    mass_kg: Annotated[float, between(1e-9, 1e9)]
+    diaphragm_area_m2: Annotated[float, between(1e-9, 1e6)]
+    spring_n_per_m: Strength
     """0: a drive without a spring, which the workbench fits and no daemon commands."""
-    viscous_ns_per_m: NonNegative
-    coulomb_n: NonNegative
-    static_n: NonNegative
-    stribeck_velocity_m_per_s: Positive
-    deadzone_ratio: Positive
-    stroke_m: Positive
+    viscous_ns_per_m: Strength
+    coulomb_n: Strength
+    static_n: Strength
+    stribeck_velocity_m_per_s: Annotated[float, between(1e-12, 1e6)]
+    deadzone_ratio: Annotated[float, between(1e-9, 1e6)]
+    stroke_m: Stroke
     kind: KindName = "valve"
 
     @property

@@ -110,7 +110,7 @@ def test_a_valves_command_is_no_force() -> None:
         ("coulomb_nm = 0.03\n", "", "drive.coulomb_nm: is required and missing"),
         ("torque_nm_per_a = 0.35\n", "", "drive.torque_nm_per_a: is required and missing"),
         ("coulomb_nm = 0.03", "coulomb_n = 0.03", "drive.coulomb_n: unknown key; allowed here: name, inertia_kg_m2, "),
-        ("travel_rad = 40.0", "travel_rad = -1", "drive.travel_rad: Input should be greater than 0, got -1"),
+        ("travel_rad = 40.0", "travel_rad = -1", "drive.travel_rad: allowed is 1e-09 to 1e+06, got -1"),
         ("force_nm", "force_n", "effect.force_n: a drive of kind rotary motor has force_nm"),
     ],
 )

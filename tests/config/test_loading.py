@@ -43,7 +43,14 @@ def test_the_seed_valve_has_the_corrected_static_friction() -> None:
     ("wrong", "right", "said"),
     [
         ("mass_lb = 3.0", "mass_kg = 1.0", "valve.mass_lb: unknown key; allowed here: coulomb_n, deadzone_ratio,"),
-        ("mass_kg = -1.0", "mass_kg = 1.0", "valve.mass_kg: Input should be greater than 0, got -1.0"),
+        ("mass_kg = -1.0", "mass_kg = 1.0", "valve.mass_kg: allowed is 1e-09 to 1e+09, got -1.0"),
+        ("mass_kg = 1e-320", "mass_kg = 1.0", "valve.mass_kg: allowed is 1e-09 to 1e+09, got 1e-320"),
+        (
+            "spring_n_per_m = 1e20",
+            "spring_n_per_m = 5e4",
+            "valve.spring_n_per_m: allowed is 0, or 1e-12 to 1e+12, got 1e+20",
+        ),
+        ("deadzone_ratio = 1e300", "deadzone_ratio = 0.6", "valve.deadzone_ratio: allowed is 1e-09 to 1e+06"),
         ('mass_kg = "heavy"', "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number"),
         ("mass_kg = true", "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number, got True"),
         ('mass_kg = "5"', "mass_kg = 1.0", "valve.mass_kg: Input should be a valid number, got '5'"),
@@ -97,6 +104,12 @@ def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> Non
         ("[valve]\nstroke_m = 0.1\n[cycle]\nperiod_s = 1\npace = 'fast'\n", "cycle.pace: Input should be 'real_time'"),
         ("[valve]\nstroke_m = 0.1\n[pressure]\nminimum_pa = 5e5\n", "pressure: minimum_pa must be below maximum_pa"),
         ("[valve]\nstroke_m = 0.1\n[device.map]\nposition_m = {address = 0}\n", "device.map.command_pa: is required"),
+        ("[valve]\nstroke_m = 1e308\n", "valve.stroke_m: allowed is 1e-09 to 1e+06, got 1e+308"),
+        ("[valve]\nstroke_m = 0.1\n[pressure]\nmaximum_pa = 1e308\n", "pressure.maximum_pa: allowed is 0.001 to 1e+09"),
+        ("[valve]\nstroke_m = 0.1\n[safety]\nstale_after_s = 1e5\n", "safety.stale_after_s: allowed is 1e-06 to 3600"),
+        ("[valve]\nname = ''\nstroke_m = 0.1\n", "valve.name: must be printable characters"),
+        ("[valve]\nname = 'hold '\nstroke_m = 0.1\n", "valve.name: must be printable characters"),
+        ('[valve]\nname = "\\u0000"\nstroke_m = 0.1\n', "valve.name: must be printable characters"),
         ("[valve]\nstroke_m = 0.1\n[cycle]\nshadow = 0\n", "cycle.shadow: Input should be a valid boolean, got 0"),
         ("[valve]\nstroke_m = 0.1\n[device]\nport = true\n", "device.port: Input should be a valid integer, got True"),
         (
