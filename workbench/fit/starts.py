@@ -236,7 +236,19 @@ def told_starts(
         for theta in best
         for z in error.screened([error.coordinates(scaled(theta, STATIC, each)) for each in STATIC_FACTORS], count)
     ]
-    return [Place(z, "landings") for z in error.screened(broken_loose, count)]
+    return [Place(z, "landings") for z in _apart(error, broken_loose, count)]
+
+
+def _apart(error: SimulationError, pool: Sequence[Vector], count: int) -> list[Vector]:
+    """Return the best of a pool, and of those as good the one farthest from it: what is not told must be seen open."""
+    ranked = error.screened(pool, len(pool))
+    if len(ranked) <= count:
+        return ranked
+    least = error.rough.cost(ranked[0], MIDDLE)
+    as_good = [z for z in ranked if error.rough.cost(z, MIDDLE) <= AS_GOOD * least]
+    farthest = max(as_good, key=lambda z: float(np.abs(z - ranked[0]).max()))
+    others = [z for z in ranked[1:] if z is not farthest]
+    return [ranked[0], farthest, *others][:count] if farthest is not ranked[0] else ranked[:count]
 
 
 def _changed(theta: Vector, added: Iterable[Parameter], values: Iterable[float]) -> Vector:

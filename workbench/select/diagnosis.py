@@ -32,7 +32,7 @@ from workbench.select.judged_landings import judged_landings
 from workbench.select.moved_parameters import Moved, moved_parameters
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
-from workbench.select.verdict import Verdict, verdict
+from workbench.select.verdict import EXPLAINED, Verdict, verdict
 from workbench.select.verdict_sentence import verdict_line, verdict_sentence
 
 if TYPE_CHECKING:
@@ -214,7 +214,7 @@ def diagnose(
             steps, found, chosen = search.so_far(base), "unfinished", None
             base, best = steps[0].before, _last(steps)
     own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
-    moved = moved_parameters(valve, best.fit, library | own)
+    moved = moved_parameters(valve, best.fit, library | own) if found in EXPLAINED else ()
     return Diagnosis(
         steps=steps,
         verdict=found,

@@ -21,6 +21,7 @@ from workbench.select.effect_candidates import EffectCandidate, EffectStep, Eval
 from workbench.select.judged_landings import JudgedLandings
 
 Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "unfinished", "untrusted"]
+EXPLAINED: tuple[Verdict, ...] = ("adequate", "missing", "one_of")
 
 
 def verdict(
