@@ -53,6 +53,7 @@ NOT_THERE = (
     InhibitReason.EXCURSION_BEYOND_LIMIT,
     InhibitReason.LAW_BEYOND_LIMITS,
     InhibitReason.TRIM_ENDED,
+    InhibitReason.STUCK,
 )
 """With which slides leave an error."""
 
@@ -106,11 +107,11 @@ def _sliding(
     pulses_allowed: bool,
 ) -> MoveMemory:
     """Let slides have the stem, or give it to a pulse that is worth more than what they would do."""
-    before = memory.slides
+    before = memory.slides.asked(observation.now_s, reference_m)
     slides = slide_law.step(before, observation, reference_m, balance, settings.slides)
     gave = slides.level_pa != before.level_pa
     away = slides.inhibit_reason in NOT_THERE or (slides.excursion and gave)
-    asked = (reference_m, before.slides if before.target_m == reference_m else 0)
+    asked = (reference_m, before.slides)
     if pulses_allowed and away and memory.pulses.rest.known and asked != memory.declined:
         pulses = _first_pulse(memory, sampled, observation, reference_m, balance, settings)
         if pulses.in_progress is not None:
@@ -190,8 +191,7 @@ def _pulsing(
 
 def _beside_pulses(slides: SlideMemory, pulses: BreakawayMemory, now_s: float, reference_m: float) -> SlideMemory:
     """Return the memory of slides while pulses have the stem: the course of the reference, the last direction."""
-    if reference_m != slides.course.value_m:
-        slides = replace(slides, course=slides.course.after(now_s, reference_m))
+    slides = slides.asked(now_s, reference_m)
     trial = None if pulses.in_progress is None else pulses.in_progress.trial
     if trial is not None and trial.pulse.direction != slides.anchor.direction:
         slides = replace(slides, anchor=Anchor(nan, trial.pulse.direction))
@@ -232,7 +232,6 @@ def _handed_over(slides: SlideMemory, pulses: BreakawayMemory, reference_m: floa
         slides,
         level_pa=pulses.level_pa,
         target_m=reference_m,
-        slides=slides.slides if slides.target_m == reference_m else 0,
         anchor=Anchor(pulses.rest.mean_m, slides.anchor.direction),
         last_m=nan,
         margins=_pushed(pulses) if slides.margins is NO_MARGINS else slides.margins,

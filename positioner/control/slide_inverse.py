@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import isnan
 
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_margins import Margin
+from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
 from positioner.control.slide_memory import SlideMemory, StemObservation
 
 SURE = 1.02
@@ -34,15 +34,20 @@ def with_margins_at(memory: SlideMemory, reference_m: float, valve: ExtendedValv
     """Return the memory with the margins of the valve at a reference; what slides have taught of them stays."""
     if memory.margins_at_m == reference_m:
         return memory
-    margins = memory.margins
+    margins = _at(memory.margins, memory.margins_at_m, reference_m, valve)
+    before = _at(memory.held.margins, memory.margins_at_m, reference_m, valve) if memory.held.slides else NO_MARGINS
+    return replace(memory, margins=margins, held=replace(memory.held, margins=before), margins_at_m=reference_m)
+
+
+def _at(margins: Margins, at_m: float, reference_m: float, valve: ExtendedValve) -> Margins:
+    """Return margins learnt at one place, m, at another; at none, nan: the valve's."""
     for s in (1, -1):
         for turning in (False, True):
             margin = Margin(_margin_m(reference_m, s, valve) / SURE, _margin_m(reference_m, s, valve))
-            if not isnan(memory.margins_at_m):
-                before_m = _margin_m(memory.margins_at_m, s, valve)
-                margin = margins.own(s, turning=turning).times(margin.broke_m / before_m)
+            if not isnan(at_m):
+                margin = margins.own(s, turning=turning).times(margin.broke_m / _margin_m(at_m, s, valve))
             margins = margins.replaced(s, margin, turning=turning)
-    return replace(memory, margins=margins, margins_at_m=reference_m)
+    return margins
 
 
 def _margin_m(stem_m: float, direction: int, valve: ExtendedValve) -> float:

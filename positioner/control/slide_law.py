@@ -23,6 +23,10 @@ do not take back (reference_course.py).
 Why there is no limit cycle: what a slide missed corrects B for the next (each miss is a fraction of the one before),
 the dead band widens from slide to slide, and their number is limited. After the end of a move nothing happens until the
 reference changes, or something else has visibly moved the stem.
+
+A stem that slides in a row do not break loose makes its margins longer until a bound bars the next: the limit of an
+excursion, the pressure, the number of slides. Then it is stuck, whichever bound it was, and the margins are those from
+before the row (`_barred`).
 """
 
 from collections.abc import Sequence
@@ -32,7 +36,17 @@ from math import isnan, nan
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve
 from positioner.control.slide_margins import NO_MARGINS, Margin
-from positioner.control.slide_memory import DAY_S, NOWHERE, Anchor, SlideMemory, SlideSettings, StemObservation
+from positioner.control.slide_memory import (
+    CREEP,
+    DAY_S,
+    NONE_HELD,
+    NOWHERE,
+    Anchor,
+    Held,
+    SlideMemory,
+    SlideSettings,
+    StemObservation,
+)
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import SlideOutcome
@@ -66,8 +80,8 @@ MOST_SLIDES = 14
 """Given for one reference."""
 REFILL_S = 60.0
 """At rest, after this time each, two slides come back to the number that is left."""
-STUCK_MARGIN = 3.0
-"""Of F_c/k_s: a margin beyond it moves nothing."""
+STUCK_AFTER = 3
+"""Slides in a row that break nothing loose, each as long as has: one may be luck, and friction grows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +128,12 @@ class Balance:
 
 
 def while_not_commanding(memory: SlideMemory, command_pa: float) -> SlideMemory:
-    """Return the memory while another state commands: nothing of a move."""
+    """Return the memory while another state commands: nothing of a move, nor of what seems to hold the stem."""
     return replace(
         memory,
+        slides=0,
+        margins=memory.learnt,
+        held=NONE_HELD,
         level_pa=command_pa,
         target_m=None,
         direction=0,
@@ -137,8 +154,7 @@ def step(
         memory = _first_margins(memory, balance, settings)
     if observation.outcome is not None:
         memory = _learnt(memory, observation.outcome, observation.quantum_m, balance, settings)
-    if reference_m != memory.course.value_m:
-        memory = replace(memory, course=memory.course.after(observation.now_s, reference_m))
+    memory = memory.asked(observation.now_s, reference_m)
     reference_m = _asked_m(memory, observation, settings)
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
         memory = replace(memory, anchor=Anchor(observation.position_m, memory.direction))
@@ -150,7 +166,7 @@ def step(
     if observation.rest is None:
         return _redirected(memory, observation, reference_m, balance, settings)
     if reference_m != memory.target_m:
-        memory = replace(memory, target_m=reference_m, slides=0, inhibit_reason=InhibitReason.NOTHING)
+        memory = replace(memory, target_m=reference_m, inhibit_reason=InhibitReason.NOTHING)
     return _next_slide(memory, observation, balance, settings)
 
 
@@ -214,7 +230,7 @@ def _learnt(
     """
     s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
-        return replace(memory, anchor=NOWHERE)
+        return replace(memory, anchor=NOWHERE, held=NONE_HELD)
     ours = s == memory.direction and not isnan(memory.aim_m)
     anchor = memory.anchor.at(outcome.from_m, settings.stroke_m)
     turning = s != anchor.direction
@@ -224,12 +240,17 @@ def _learnt(
     unsure_m = max(SURELY * balance.scatter_m, settings.dead_band_m, outcome.std_m, quantum_m)
     hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
     margin = memory.margins.own(s, turning=turning)
+    held = memory.held
     if hit and anchor.direction:
         margin = margin.after_breaking(s * (to_m - anchor.position_m))
     elif not slid:
         margin = margin.after_holding(way_m)
+    if slid:
+        held = NONE_HELD
+    elif way_m >= memory.learnt.of(s, turning=turning).sure_m:
+        held = held.one_more(memory.margins)
     margins = memory.margins.replaced(s, margin, turning=turning)
-    return replace(memory, margins=margins, anchor=Anchor(to_m, s) if slid else anchor)
+    return replace(memory, margins=margins, held=held, anchor=Anchor(to_m, s) if slid else anchor)
 
 
 def _redirected(
@@ -273,11 +294,12 @@ def _next_slide(
         known_m = max(known_m, balance.scatter_m)
     if abs(error_m) <= max(settings.dead_band_m, known_m) * widened:
         return _because(memory, InhibitReason.NOTHING)
+    if memory.held.stuck and abs(rest.position_m - memory.held.at_m) > CREEP * settings.stroke_m:
+        memory = replace(memory, held=NONE_HELD, slides=0)
     again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0
     memory = replace(memory, slides=max(0, memory.slides - 2 * again)) if again else memory
     if memory.slides >= MOST_SLIDES:
-        stuck = max(each.sure_m for each in memory.margins.all) > STUCK_MARGIN * balance.friction_m
-        return replace(memory, inhibit_reason=InhibitReason.STUCK if stuck else InhibitReason.TRIM_ENDED)
+        return _barred(memory, InhibitReason.TRIM_ENDED, rest.position_m, balance, settings)
     s = 1 if error_m > 0 else -1
     anchor = memory.anchor.at(rest.position_m, settings.stroke_m)
     memory = replace(memory, anchor=anchor)
@@ -291,8 +313,43 @@ def _next_slide(
 
 
 def _because(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
-    """Return the memory with the reason why nothing is done: the same one, if it says so already, as in most steps."""
+    """Return the memory with the reason why nothing is done: the same one, if it says so already, as in most steps.
+
+    Of a stem that nothing has broken loose, and that is not where it is to be, no other reason matters.
+    """
+    holds = memory.held.stuck or memory.held.slides >= STUCK_AFTER
+    reason = InhibitReason.STUCK if holds and reason is not InhibitReason.NOTHING else reason
     return memory if memory.inhibit_reason is reason else replace(memory, inhibit_reason=reason)
+
+
+def _barred(
+    memory: SlideMemory, reason: InhibitReason, rest_m: float, balance: Balance, settings: SlideSettings
+) -> SlideMemory:
+    """End the move where a bound bars a longer slide: for that reason, or, where nothing breaks loose, for that.
+
+    A stem is stuck that slides in a row have not moved, each as long as has broken it loose before, or one that was to
+    go the whole way. Whichever bound they met, their margins are not believed: the next reference is tried with those
+    known before, and what is held until then brings a stem that comes free to its reference, not to where the last push
+    would have.
+    """
+    assert memory.target_m is not None
+    held, error_m = memory.held, memory.target_m - rest_m
+    s = 1 if error_m > 0 else -1
+    broke_m = held.margins.of(s, turning=s != memory.anchor.direction).sure_m
+    if not held.slides or not (held.stuck or held.slides >= STUCK_AFTER or abs(error_m) >= broke_m > 0.0):
+        return _because(memory, reason)
+    level_pa = min(max(balance.slide_pa(rest_m, memory.target_m, s), settings.minimum_pa), settings.maximum_pa)
+    return replace(
+        memory,
+        level_pa=level_pa,
+        direction=0,
+        aim_m=nan,
+        excursion=False,
+        slides=MOST_SLIDES,
+        margins=memory.learnt,
+        held=Held(at_m=rest_m),
+        inhibit_reason=InhibitReason.STUCK,
+    )
 
 
 def _lead_m(
@@ -318,6 +375,7 @@ def _excursion(
     """Give the first of two slides, by whichever side it may."""
     target_m = memory.target_m
     assert target_m is not None
+    assert observation.rest is not None
     error_m = target_m - memory.anchor.position_m
     s = 1 if error_m > 0 else -1
     now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m
@@ -332,7 +390,7 @@ def _excursion(
     # A stem that the first of two slides has left away, for the second was too short, does not wait there.
     left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]
     if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
-        return replace(memory, inhibit_reason=InhibitReason.EXCURSION_WAITS)
+        return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     for direction, by_m in ways:
         if abs(by_m - target_m) > settings.excursion_limit_m or not 0.0 <= by_m <= settings.stroke_m:
@@ -347,7 +405,9 @@ def _excursion(
         memory = replace(memory, excursion_s=now_s, spent_m=spent_m, last_m=observation.position_m)
         memory = _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
         return replace(memory, return_pa=_return_pa(memory, memory.anchor.position_m, balance, settings))
-    return _because(memory, why)
+    if why is InhibitReason.EXCURSION_BUDGET_SPENT:
+        return _because(memory, why)
+    return _barred(memory, why, observation.rest.position_m, balance, settings)
 
 
 def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, settings: SlideSettings) -> float:
@@ -379,6 +439,7 @@ def _slide(
     level_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
     if level_pa == memory.level_pa:  # nothing would change: what the stem does not do now it will not do then
         return replace(memory, slides=MOST_SLIDES, slide_s=now_s)
+    reason = InhibitReason.NOTHING if level_pa == wanted_pa else InhibitReason.LAW_BEYOND_LIMITS
     return replace(
         memory,
         level_pa=level_pa,
@@ -387,5 +448,5 @@ def _slide(
         excursion=excursion,
         slides=memory.slides + 1,
         slide_s=now_s,
-        inhibit_reason=InhibitReason.NOTHING if level_pa == wanted_pa else InhibitReason.LAW_BEYOND_LIMITS,
+        inhibit_reason=InhibitReason.STUCK if memory.held.stuck else reason,
     )

@@ -1,7 +1,7 @@
 """The memory of the law of slides: the move, the slide in progress, and how far a stem at rest must be sent."""
 
-from dataclasses import dataclass
-from math import inf, nan
+from dataclasses import dataclass, replace
+from math import inf, isnan, nan
 
 from config.codes import InhibitReason
 from positioner.control.reference_course import ReferenceCourse
@@ -58,7 +58,27 @@ class Anchor:
         return self if abs(rest_m - self.position_m) <= CREEP * stroke_m else Anchor(rest_m)
 
 
-NOWHERE, NO_COURSE = Anchor(), ReferenceCourse()
+@dataclass(frozen=True, slots=True)
+class Held:
+    """Slides in a row that did not break the stem loose, each as long as has, and what was known before the first."""
+
+    slides: int = 0
+    margins: Margins = NO_MARGINS
+    """Before the first: what slides teach that all held is a friction that no slide has overcome."""
+    at_m: float = nan
+    """Where the stem was found stuck; nan: it was not. It is until a slide breaks it loose, or it is seen elsewhere."""
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the stem was found stuck, and has not been seen to move since."""
+        return not isnan(self.at_m)
+
+    def one_more(self, margins: Margins) -> "Held":
+        """Return the row with one more slide, before which margins were known."""
+        return replace(self, slides=self.slides + 1, margins=self.margins if self.slides else margins)
+
+
+NOWHERE, NO_COURSE, NONE_HELD = Anchor(), ReferenceCourse(), Held()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +107,8 @@ class SlideMemory:
     last_m: float = nan
     """The sample before."""
     margins: Margins = NO_MARGINS
+    held: Held = NONE_HELD
+    """Of the last slides, those that broke nothing loose."""
     margins_at_m: float = nan
     """Where the margins are those of the extended valve; nan: none is known."""
     excursion_s: float = -inf
@@ -94,6 +116,17 @@ class SlideMemory:
     spent_m: float = 0.0
     """... and what was spent then of a day's travel."""
     inhibit_reason: InhibitReason = InhibitReason.NOTHING
+
+    def asked(self, now_s: float, reference_m: float) -> "SlideMemory":
+        """Return the memory with a reference, m: where it is another one, slides are counted anew."""
+        if reference_m == self.course.value_m:
+            return self
+        return replace(self, course=self.course.after(now_s, reference_m), slides=0)
+
+    @property
+    def learnt(self) -> Margins:
+        """The margins without what slides seem to teach of which none has yet broken loose."""
+        return self.held.margins if self.held.slides else self.margins
 
     def held_pa(self, command_pa: float) -> float:
         """Return what to hold when something interrupts after a command, Pa: of two slides the second."""

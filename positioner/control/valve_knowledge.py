@@ -116,7 +116,7 @@ def known(
         landings=statics.landings,
         held=statics.held,
         answers=statics.detector.answers,
-        margins=slides.margins if isinstance(slides, SlideMemory) else None,
+        margins=slides.learnt if isinstance(slides, SlideMemory) else None,
         pushes=(pulses.up, pulses.down) if isinstance(pulses, BreakawayMemory) else None,
     )
 

@@ -8,7 +8,7 @@ from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
 from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
 from positioner.control.slide_inverse import with_margins_at
-from positioner.control.slide_memory import SlideMemory
+from positioner.control.slide_memory import Held, SlideMemory
 from sim.composition import Composition
 from sim.static_inverse import extended_valve
 from tests.sim.library import EFFECTS, SEED, library, theta_with
@@ -51,6 +51,9 @@ def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:
     assert up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1))
     assert down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
     assert with_margins_at(there, 0.8 * STROKE_M, extended) is there
+    grown = replace(first, margins=first.margins.replaced(1, up.times(3.0), turning=True))
+    held = with_margins_at(replace(grown, held=Held(2, learnt.margins)), 0.8 * STROKE_M, extended)
+    assert held.learnt == there.margins, "so does what was known before slides that held"
 
 
 def test_lead_makes_a_slow_pressure_fast_enough() -> None:

@@ -7,17 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from config.codes import Fault, InhibitReason, Mode, State
-from config.daemon_file import DaemonFile
+from config.codes import Fault, InhibitReason, Mode, Ne107Cause, State
+from config.daemon_file import DaemonFile, HealthTable
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller_memory import Decision
 from positioner.control.reference_course import ReferenceCourse
 from positioner.control.requests import Requests
-from positioner.control.slide_law import Balance, step
+from positioner.control.slide_law import MOST_SLIDES, Balance, step, while_not_commanding
 from positioner.control.slide_margins import Margin, Margins
-from positioner.control.slide_memory import DAY_S, Anchor, SlideMemory, SlideSettings, StemObservation
+from positioner.control.slide_memory import DAY_S, Anchor, Held, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
+from positioner.daemon.health import Health, ne107_condition
+from positioner.daemon.health.valve_health import HealthSettings
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
@@ -269,6 +271,122 @@ def test_a_stem_on_its_reference_is_not_moved_to_what_the_references_scatter_abo
     assert within(0.06, 3.1, True, memory).level_pa == 60e3
 
 
+STUCK_N = 20e3
+"""More than the spring and any pressure allowed overcome."""
+
+
+NEW_HEALTH = Health(HealthSettings.of(HealthTable(), STROKE_M))
+
+
+def stuck_at(loop: Loop, reference_pu: float, seconds: float = 20.0) -> list[float]:
+    """Return the pressures, Pa, that a reference draws from a stem that nothing breaks loose, and set it free again."""
+    loop.valve.change(static_n=STUCK_N, coulomb_n=STUCK_N)
+    loop.step_to(reference_pu, cycles=0)
+    given_pa = [loop.decision.command_pa]
+    for _ in range(round(seconds / loop.period_s)):
+        loop.cycle.once()
+        if loop.decision.command_pa != given_pa[-1]:
+            given_pa.append(loop.decision.command_pa)
+    return given_pa
+
+
+def free(loop: Loop) -> None:
+    loop.valve.change(static_n=VALVE.static_n, coulomb_n=VALVE.coulomb_n)
+
+
+@pytest.mark.parametrize(
+    "control",
+    [{}, {"excursion_limit": 0.08}, {"excursion_interval_s": 5.0}, {"law": "moves"}],
+    ids=["as shipped", "a short excursion", "an interval", "moves"],
+)
+def test_a_stem_that_nothing_breaks_loose_is_stuck_whichever_bound_is_met_first(control: dict[str, Any]) -> None:
+    loop = Loop(0.05, **control)
+    loop.step_to(0.5, cycles=400)
+    given_pa = stuck_at(loop, 0.6)
+    assert loop.decision.inhibit_reason is InhibitReason.STUCK
+    assert ne107_condition(loop.decision, NEW_HEALTH).cause is Ne107Cause.STUCK
+    assert 3 < len(given_pa) < MOST_SLIDES, "tried, and not until the number of slides ends it"
+    held = set(given_pa[-1:])
+    for _ in range(round(30.0 / loop.period_s)):
+        loop.cycle.once()
+        held.add(loop.decision.command_pa)
+    assert len(held) == 1
+    path = loop.step_to(0.3, cycles=400)
+    assert np.ptp(path) < 1e-3
+    assert loop.decision.command_pa < given_pa[0], "the next reference is tried"
+    assert loop.decision.inhibit_reason is InhibitReason.STUCK
+
+
+def test_a_stem_that_comes_free_goes_to_its_reference_and_is_as_movable_as_before() -> None:
+    loop = Loop(0.05)
+    for at in (0.5, 0.503, 0.6, 0.597, 0.5):
+        loop.step_to(at)
+    law = loop.cycle._controller._memory.law
+    assert isinstance(law, SlideMemory)
+    margins = law.margins
+    stuck_at(loop, 0.6)
+    law = loop.cycle._controller._memory.law
+    assert isinstance(law, SlideMemory)
+    assert law.margins == margins
+    free(loop)
+    path = loop.step_to(0.6, cycles=200)
+    assert path.max() < 0.601, "not where the last push would have brought it"
+    assert abs(path[-1] - 0.6) < 1e-3
+    assert loop.decision.inhibit_reason is InhibitReason.NOTHING
+    for at in (0.55, 0.553, 0.8, 0.5, 0.503):
+        assert abs(loop.step_to(at)[-1] - at) < 1e-3
+
+
+def test_a_stem_held_for_small_moves_is_tried_again_and_lands_where_it_shall() -> None:
+    """Stuck for references a per cent away: pressures alone do not move it when it comes free, the next tries do."""
+    loop = Loop(0.05)
+    loop.step_to(0.5)
+    loop.step_to(0.503)
+    stuck_at(loop, 0.513)
+    assert loop.decision.inhibit_reason is InhibitReason.STUCK
+    free(loop)
+    assert abs(loop.step_to(0.513, cycles=1400)[-1] - 0.513) < 1e-3, "two slides come back a minute"
+    assert not loop.decision.inhibit_reason
+
+
+@pytest.mark.parametrize(("position_m", "given"), [(0.050, False), (0.0505, False), (0.0545, True)])
+def test_a_stuck_stem_that_is_seen_elsewhere_is_moved_at_once(position_m: float, given: bool) -> None:
+    """It was found stuck at 0.05 m. A packing gives way by some per cent of the stroke; farther, it has come free."""
+    memory = SlideMemory(
+        target_m=0.06,
+        course=STOOD,
+        slides=MOST_SLIDES,
+        slide_s=9.0,
+        anchor=Anchor(0.05, 1),
+        margins=KNOWN,
+        held=Held(at_m=0.05),
+        level_pa=70e3,
+    )
+    after = within(position_m, 10.0, True, memory)
+    assert (after.level_pa != 70e3) is given
+    assert after.inhibit_reason is (InhibitReason.NOTHING if given else InhibitReason.STUCK)
+
+
+def test_a_slide_shorter_than_has_broken_loose_may_hold() -> None:
+    """One of 5.5 mm, and 5.6 mm is what is known: nothing is said of the stem. One of 5.5 mm, and 5 mm is, is."""
+    assert after(0.0655, moved=False).held == Held()
+    margins = Margins(*(4 * [Margin(broke_m=0.005)]))
+    came = SlideOutcome(1.0, -1, 0.0655, 27e3, 0.0655, 1e-6, False, False)
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.0655, 1), margins=margins)
+    observation = StemObservation(1.0, 0.0655, True, None, 0.0, came)
+    held = step(memory, observation, 0.06, BALANCE, SETTINGS)
+    assert (held.held.slides, held.learnt) == (1, margins)
+
+
+def test_another_state_gives_up_what_slides_that_held_seemed_to_teach() -> None:
+    margins = Margins(*(4 * [Margin(0.0055, 0.0056)]))
+    grown = Margins(*(4 * [Margin(0.03, 0.039)]))
+    memory = SlideMemory(margins=grown, held=Held(2, margins), slides=3)
+    assert memory.learnt == margins
+    after = while_not_commanding(memory, 50e3)
+    assert (after.margins, after.held, after.slides) == (margins, Held(), 0)
+
+
 def test_the_staircase_stays_in_its_window_and_leaves_what_it_found_when_it_fails() -> None:
     """A stem that never moves: the pressure goes to its limits and back, and nothing is applied."""
     loop = Loop(0.05, identify=False)
@@ -411,6 +529,8 @@ def within(position_m: float, now_s: float, rest: bool, memory: SlideMemory, int
 
 BALANCE = Balance(Ratios(-SLOPE_PA_PER_M, -FRICTION_PA), (), (), STROKE_M)
 KNOWN = Margins(*(4 * [Margin(0.0055, 0.0056)]))
+STOOD = ReferenceCourse(0.06, 0.0)
+"""The reference that is wanted, since a while."""
 
 
 @pytest.mark.parametrize(
@@ -451,7 +571,13 @@ def test_no_slide_is_given_for_less_than_slides_miss_by(slides: int, given: bool
     assert 0.9e-4 < balance.scatter_m < 4e-4
     at = Rest(0.06 - 0.9e-4, 1e-6, 1e-6, 100, 0.1)
     memory = SlideMemory(
-        target_m=0.06, direction=-1, slides=slides, slide_s=9.5, anchor=Anchor(at.position_m, -1), margins=KNOWN
+        target_m=0.06,
+        course=STOOD,
+        direction=-1,
+        slides=slides,
+        slide_s=9.5,
+        anchor=Anchor(at.position_m, -1),
+        margins=KNOWN,
     )
     observation = StemObservation(10.0, at.position_m, True, at, 0.0, None)
     assert (step(memory, observation, 0.06, balance, SETTINGS).slides > slides) is given
@@ -460,7 +586,14 @@ def test_no_slide_is_given_for_less_than_slides_miss_by(slides: int, given: bool
 @pytest.mark.parametrize(("slides", "waits"), [(0, True), (2, False)])
 def test_a_stem_that_an_excursion_left_away_does_not_wait_there(slides: int, waits: bool) -> None:
     memory = SlideMemory(
-        target_m=0.06, direction=-1, slides=slides, excursion_s=9.0, anchor=Anchor(0.065, 1), margins=KNOWN, slide_s=9.5
+        target_m=0.06,
+        course=STOOD,
+        direction=-1,
+        slides=slides,
+        excursion_s=9.0,
+        anchor=Anchor(0.065, 1),
+        margins=KNOWN,
+        slide_s=9.5,
     )
     after = within(0.065, 10.0, True, memory, interval_s=20.0)
     assert (after.inhibit_reason is InhibitReason.EXCURSION_WAITS) is waits
