@@ -100,7 +100,7 @@ COMMANDS = (
     _operable("reference", 0, "float32", "p.u.", 0.0, 1.0, "stem position asked for"),
     _operable("reference_scaled", 2, "uint16", "1e-4 p.u.", 0, 10000, "the same as a whole number"),
     _writable("mode", 3, "uint16", "1", 0, 2, f"{listed(Mode)}; falls to hold on a fault"),
-    _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3)"),
+    _writable("eta_1", 4, "uint16", "1", 0, 1, "0 switches the excitation on (state S3); the DCS ends it: 1"),
     _writable("eta_2", 5, "uint16", "1", 0, 1, "0 switches the parameter identifier on"),
     _writable("eta_3", 6, "uint16", "1", 0, 1, "0 switches the friction estimator on"),
     _operable("acknowledge", 7, "uint16", "1", 0, 1, "write 1: acknowledges a fault whose cause is gone; reads 0"),
@@ -164,7 +164,9 @@ def _estimate_registers() -> tuple[Register, ...]:
 
 ESTIMATES = (
     *_estimate_registers(),
-    Register("progress", 240, "float32", "1", "of the identification window, 0 to 1"),
+    Register(
+        "progress", 240, "float32", "1", "of the identification window, 0 to 1; at 1 the DCS may end S3 (eta_1 = 1)"
+    ),
     Register("estimate_age", 242, "float32", "s", "time since the last sample the estimates used"),
     Register("b_over_c_applied", 244, "float32", "Pa/m", "b/c as the law uses it; NaN: none yet"),
     Register("k_over_c_applied", 246, "float32", "Pa", "k/c as the law uses it; NaN: none yet"),

@@ -29,6 +29,7 @@ REFUSALS = (
     InhibitReason.EXCITATION_VETOED,
     InhibitReason.AMPLITUDE_ZERO,
     InhibitReason.STAIRCASE_IN_VAIN,
+    InhibitReason.STAIRCASE_UNANSWERED,
 )
 """Why an excitation does not begin or has ended; the other reasons concern the law."""
 

@@ -172,7 +172,7 @@ def step(
     situation = Situation(
         supervision.mode is AUTOMATIC,
         playing or (excitation is not None and not excitation.ended),
-        applied.ratios is not None,
+        applied.ratios is not None and not (excitation is not None and excitation.unanswered),
         reference.delta_m,
         dropped,
     )

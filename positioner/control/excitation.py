@@ -2,6 +2,8 @@
 
 S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or that is not permitted any more
 (`permissives`), or a staircase that came to nothing, has ended: S3 is left, and only eta_1 = 1 makes room for another.
+After a staircase whose steps the stem did not answer the law has to wait for that, too: where the stem is nobody knows,
+so the command before S3 is held until somebody asks for something else.
 """
 
 from dataclasses import dataclass, replace
@@ -33,6 +35,11 @@ class ActiveExcitation:
     def ended(self) -> bool:
         """Whether S3 is over."""
         return self.inhibit_reason is not NOTHING
+
+    @property
+    def unanswered(self) -> bool:
+        """Whether it has ended because the stem did not answer."""
+        return self.inhibit_reason is InhibitReason.STAIRCASE_UNANSWERED
 
     @property
     def by_slides(self) -> bool:
@@ -114,11 +121,13 @@ def climbed(
     stairs, rest = excitation.signal, statics.detector.rest
     if not isinstance(stairs, Staircase) or settings.staircase is None or excitation.ended or rest is None:
         return excitation
-    stairs, law_valid = stairs.counted(outcome), statics.law.valid
+    stairs, law_valid = stairs.counted(outcome, settings.staircase), statics.law.valid
     if stairs.over(law_valid):
         if law_valid:
             return replace(excitation, signal=replace(stairs, complete=True))
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
+    if outcome is not None and stairs.unanswered(settings.staircase):
+        return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_UNANSWERED)
     if stairs.enough(law_valid, settings.staircase):
         stairs = stairs.turned_to_close()
     return replace(excitation, signal=stairs.stepped(rest.position_m, settings.staircase))

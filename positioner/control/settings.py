@@ -193,7 +193,7 @@ WITH_MEMORY: dict[str, Callable[[DaemonFile], LawSettings]] = {
 
 def _staircase(file: DaemonFile) -> StaircaseLimits:
     low, high = (share * file.valve.stroke_m for share in file.excitation.travel_window)
-    return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa)
+    return StaircaseLimits(low, high, file.pressure.minimum_pa, file.pressure.maximum_pa, file.valve.stroke_m)
 
 
 def _excitation(file: DaemonFile) -> ExcitationLimits:

@@ -15,10 +15,19 @@ does not close it: behind a soft packing it is a short one, which a slow pressur
 the staircase has ended, or after `MOST_TURNS`. No alpha and beta are
 needed: break-away is found by the ramp of small steps, and nothing is asked for beyond the window and the pressure
 limits.
+
+A stem that is broken loose and does not show it (its sensor is frozen) would be driven out of the window unseen. So W,
+all that the pressure went over since the stem last answered, is bounded by what slides have needed:
+
+    going on           W <= 1.5 of the most in this direction, or of the most of a turn, and a first step
+    after a turn       W <= 1.5 of the most of a turn, for friction differs over the travel, and a first step
+    after the first    W <= what spring balances over the whole stroke: friction that is more leaves no valve
+
+Until it has gone on once nothing is known, and it may be searched up to the pressure limits.
 """
 
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import inf, nan, sqrt
 
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
@@ -43,6 +52,10 @@ NOT_COMPLETE = 0.99
 NEARLY_TURNED = 0.8
 """Of the rise that turned friction round before: the first step of the last turn."""
 MOST_TURNS = 6
+UNANSWERED = 1.5
+"""Of the most that a slide has needed: a stem that has not answered by then is not where it is said to be, or stuck."""
+ANSWER, DEVIATIONS = 1e-3, 3.0
+"""Of the window; of a rest: a stem that went farther than both has answered, if only its packing gave way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +66,12 @@ class StaircaseLimits:
     high_m: float
     minimum_pa: float
     maximum_pa: float
+    stroke_m: float
+
+    @property
+    def span_pa(self) -> float:
+        """Between the limits of the pressure."""
+        return self.maximum_pa - self.minimum_pa
 
     @property
     def window_m(self) -> float:
@@ -81,6 +100,10 @@ class Staircase:
         closing: whether it has turned round for the last landing ...
         closed: ... and has had that.
         complete: whether it has given a static law.
+        slid_pa: level under which the stem last slid; NaN: not known, for it has not yet, or rests at a stop, which
+            bears any excess.
+        lowest_pa, highest_pa: levels since it last moved visibly at all; NaN likewise.
+        most_up_pa, most_down_pa, most_turn_pa: longest way of the level from slide to slide, going on and turning.
     """
 
     level_pa: float
@@ -101,6 +124,12 @@ class Staircase:
     closing: bool = False
     closed: bool = False
     complete: bool = False
+    slid_pa: float = nan
+    lowest_pa: float = nan
+    highest_pa: float = nan
+    most_up_pa: float = 0.0
+    most_down_pa: float = 0.0
+    most_turn_pa: float = 0.0
 
     @property
     def progress(self) -> float:
@@ -151,10 +180,33 @@ class Staircase:
             going_m=0.0,
         )
 
-    def counted(self, outcome: SlideOutcome | None) -> "Staircase":
+    def counted(self, outcome: SlideOutcome | None, limits: StaircaseLimits) -> "Staircase":
         """Return it with what the last step did, if that is known now."""
-        if outcome is None:
+        return self if outcome is None else self._slid(outcome)._answered(outcome, limits)
+
+    def unanswered(self, limits: StaircaseLimits) -> bool:
+        """Return whether the stem has not answered what has always moved it before."""
+        return self.highest_pa - self.lowest_pa > self._most_pa(limits)
+
+    def _most_pa(self, limits: StaircaseLimits) -> float:
+        """Return the longest way of the level for which the stem may leave it without an answer."""
+        going_on_pa = self.most_up_pa if self.direction > 0 else self.most_down_pa
+        needed_pa = (going_on_pa if self.slide_m else 0.0) or self.most_turn_pa
+        if needed_pa:
+            return UNANSWERED * needed_pa + FIRST_STEP * limits.span_pa
+        return self.slope_pa_per_m * limits.stroke_m or inf
+
+    def _answered(self, outcome: SlideOutcome, limits: StaircaseLimits) -> "Staircase":
+        """Return it with the way of the level begun anew, if the stem moved visibly, or its packing gave way."""
+        way_m = outcome.direction * (outcome.position_m - outcome.from_m)
+        if way_m <= max(ANSWER * limits.window_m, DEVIATIONS * outcome.std_m):
             return self
+        at_stop = outcome.moved and not outcome.landing
+        level_pa = nan if at_stop else self.level_pa
+        return replace(self, lowest_pa=level_pa, highest_pa=level_pa)
+
+    def _slid(self, outcome: SlideOutcome) -> "Staircase":
+        """Return it with what a slide has taught, if the last step was one."""
         first = self.slide_m == 0.0  # of a direction: its rise turned friction round, too
         if not outcome.moved:
             return self if first else replace(self, low_pa=max(self.low_pa, self.rise_pa))
@@ -163,7 +215,7 @@ class Staircase:
             return replace(self, low_pa=max(self.low_pa, self.rise_pa))
         going_m = self.going_m + went_m if outcome.landing and not first else self.going_m
         counted = replace(
-            self,
+            self._having_needed(outcome, first=first),
             going_m=going_m,
             up_m=max(self.up_m, going_m) if outcome.direction > 0 else self.up_m,
             down_m=max(self.down_m, going_m) if outcome.direction < 0 else self.down_m,
@@ -178,6 +230,16 @@ class Staircase:
             return replace(counted, reversal_pa=self.rise_pa) if self.turns else counted
         high_pa = self.rise_pa if self.high_pa < self.low_pa else min(self.high_pa or self.rise_pa, self.rise_pa)
         return replace(counted, high_pa=high_pa, slope_pa_per_m=self.rise_pa / went_m)
+
+    def _having_needed(self, outcome: SlideOutcome, *, first: bool) -> "Staircase":
+        """Return it with how far the level went from slide to slide; the first slide of all tells nothing of that."""
+        way_pa = abs(self.level_pa - self.slid_pa)
+        stairs = replace(self, slid_pa=self.level_pa if outcome.landing else nan)
+        if first:  # a NaN is no longer than anything
+            return replace(stairs, most_turn_pa=max(self.most_turn_pa, way_pa))
+        if outcome.direction > 0:
+            return replace(stairs, most_up_pa=max(self.most_up_pa, way_pa))
+        return replace(stairs, most_down_pa=max(self.most_down_pa, way_pa))
 
     def _least_known(self, limits: StaircaseLimits) -> bool:
         """Return whether the least rise that breaks the stem loose in this direction is known well enough."""
@@ -197,7 +259,7 @@ class Staircase:
         return wanted_pa if wanted_pa > self.rise_pa else GROWTH * self.rise_pa
 
     def _next_step(self, limits: StaircaseLimits) -> "Staircase":
-        span_pa = limits.maximum_pa - limits.minimum_pa
+        span_pa = limits.span_pa
         if self.slide_m > 0.0 and self.slope_pa_per_m > 0.0:
             step_pa = self._wanted_rise_pa(limits) - self.rise_pa
         elif self.closing and not self.step_pa:
@@ -207,4 +269,11 @@ class Staircase:
         else:
             step_pa = min(GROWTH * self.step_pa, LARGEST_STEP * span_pa) if self.step_pa else FIRST_STEP * span_pa
         level_pa = min(max(self.level_pa + self.direction * step_pa, limits.minimum_pa), limits.maximum_pa)
-        return replace(self, level_pa=level_pa, step_pa=step_pa, rise_pa=self.rise_pa + step_pa)
+        return replace(
+            self,
+            level_pa=level_pa,
+            step_pa=step_pa,
+            rise_pa=self.rise_pa + step_pa,
+            lowest_pa=min(self.lowest_pa, level_pa),  # a NaN stays one
+            highest_pa=max(self.highest_pa, level_pa),
+        )
