@@ -8,6 +8,7 @@ and v_0 are free.
 """
 
 from dataclasses import dataclass, replace
+from math import inf, nextafter
 
 import numpy as np
 
@@ -92,7 +93,8 @@ def prepared(segment: MotionSegment, *, held: bool, lopsided: bool = False) -> P
         position_m = np.add.reduceat(position_m, edges) / weight
         time_s = coarse_s
     if not from_rest:
-        start_s -= 1e-9 * float(time_s[-1] - start_s)  # the first sample is a row like the others
+        # The first sample is a row like the others; far from the zero of the clock the least that a time can be before.
+        start_s = min(start_s - 1e-9 * float(time_s[-1] - start_s), nextafter(start_s, -inf))
     count = _independent_count(rest, position_m)
     return PreparedMotion(
         direction=segment.direction,

@@ -220,3 +220,13 @@ def test_samples_that_are_no_numbers_are_missing_samples() -> None:
     whole = moved().noisy(np.random.default_rng(1))
     whole.position_m[300:310] = np.nan
     assert max(map(abs, errors(found(whole)))) < 0.01
+
+
+def test_a_motion_that_begins_the_record_is_found_on_whatever_clock() -> None:
+    rows: Array = np.arange(300, dtype=np.float64)
+    for zero_s in (0.0, 1e7, 1.76e9):
+        t: Array = zero_s + 0.01 * rows + 1e7 * (rows > 150)
+        position_m: Array = 1e-4 * rows
+        pressure_pa: Array = 100.0 * rows
+        ramp = identify(t, position_m, pressure_pa, HELD)
+        assert ramp.estimates.b_over_c.value == pytest.approx(-1e6, rel=1e-6)
