@@ -5,7 +5,8 @@ is known, has `reference_m`, the set point, in the place of `command_pa`. `press
 force on the stem, positive in the opening direction), `reference_m`, `state` and further columns are optional. A row's
 command is the one in force from its time to the next row's. Lines that begin with `#` at the top carry metadata,
 `# key: value`. A last line torn by a crash is left out and told as `torn`. A byte order mark before it all is no part
-of it. A file named `.parquet` holds the same columns; one named `.gz` is such a CSV, compressed.
+of it. Numbers beyond 1e12 either way, infinite ones too, are no measurements: they are taken as missing, which is told.
+A file named `.parquet` holds the same columns; one named `.gz` is such a CSV, compressed.
 
 A drive's recording has the names and units of its kind (`config.drive`): `command_nm, position_rad`. Where it says a
 velocity and no position, that is the velocity's integral, from zero. In the program the columns have a valve's names,
@@ -18,7 +19,7 @@ import os
 import zlib
 from array import array
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -48,6 +49,9 @@ OF_DRIVES = tuple(
 """The same of drives."""
 KIND, INTEGRATED = "drive", "position"
 """Keys of what is said of a drive's: its kind; where its position comes from."""
+NOT_MEASURED = "not measured"
+MOST_MEASURED = 1e12
+"""In SI: what is beyond it, either way, stands for no measurement, as 3.4e38 does."""
 CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
 
@@ -68,8 +72,13 @@ class Recording(Result):
 
     @classmethod
     def of(cls, columns: Mapping[str, Column], metadata: Mapping[str, str]) -> Self:
-        """Return a recording of columns that may have a drive's names; they get a valve's, and its kind is said."""
+        """Return a recording of columns that may have a drive's names; they get a valve's, and its kind is said.
+
+        What no instrument shows becomes a missing value, and that is said.
+        """
         kind = kind_of_columns(columns)
+        columns, told = _as_measured(columns, [kind.own(name) for name in COLUMNS])
+        metadata = {**metadata, **told}
         if kind is VALVE:
             return cls(columns, {key: each for key, each in metadata.items() if key != KIND})
         names = {kind.own(name): name for name in COLUMNS}
@@ -185,6 +194,20 @@ class Recording(Result):
 def of_kind(kind: Kind) -> dict[str, str]:
     """Return what a recording says of itself so that `Recording.kind` knows whose it is; of a valve nothing."""
     return {} if kind is VALVE else {KIND: kind.name}
+
+
+def _as_measured(columns: Mapping[str, Column], names: Sequence[str]) -> tuple[dict[str, Column], dict[str, str]]:
+    """Return the columns without what no instrument shows, NaN in its place, and what is to be said of it."""
+    kept, said = dict(columns), []
+    for name in names:
+        if name not in columns or not (beyond := np.abs(columns[name]) > MOST_MEASURED).any():
+            continue
+        first, count = int(beyond.argmax()), int(beyond.sum())
+        which = f"sample {first + 1}" if count == 1 else f"{count} samples, the first {first + 1},"
+        said.append(f"{name} of {which} is {columns[name][first]:g}")
+        kept[name] = np.where(beyond, np.nan, columns[name])
+    allowed = f"{'; '.join(said)}: beyond {MOST_MEASURED:g} either way nothing is, taken as missing"
+    return kept, {NOT_MEASURED: allowed} if said else {}
 
 
 def _integrated(time_s: Column, velocity_m_per_s: Column) -> Column:

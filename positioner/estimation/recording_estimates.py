@@ -3,7 +3,7 @@
 Where a pressure was measured in most rows it is used; else the command, a row's being in force until the next row.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -40,6 +40,8 @@ class RecordingEstimates(Result):
     found: BatchResult
     samples: int
     statics: StaticIdentification
+    notes: tuple[str, ...] = ()
+    """What was left out of the recording."""
 
     @property
     def estimates(self) -> Estimates:
@@ -93,6 +95,7 @@ class RecordingEstimates(Result):
             *quality,
             f"{self.static_law.landings} landings"
             + (f"; they lie {self.static_law.residual_m:.3g} m off the static law" if self.static_law.valid else ""),
+            *(f"recording: {note}" for note in self.notes),
         ]
 
     def frame_columns(self) -> dict[str, list[object]]:
@@ -143,7 +146,20 @@ def estimate(
         raise InputError("noise_std_m", f"must be positive, it is {noise_std_m:g}")
     pressure_pa, settings = _pressure(recording, noise_std_m, pressure_held)
     found = identify(recording.time_s, recording.position_m, pressure_pa, settings)
-    return RecordingEstimates(found, len(recording), recording_landings(recording))
+    notes = tuple(_notes(recording, pressure_pa))
+    return RecordingEstimates(found, len(recording), recording_landings(recording), notes)
+
+
+def _notes(recording: Recording, pressure_pa: Array) -> Iterator[str]:
+    """Yield what is not as it should be in a recording, and what is left out of it."""
+    for key, said in recording.metadata.items():
+        if key == "torn" or key.startswith("not "):
+            yield f"{key}: {said}"
+    missing = ~(np.isfinite(recording.position_m) & np.isfinite(pressure_pa))
+    if missing.any():
+        count, first = int(missing.sum()), int(missing.argmax()) + 1
+        which = f"sample {first}" if count == 1 else f"{count} samples, the first {first}"
+        yield f"position or pressure is missing in {which}: left out"
 
 
 def _pressure(

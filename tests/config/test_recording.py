@@ -60,3 +60,13 @@ def test_a_line_torn_by_a_crash_is_left_out_and_told(tmp_path: Path) -> None:
     read = read_recording(tmp_path / "r.csv")
     assert len(read) == 2
     assert read.metadata["torn"] == "the last line, 4, is not whole and was left out"
+
+
+@pytest.mark.parametrize("cell", ["3.4e38", "-1e160", "inf"])
+def test_what_no_instrument_shows_is_taken_as_missing_and_told(tmp_path: Path, cell: str) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text(f"time_s,command_pa,position_m,unix_ns\n0,1,2,1.7e18\n1,1,{cell},1.7e18\n2,1,2,1.7e18\n")
+    read = Recording.read(path)
+    np.testing.assert_array_equal(read.position_m, [2.0, np.nan, 2.0])
+    assert (read.columns["unix_ns"] == 1.7e18).all(), "no quantity of a valve's"
+    assert read.metadata["not measured"].startswith(f"position_m of sample 2 is {float(cell):g}: beyond 1e+12")
