@@ -58,6 +58,29 @@ def test_lost_samples_are_a_longer_period_told_once() -> None:
     )
 
 
+@pytest.mark.parametrize("word", [-9999.0, 9.999e6])
+def test_a_command_of_one_row_that_is_a_word_is_told_and_the_one_before_is_held(word: float) -> None:
+    columns = plain()
+    columns["command_pa"] = columns["command_pa"].copy()
+    columns["command_pa"][400] = word
+    record = ready(Recording(columns))
+    assert record.command_pa[400] == columns["command_pa"][399]
+    assert record.notes == (
+        f"command_pa is {word:g} in sample 401, alone among others unlike it: no command",
+        "command_pa is not a number in sample 401: the command before is held",
+    )
+
+
+@pytest.mark.parametrize(("kind", "pulse"), [("valve", 0.0), ("valve", 3e5), ("rotary", -9999.0)])
+def test_a_pulse_of_one_row_is_a_command(kind: str, pulse: float) -> None:
+    columns = plain()
+    columns["command_pa"] = columns["command_pa"].copy()
+    columns["command_pa"][400] = pulse
+    record = ready(Recording(columns, {"drive": kind} if kind != "valve" else {}))
+    assert record.command_pa[400] == pulse
+    assert not any("no command" in note for note in record.notes)
+
+
 def test_a_missing_command_is_held_and_missing_positions_and_spikes_are_not_judged() -> None:
     columns = plain()
     command, position = columns["command_pa"].copy(), columns["position_m"].copy()

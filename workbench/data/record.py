@@ -2,10 +2,10 @@
 
 The clock set back, a gap, or rows that the daemon's recorder missed begin a new segment, simulated from rest on its
 own. Samples that the daemon lost are a longer period: it wrote no command in the meantime. A position that is not a
-number, or a spike, is left out of the error; a command that is not a number is the one before, still in force. What
-begins in motion, at a velocity that its samples do not tell, or with a motion that no command of it began, begins where
-the stem first rests, if that is in its first third. Nothing else is touched, and `notes` has a sentence for each of
-these, samples counted from 1.
+number, or a spike, is left out of the error; a command that is not a number, or is none, as -9999 for a row, is the one
+before, still in force. What begins in motion, at a velocity that its samples do not tell, or with a motion that no
+command of it began, begins where the stem first rests, if that is in its first third. Nothing else is touched, and
+`notes` has a sentence for each of these, samples counted from 1.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from config.drive import KINDS, KindName
+from config.drive import KINDS, VALVE, KindName
 from config.errors import InputError
 from config.noise import quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
@@ -48,6 +48,10 @@ ALLOWED = (
 )
 STRETCH = "stretch"
 """The column that counts the stretches of a recording of which the rest was left out."""
+WORD = 10.0
+"""Times the other commands, from which on one of a single row is none."""
+BELOW_ZERO = 0.05
+"""Of the range of the commands: a pressure that is as far below zero for a single row is none."""
 UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
 Mask = npt.NDArray[np.bool_]
 
@@ -114,7 +118,7 @@ def ready(recording: Recording) -> Record:
     _require_columns(columns)
     notes = [f"{key}: {value}" for key, value in recording.metadata.items() if key == "torn" or key.startswith("not ")]
     asked = "reference_m" if recording.by_setpoint else "command_pa"
-    command_pa = _held(columns[asked], asked, notes)
+    command_pa = _held(_without_words(columns[asked], asked, recording.kind is VALVE, notes), asked, notes)
     position_m = recording.position_m
     valid = _valid(position_m, notes)
     segments = tuple(_segments(columns, notes))
@@ -302,6 +306,28 @@ def _require_columns(columns: Mapping[str, Column]) -> None:
     set_back = int(np.sum(np.diff(columns["time_s"]) <= 0.0))
     if set_back > max(FEW_STEPS, CLOCK_STEPS_TOLERATED * count):
         raise InputError("recording", f"time_s must increase: it does not at {set_back} of {count} samples")
+
+
+def _without_words(command: Column, name: str, of_valve: bool, notes: list[str]) -> Column:
+    """Return the commands with NaN for those of a single row that stand for a word, as -9999 does for "bad".
+
+    They are ten times as large as the others; or of a pressure below zero, where the others are above it. A pulse that
+    was commanded for a row is neither.
+    """
+    known = command[np.isfinite(command)]
+    if not known.size:
+        return command
+    low, high = np.quantile(known, [0.01, 0.99]).tolist()
+    wide = high - low
+    strange = np.abs(command) > WORD * max(abs(low), abs(high)) if wide else np.zeros(command.size, dtype=np.bool_)
+    if of_valve and name == "command_pa" and low >= 0.0:
+        strange |= command < -BELOW_ZERO * wide
+    alone = strange & ~np.append(strange[1:], False) & ~np.append(False, strange[:-1])
+    if not alone.any():
+        return command
+    first = float(command[int(alone.argmax())])
+    notes.append(f"{name} is {first:g} in {_samples(alone)}, alone among others unlike it: no command")
+    return np.where(alone, np.nan, command)
 
 
 def _held(command_pa: Column, name: str, notes: list[str]) -> Column:
