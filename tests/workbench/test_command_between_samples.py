@@ -69,6 +69,16 @@ def test_a_command_that_stands_still_as_the_stem_moves_was_held() -> None:
     assert sampling(record, SEED.valve).sure
 
 
+@pytest.mark.parametrize("offset_s", [0.3, 0.5])
+def test_a_slow_valve_under_steps_that_fall_between_samples_is_not_taken_for_sure(offset_s: float) -> None:
+    """It moves on for many samples under a command that stands still; the few with which it goes on tell."""
+    slow = with_effect(CALM, "rate_limit", filling_pa_per_s=1e4, venting_pa_per_s=1e4)
+    found = sampling(ready(once_a_second(slow, 400, held_s=5.0, offset_s=offset_s)), CALM.valve)
+    assert not (found.held and found.sure)
+    steady = sampling(ready(once_a_second(slow, 400, held_s=5.0)), CALM.valve)
+    assert (steady.motion, steady.sure) == (Motion.QUASI_STATIC, True)
+
+
 @pytest.mark.parametrize("acts_s", [1.0, ACTS_S])
 def test_a_few_movements_leave_it_open_and_that_is_said(acts_s: float) -> None:
     recording = ramping(CALM, acts_s)

@@ -26,7 +26,7 @@ from workbench.data.record import Record
 MOVED = 6.0
 """Noises by which a stem moves from one sample to the next."""
 GOES_ON = 0.2
-"""Share of the movements with which the command goes on at least, where it ramps."""
+"""Share of the movements with which the command goes on, where it ramps: with fewer it is held, unless they tell."""
 FEWEST_MOVES, FEWEST_AHEAD = 20, 10
 """Of movements, and of those with which the command goes on: seven numbers are fitted."""
 DEVIATIONS, LEAST_PART = 3.0, 0.05
@@ -67,9 +67,7 @@ def part_of_the_way(record: Record) -> PartOfTheWay | None:
     before_pa: Column = u[rows - 1]
     ahead_pa: Column = way * np.maximum(way * (u[rows] - before_pa), 0.0)
     ahead_count = int(np.count_nonzero(ahead_pa))
-    if ahead_count <= GOES_ON * rows.size:
-        return None
-    untold = PartOfTheWay(0.0, inf, rows.size)
+    untold = PartOfTheWay(0.0, inf, rows.size) if ahead_count > GOES_ON * rows.size else None
     if rows.size < FEWEST_MOVES or ahead_count < FEWEST_AHEAD:
         return untold
     span_pa, span_s = float(np.ptp(u)), float(np.ptp(record.time_s))
