@@ -9,6 +9,7 @@ Its files:
     pressure_errors                               how far a fit's pressure is off the measured one
     knife_edges                                   held-out slips that are narrowly mistimed, by name
     verdict, verdict_sentence                     what follows, and how it is said
+    judged_landings                               how many landings a verdict rests on, where nothing else is judged
     equivalence                                   what no recording tells apart
     moved_parameters                              what the file's own effects are by the recording
     kept_mass                                     what another mass than the valve file's would leave
