@@ -2,7 +2,7 @@
 
 import argparse
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
 from math import nan, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,13 +54,17 @@ class Run:
     """From the beginning of the reference on."""
 
     @property
+    def references_m(self) -> list[float]:
+        """The reference in force, m, with each position of the stem."""
+        return [each.decision.reference_m for each in self.snapshots[-len(self.stem_m) :]]
+
+    @property
     def error_m(self) -> float:
         """Root mean square of the stem's error when the reference is about to change, m."""
-        references_m = [each.decision.reference_m for each in self.snapshots[-len(self.stem_m) :]]
-        following_m = [*references_m[1:], nan]
+        following_m = [*self.references_m[1:], nan]
         errors_m = [
             stem - here
-            for stem, here, after in zip(self.stem_m, references_m, following_m, strict=True)
+            for stem, here, after in zip(self.stem_m, self.references_m, following_m, strict=True)
             if here != after
         ]
         return sqrt(sum(each**2 for each in errors_m) / len(errors_m))
@@ -103,7 +107,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _left(played: Run, stroke_m: float, name: str) -> str:
-    return f"error of the stem ({name}): {100 * played.error_m / stroke_m:.3f} % of stroke rms"
+    """Return what a run leaves, and what it travelled for that: the ends of steps hide a stem that hunts in between."""
+    error = f"error of the stem ({name}): {100 * played.error_m / stroke_m:.3f} % of stroke rms"
+    travel = f"{_travel_m(played.stem_m) / stroke_m:.2f} strokes travelled"
+    return f"{error}, {travel}, {_travel_m(played.references_m) / stroke_m:.2f} by the references"
+
+
+def _travel_m(places_m: list[float]) -> float:
+    """Return how far it is from place to place, m."""
+    return sum(abs(after - before) for before, after in pairwise(places_m))
 
 
 def _played(

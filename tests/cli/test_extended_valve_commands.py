@@ -32,6 +32,11 @@ def test_play_prints_what_either_law_leaves(tmp_path: Path, capsys: Capture) -> 
     said = capsys.readouterr().out.splitlines()
     before, after = (float(line.split(": ")[1].split(" %")[0]) for line in said if line.startswith("error of the stem"))
     assert after < 0.01 < before
+    # The steps make 0.197 strokes; those of a per cent and less are two slides each, there and back.
+    *_, last = (line for line in said if line.startswith("error of the stem"))
+    travelled, asked = (float(each.split()[0]) for each in last.split(", ")[-2:])
+    assert asked == pytest.approx((0.004 + 0.003 + 0.009 + 0.004) / 0.1016, abs=0.006)
+    assert asked < travelled < 1.5
 
 
 @pytest.mark.parametrize(
