@@ -196,6 +196,7 @@ class Refusal(Code):
         "landings before and after a moment disagree: the sensor jumped, or something shifted the stem; try again",
     )
     PRELOAD_EXPLAINS_AS_WELL = 28, "a preload would explain the motion as well, with another b/c"
+    BROKEN_OFF = 29, "S3 was broken off before it was complete: by a fault, another mode, or a stem that did not answer"
 
 
 class Ne107Status(Code):

@@ -161,7 +161,10 @@ def step(
     if excitation is not None and fresh:
         excitation = climbed(excitation, outcome, statics, settings)
         excitation_inhibit = excitation.inhibit_reason
-    identifying, applied = identify(memory, excitation, sample, fresh, requests, identification, statics)
+    by_slides = settings.staircase is not None
+    identifying, applied = identify(
+        memory, excitation, sample, fresh, requests, identification, statics, by_slides=by_slides
+    )
     ordinary = excitation is None and not playing
     restoration = _restoration(memory, applied, outcome if ordinary else None, settings)
     dropped = restoration.trust is Restored.DROPPED

@@ -45,12 +45,16 @@ class Applied:
     refusals: int = 0
     last_refusal: Refusal = Refusal.NOT_STARTED
 
+    def refused(self, reason: Refusal) -> "Applied":
+        """Return what is applied after an identification that was refused: the numbers in use."""
+        return replace(self, refusals=self.refusals + 1, last_refusal=reason)
+
 
 def accept(applied: Applied, estimated: Estimates) -> Applied:
     """Return what is applied after an identification: its numbers, or those in use and why."""
     reason = _refusal(applied.ratios, estimated)
     if reason is not Refusal.VALID:
-        return replace(applied, refusals=applied.refusals + 1, last_refusal=reason)
+        return applied.refused(reason)
     return Applied(_ratios(applied.ratios, estimated), applied.count + 1, applied.refusals, Refusal.VALID)
 
 

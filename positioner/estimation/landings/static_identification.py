@@ -185,5 +185,5 @@ class StaticIdentification:
             self.restart()
             self.law = no_static_law(Refusal.LANDINGS_SHIFTED)
         if not self.law.valid:
-            return replace(applied, refusals=applied.refusals + 1, last_refusal=self.law.reason)
+            return applied.refused(self.law.reason)
         return Applied(self.law.ratios, applied.count + 1, applied.refusals, Refusal.VALID)
