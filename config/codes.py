@@ -72,7 +72,7 @@ class Fault(Code):
     STALE = 2, "stale"
     IMPLAUSIBLE = 3, "implausible"
     DEVICE = 4, "device"
-    RESTARTED = 5, "device restarted"
+    RESTARTED = 5, "device restarted, or missed commands: it is back with another than the last one it was given"
     DCS_SILENT = 6, "DCS silent"
     STALLED = 7, "the daemon stood still"
     OTHER_MASTER = 8, "another master wrote the set point"
