@@ -25,17 +25,29 @@ LOOKED_AT = 200
 FIRST = 3
 MOST_SIGNALS = 20
 WIDEST = 24
+SETPOINT = r"soll|\bsp\b|set ?point"
 COMMON = {
-    "time_s": r"time|zeit|stamp|date|datum|^ts?\b|uhr",
-    "position_m": r"position|\bpos|travel|stroke|hub|lift|stem|\bpv\b|\bist|\bzt|feedback|^x\b|rückm|opening|öffnung|"
-    r"stellung",
-    "command_pa": r"command|cmd|\bout\b|\bop\b|\bmv\b|\bao\b|output|stell|signal|demand|^u\b|drive|pressure|druck|soll|"
-    r"\bsp\b",
+    "time_s": (r"time|zeit|stamp|date|datum|^ts?\b|uhr",),
+    "position_m": (
+        r"travel|stroke|hub|lift|stem|\bz[ti]|\bweg\b|rückm|stellung",
+        r"position|\bpos|feedback|opening|öffnung",
+        r"\bpv\b|\bist|^x\b",
+    ),
+    "command_pa": (
+        r"command|cmd|\bout\b|\bop\b|\bmv\b|\bao\b|output|stell|demand|^u\b",
+        r"signal|drive|pressure|druck",
+        SETPOINT,
+    ),
 }
-"""What columns are called, by ours; names are taken apart at _, . and - and where capitals follow small letters."""
+"""What columns are called, by ours, from what is said of nothing else to what may be said of a loop's flow or level.
+
+Names are taken apart at _, . and - and where capitals follow small letters.
+"""
 STAMP = r"\d{4}-\d\d-\d\d"
-STATUS = re.compile(r"status|quality|qualität|güte", re.IGNORECASE)
+STATUS = re.compile(r"status|quality|qualität|güte|\bqual\b", re.IGNORECASE)
 """What columns are called that say which rows are good."""
+GOOD = "192"
+"""What OPC calls good, where qualities are numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +70,14 @@ class ColumnPreview:
         if self.numbers or not STATUS.search(self.name):
             return ""
         return ", ".join(sorted({str(cell) for cell in self.cells if cell != ""})[:5])
+
+    @property
+    def opc_qualities(self) -> str:
+        """The numbers by which it says, as OPC does, which rows are good; empty of a column that does not."""
+        held = Counter(_short(cell) for cell in self.cells if cell != "")
+        if not self.numbers or not STATUS.search(self.name) or 2 * held[GOOD] <= held.total():
+            return ""
+        return ", ".join(number for number, _ in held.most_common(5))
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,22 +155,24 @@ def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[s
     left = list(columns)
     of_drive = _of_drive(columns)
     for ours in ("time_s", *of_drive) if of_drive else COMMON:
-        chosen = of_drive.get(ours) or next((each for each in left if _looks_like(ours, each)), None)
+        chosen = of_drive.get(ours) or _likeliest(ours, left)
         if chosen is None and ours == "time_s":
             chosen = next((each for each in left if _most_are(each.cells, STAMP)), None)
         if chosen is None:
             open_.append(f"{ours} is open: no column is called like it; --column {ours}=NAME:UNIT says which is")
             continue
         left.remove(chosen)
+        name = "reference_m" if ours == "command_pa" and _is_setpoint(chosen) else ours
         if ours == "time_s":
             chosen = _whole_clock(chosen, left)
-        unit, doubt = _unit_of(ours, chosen)
+        unit, doubt = _unit_of(name, chosen)
         if doubt and (unknown := header.unknown.get(chosen.name)):
             doubt = [f"the unit of {chosen.name!r} is {unknown!r} by the file, none that is known; {unit} is a guess"]
-        words += ["--column", f"{ours}={chosen.name}{unit}"]
+        words += ["--column", f"{name}={chosen.name}{unit}"]
         open_ += doubt
         if ours == "time_s" and not chosen.numbers:
             words += _time_words(chosen, open_)
+    words += [word for each in left if each.opc_qualities for word in ("--status", f"{each.name}={GOOD}")]
     open_ += _doubts(columns, left, header.table.separator)
     if any(word.endswith(":%") and word.startswith("position") for word in words):
         words += ["--stroke-m", "M"]
@@ -182,6 +204,8 @@ def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], sep
             (often, _), *_ = Counter(cell for cell in each.cells if cell != "").most_common()
             keeps = f"--status {_quoted(f'{each.name}={often}')} keeps the rows of that word alone"
             yield f"{each.name!r} holds {held}: {keeps}, if it is the good one"
+        if held := each.opc_qualities:
+            yield f"{each.name!r} holds {held}: of OPC's qualities {GOOD} is good, the rows of it alone are kept"
     if said := _row_a_value(columns):
         yield said
     texts = [cell for each in columns if each.numbers for cell in each.cells if isinstance(cell, str)]
@@ -193,7 +217,7 @@ def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], sep
 
 def _row_a_value(columns: Sequence[ColumnPreview]) -> str | None:
     """Return what to say of a table in which a column of few words, in turn, says whose the only number is."""
-    numbers = [each for each in columns if each.numbers and not _looks_like("time_s", each)]
+    numbers = [each for each in columns if each.numbers and _rank("time_s", each) is None]
     if len(numbers) != 1:
         return None
     for each in columns:
@@ -228,15 +252,35 @@ def _most_are(cells: Sequence[Cell], pattern: str) -> bool:
     return 2 * sum(re.match(pattern, str(cell)) is not None for cell in cells) > len(cells)
 
 
-def _looks_like(ours: str, column: ColumnPreview) -> bool:
+def _likeliest(ours: str, columns: Sequence[ColumnPreview]) -> ColumnPreview | None:
+    """Return the column that is called most like ours, the first of several; None if none is."""
+    ranked = [(rank, each) for each in columns if (rank := _rank(ours, each)) is not None]
+    return min(ranked, key=lambda each: each[0])[1] if ranked else None
+
+
+def _rank(ours: str, column: ColumnPreview) -> int | None:
+    """Return how surely a column is ours by its name, 0 best, None if it is not."""
+    rank = next((rank for rank, words in enumerate(COMMON[ours]) if _is_called(words, column)), None)
+    if rank is None or STATUS.search(column.name):
+        return None
+    if ours == "time_s":
+        return rank if any(begins_number(cell) and cell != "" for cell in column.cells) else None
+    if not column.numbers or not (column.unit is None or column.unit in allowed_units(ending_of(ours))):
+        return None
+    # The set point of a position is none, unless there is no other.
+    return rank if ours != "position_m" or not _is_called(SETPOINT, column) else rank + len(COMMON[ours])
+
+
+def _is_setpoint(column: ColumnPreview) -> bool:
+    """Whether a column taken for the command is the set point of a valve behind its own positioner."""
+    return _rank("command_pa", column) == COMMON["command_pa"].index(SETPOINT) and column.unit not in UNITS["_pa"]
+
+
+def _is_called(words: str, column: ColumnPreview) -> bool:
     # Of a structure's field, log.t, the field's own name counts as well; the unit behind a name does not.
     plain = unit_in_header(column.name)[0]
-    names = tuple(_taken_apart(each) for each in (column.name, plain, plain.rpartition(".")[2]))
-    if not any(re.search(COMMON[ours], each, re.IGNORECASE) for each in names) or STATUS.search(column.name):
-        return False
-    if ours == "time_s":
-        return any(begins_number(cell) and cell != "" for cell in column.cells)
-    return column.numbers and (column.unit is None or column.unit in allowed_units(ending_of(ours)))
+    names = (_taken_apart(each) for each in (column.name, plain, plain.rpartition(".")[2]))
+    return any(re.search(words, each, re.IGNORECASE) for each in names)
 
 
 def _taken_apart(name: str) -> str:

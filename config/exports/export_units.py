@@ -68,8 +68,9 @@ _ALIASES = {
     "turn turns revolutions umdrehungen": "rev",
     "1/min min-1 u/min": "rpm",
     "percent pct prozent %open %offen %travel %oftravel %stroke %ofstroke %hub %span %ofspan %fs": "%",
+    "0-100% 0..100%": "%",
     "pu p.u": "p.u.",
-    "milliampere ma(dc)": "mA",
+    "milliampere ma(dc) 4-20ma 4..20ma 4to20ma": "mA",
 }
 _BY_ALIAS = {alias: unit for aliases, unit in _ALIASES.items() for alias in aliases.split()} | {
     unit.casefold(): unit for units in (*UNITS.values(), SHARES) for unit in units if unit != "iso"

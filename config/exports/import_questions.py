@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from config.errors import InputError
 from config.exports.column_mapping import Source, read_mapping
-from config.exports.export_preview import COMMON, ColumnPreview, ExportPreview
+from config.exports.export_preview import COMMON, GOOD, ColumnPreview, ExportPreview
 from config.exports.export_units import SHARES
 from config.exports.mapping_file import MappingTable
 
@@ -21,7 +21,8 @@ def answered(found: ExportPreview, ask: Ask) -> MappingTable:
         InputError: an answer that is none of those allowed; names the question.
     """
     words = _proposed(found)
-    columns = [word for ours in COMMON if (word := _column(ours, words.get(ours), found, ask))]
+    asked = [ours if ours != "command_pa" or "reference_m" not in words else "reference_m" for ours in COMMON]
+    columns = [word for ours in asked if (word := _column(ours, words.get(ours), found, ask))]
     sources = read_mapping(columns)
     status = [word for each in found.columns if (word := _status(each, ask))]
     (position,) = (each for each in sources if each.name == "position_m")
@@ -58,9 +59,10 @@ def _column(ours: str, proposed: str | None, found: ExportPreview, ask: Ask) -> 
 
 
 def _status(column: ColumnPreview, ask: Ask) -> str:
-    if not (held := column.status_words):
+    if not (held := column.status_words or column.opc_qualities):
         return ""
-    good = ask(f"{column.name!r} holds {held}: which are good, by commas; nothing if it does not matter?", "")
+    otherwise = GOOD if column.opc_qualities else ""
+    good = ask(f"{column.name!r} holds {held}: which are good, by commas; nothing if it does not matter?", otherwise)
     return f"{column.name}={good}" if good else ""
 
 

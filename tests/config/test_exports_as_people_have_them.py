@@ -548,7 +548,36 @@ def test_what_is_odd_is_said_before_anything_is_fitted(kind: str, tmp_path: Path
     assert re.search(said, "; ".join(oddities(recording, STROKE_M)))
 
 
+def beside(header: str, *cells: str) -> list[str]:
+    """Return a text file of ISO times and, in every row, these cells."""
+    return [header, *(",".join((stamp, *cells)) for stamp in ISO)]
+
+
 PROPOSED = {
+    "a loop's flow before the travel": (
+        beside("Time,FIC1.OP,FIC1.PV,FV1.Travel", "12.7", "40.4", "11.7"),
+        "--column time_s=Time --column position_m=FV1.Travel:% --column command_pa=FIC1.OP:%",
+    ),
+    "a loop's set point before its output": (
+        beside("Time,FIC1.SP %,FIC1.PV m3/h,FIC1.OP %,FV1.ZT %", "40", "23.4", "12.7", "11.7"),
+        "--column time_s=Time --column position_m=FV1.ZT %:% --column command_pa=FIC1.OP %:%",
+    ),
+    "a set point alone": (
+        beside("Time,FV1.SP,FV1.Travel", "49.7", "50.1"),
+        "--column time_s=Time --column position_m=FV1.Travel:% --column reference_m=FV1.SP:%",
+    ),
+    "a set point that is a pressure": (
+        beside("Time,Sollwert [bar],Hub [mm]", "1.2", "50.1"),
+        "--column time_s=Time --column position_m=Hub [mm]:mm --column command_pa=Sollwert [bar]:bar",
+    ),
+    "a range in the unit's place": (
+        beside("Time,OP [4-20 mA],PV [0-100 %]", "13.7", "59.0"),
+        "--column time_s=Time --column position_m=PV [0-100 %]:% --column command_pa=OP [4-20 mA]:mA",
+    ),
+    "qualities by number": (
+        [*beside("Time,OP(%),PV(%),Qual.", "61.0", "59.0", "192"), "2026-10-25T03:00:00,61.0,59.0,64"],
+        "--column time_s=Time --column position_m=PV(%):% --column command_pa=OP(%):% --status Qual.=192",
+    ),
     "units in words over a shorter table": (
         ["Report;FV-101", "", "Timestamp;FV-101 Travel;FV-101 I/P output;Comment", ";% of stroke;kPa;"]
         + [f"{stamp};{x};{u};" for stamp, x, u in zip(ISO, PV, OUT, strict=True)],
