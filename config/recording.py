@@ -148,7 +148,7 @@ class Recording(Result):
     def blocks(self) -> list[Block]:
         """Say how long it is, what its columns span, and what was said about it."""
         rows = [
-            (name, *(f"{end:.6g}" for end in _span(column)), str(int((~np.isfinite(column)).sum())))
+            (name, *(_number(end) for end in _span(column)), str(int((~np.isfinite(column)).sum())))
             for name, column in self.own_columns.items()
         ]
         said = [f"{key}: {value}" for key, value in self.metadata.items()]
@@ -226,6 +226,11 @@ def _span(column: Column) -> tuple[float, float]:
     """Return the least and the greatest number; NaN where there is none."""
     finite = column[np.isfinite(column)]
     return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+
+
+def _number(value: float) -> str:
+    """Say a number in six digits, but whole before the point where it has up to twelve: a time of today has ten."""
+    return f"{value:.0f}" if 1e6 <= abs(value) < 1e12 else f"{value:.6g}"
 
 
 def write_recording(path: Path, recording: Recording) -> None:
@@ -405,7 +410,7 @@ def _require_increasing_time(path: Path, time_s: Column, header_line: int, toler
         raise InputError(
             str(path),
             f"time_s must increase strictly: sample {index + 1} (about line {header_line + index + 1}) "
-            f"is at {time_s[index]:g} s after {time_s[index - 1]:g} s",
+            f"is at {time_s[index]:.15g} s after {time_s[index - 1]:.15g} s",
         )
 
 

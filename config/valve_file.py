@@ -183,5 +183,7 @@ def find_valve(text: str) -> Path:
     Raises:
         InputError: neither.
     """
+    if not text:
+        raise InputError("valve file", "must be its path or the name of a shipped one, got ''")
     path = Path(text)
     return path if path.suffix == ".toml" or path.exists() else shipped_valve(text)

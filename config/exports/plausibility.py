@@ -90,6 +90,9 @@ def _of_rows(recording: Recording) -> Iterator[str]:
         if missing > MISSING:
             yield f"{100 * missing:.0f} % of {name} is missing"
     steps = np.diff(recording.time_s)
+    if (back := steps <= 0.0).any():
+        rows = f"sample {int(back.argmax()) + 2}" + (f", the first of {int(back.sum())}" if back.sum() > 1 else "")
+        yield f"time_s does not increase at {rows}: the clock was set back; the workbench begins anew there"
     steps = steps[steps > 0.0]
     if steps.size and steps.max() > GAP_PERIODS * np.median(steps):
         hour = " (an hour: a clock change in spring?)" if abs(steps.max() - 3600.0) < 5.0 * np.median(steps) else ""

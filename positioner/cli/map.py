@@ -36,11 +36,17 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the map, or the reasons.
 
     Raises:
-        InputError: a configuration for another program, and no daemon's file to say where; or a fault in it.
+        InputError: a configuration for another program, and no daemon's file to say where; or a fault in it; or such a
+            file that nothing would be read of.
     """
     if arguments.format in FOR_OTHERS:
         _configuration(arguments.format, arguments.config)
         return 0
+    if arguments.config is not None:
+        from config.errors import InputError
+
+        allowed = f"--format {', '.join(FOR_OTHERS)}"
+        raise InputError("--config", f"goes with {allowed}: the map itself is the same for every daemon")
     if arguments.format == "eds":
         from fieldbus.canopen.eds import eds_text
 

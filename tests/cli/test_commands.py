@@ -111,7 +111,7 @@ def test_a_gateway_without_the_model_side_is_told_what_is_missing(missing: str, 
             "[valve]\nstroke_m = 0.1\nstrok = 1\n",
             "valve.strok: unknown key; allowed here: breakaway_pa, name, stroke_m",
         ),
-        ("[valve]\nstroke_m = 0\n", "valve.stroke_m: Input should be greater than 0, got 0"),
+        ("[valve]\nstroke_m = 0\n", "valve.stroke_m: allowed is 1e-09 to 1e+06, got 0"),
         ("[valve]\n", "valve.stroke_m: is required and missing"),
         ("[valve\n", "is not valid TOML"),
     ],
@@ -144,6 +144,8 @@ def test_no_daemon_to_talk_to_is_one_line_and_exit_status_1(free_port: int, caps
     ("words", "said"),
     [
         (["get", "positio"], "positio: no register of that name; allowed: position"),
+        (["map", "--config", "none.toml"], "--config: goes with --format telegraf, modbus-exporter, home-assistant"),
+        (["compare", "none.csv", "--valve", ""], "valve file: must be its path or the name of a shipped one, got ''"),
         (["set", "reference", "half"], "reference: 'half' is not a number"),
         (
             ["simulate", "none", "--input", "x.csv", "-o", "y.csv"],

@@ -535,6 +535,11 @@ ODD = {
         "position_m=PV:%",
         "a clock change in spring",
     ),
+    "a clock set back": (
+        rows(time=[f"{t - 20.0 * (t > 29.0):.1f}" for t in T]),
+        "position_m=PV:%",
+        "time_s does not increase at sample .*: the clock was set back",
+    ),
     "half of it missing": (rows(pv=["" if i % 2 else f"{x:.2f}" for i, x in enumerate(PV)]), "position_m=PV:%", "50 %"),
 }
 

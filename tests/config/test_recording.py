@@ -70,3 +70,10 @@ def test_what_no_instrument_shows_is_taken_as_missing_and_told(tmp_path: Path, c
     np.testing.assert_array_equal(read.position_m, [2.0, np.nan, 2.0])
     assert (read.columns["unix_ns"] == 1.7e18).all(), "no quantity of a valve's"
     assert read.metadata["not measured"].startswith(f"position_m of sample 2 is {float(cell):g}: beyond 1e+12")
+
+
+def test_the_span_of_a_time_of_today_is_said_to_the_second() -> None:
+    time_s = 1_780_000_000.0 + np.arange(100.0)
+    said = Recording({"time_s": time_s, "command_pa": time_s * 0.0, "position_m": time_s * 0.0}).summary()
+    assert "1780000000" in said
+    assert "1780000099" in said

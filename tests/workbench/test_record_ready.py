@@ -220,3 +220,10 @@ def test_a_recording_without_noise_is_judged_as_finely_as_a_model_is_simulated()
     record = ready(Recording(columns))
     assert record.noise_m == pytest.approx(6e-7)
     assert any("hardly has noise" in each and "--noise-m" in each for each in record.notes)
+
+
+def test_a_position_in_mm_is_told_to_be_imported_as_such() -> None:
+    columns = plain()
+    small = SEED.valve.model_copy(update={"stroke_m": 0.04})
+    with pytest.raises(InputError, match=r"it looks like mm; import it, --column position_m=NAME:mm$"):
+        require_units(ready(Recording({**columns, "position_m": 600.0 * columns["position_m"]})), small)

@@ -232,11 +232,12 @@ def require_units(record: Record, valve: ValveParameters) -> None:
         _require_drives_units(reached, valve)
         return
     if reached > 20.0 * valve.stroke_m:
-        unit = "mm" if valve.stroke_m < 0.06 < reached < 1.5e3 * valve.stroke_m < 90 else "per cent (%) or mm"
+        is_mm = valve.stroke_m < 0.06 < reached < 1.5e3 * valve.stroke_m < 90
+        unit, word = ("mm", "mm") if is_mm else ("per cent (%) or mm", "%, or NAME:mm")
         raise InputError(
             "recording",
             f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m: it looks like {unit}; "
-            "import it, --column position_m=NAME:%",
+            f"import it, --column position_m=NAME:{word}",
         )
     if reached > 3.0 * valve.stroke_m and 0.3 < reached < 1.5:
         raise InputError(
