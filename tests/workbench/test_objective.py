@@ -8,7 +8,7 @@ import pytest
 from config.recording import Recording
 from sim.composition import Composition
 from sim.misfit import Judge
-from tests.workbench.valves import drawn_valve, record_of, with_effect
+from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
 from workbench.fit.objective import FINAL, SimulationError, soft
 from workbench.model.free_run import FreeRun
@@ -59,7 +59,7 @@ def test_it_is_what_a_run_shows_less_what_was_measured(error: SimulationError, b
 
 
 def test_without_inertia_it_is_the_same() -> None:
-    valve = drawn_valve(np.random.default_rng(11))
+    valve = SEED
     quick = record_of(valve, 5, 900)
     record = ready(Recording(dict(quick.columns) | {"time_s": 100.0 * quick.time_s}))
     composition = Composition.from_file(valve)

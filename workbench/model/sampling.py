@@ -21,7 +21,7 @@ two before together: as a held command that acts from its sample on never makes 
 of an integrating controller, never does that; there where slides end tells (`command_between_samples`).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import exp, log, pi, sqrt
 from typing import NamedTuple
@@ -67,7 +67,7 @@ class Sampling:
     """Whether a command acts from its sample on until the next; else it is known at its sample alone."""
     period_s: float = 0.0
     """Of the record that it was chosen for,"""
-    valve: ValveParameters | None = None
+    valve: ValveParameters | None = field(default=None, repr=False)
     """and by whose numbers: not those that a fit comes to, lest two models be judged by other rows."""
     sure: bool = True
     """Whether the record tells that its command was held, or that it was not; else it is taken for held."""
