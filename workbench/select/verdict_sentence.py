@@ -11,7 +11,7 @@ from workbench.select.effect_candidates import EffectCandidate, EffectStep, Eval
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.judged_landings import unknown_between_samples
 from workbench.select.pressure_errors import PressureErrors
-from workbench.select.verdict import Verdict, by_another_name
+from workbench.select.verdict import EXPLAINED, Verdict, by_another_name
 
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
@@ -41,7 +41,7 @@ def _said(
     apart = "".join(rivals_sentence([each.name for each in step.indistinguishable], library) for step in steps)
     by_pressure = "".join(_by_pressure(step, best.fit.kind) for step in steps)
     off = _kept_off(by_another_name(steps), best)
-    if off and verdict in ("adequate", "missing", "one_of"):
+    if off and verdict in EXPLAINED:
         begun = f"Missing: {names}{or_another}; {fell}. But" if names else "No effect is missing, but"
         return f"{begun} {off}{apart}"
     suspicion = _suspicion(steps[-1].suspected)
