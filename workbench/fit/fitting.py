@@ -35,7 +35,7 @@ from workbench.fit.starts import base_starts, effect_starts, forces_regressed, m
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
-from workbench.model.sampling import MOST_WITH_INERTIA, Motion, Sampling, sampling, swing_m, with_inertia
+from workbench.model.sampling import Motion, Sampling, affords_inertia, sampling, swing_m, with_inertia
 
 OF_BASE, OF_EFFECT, OF_ONE = Effort(8, 6, 3), Effort(5, 4, 2), Effort(1, 1, 1)
 DRAWS = 8
@@ -96,7 +96,7 @@ def fit(
 
 def _may_swing(found: Fit, record: Record) -> bool:
     """Whether a stem that was simulated without inertia may swing past its balance, where it is seen in rests alone."""
-    still = found.by.motion is Motion.QUASI_STATIC and not record.by_setpoint and len(record) <= MOST_WITH_INERTIA
+    still = found.by.motion is Motion.QUASI_STATIC and not record.by_setpoint and affords_inertia(record)
     return still and found.cost > LEAVES * found.count
 
 

@@ -113,7 +113,7 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
     part = part_of_the_way(record)
     if part is not None and part.between:
         return _by_landings(record, valve, _ends_ahead(part), why)
-    if swing_m(valve) > record.scale_m and len(record) <= MOST_WITH_INERTIA:
+    if affords_inertia(record) and swing_m(valve) > record.scale_m:
         return with_inertia(record, valve)
     sentence, sure = f"simulated without inertia, a step a sample: {why}", part is None or part.held
     if not sure:
@@ -153,6 +153,11 @@ def slide_time_s(valve: ValveParameters, noise_m: float) -> float:
 def with_inertia(record: Record, valve: ValveParameters) -> Sampling:
     """Return how a record is simulated whose stem swings, as far as it was commanded by what is held."""
     return replace(DYNAMIC, period_s=record.period_s, valve=valve)
+
+
+def affords_inertia(record: Record) -> bool:
+    """Whether a record is short enough to be simulated with inertia, if its stem swings."""
+    return len(record) <= MOST_WITH_INERTIA
 
 
 def swing_m(valve: ValveParameters) -> float:

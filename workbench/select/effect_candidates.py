@@ -116,8 +116,8 @@ def judged_step(
     candidates, added = _best(_better_than(equivalent, candidates) if equivalent else candidates, library)
     added = added and _backed_by_pressure(added, candidates, library)
     suspect = None if added or equivalent else _suspect(candidates, library)
-    rivals, suspected = (_rivals(candidates, each, library) if each else () for each in (added, suspect))
-    contradicted = _contradicted(candidates, added, library) if added else ()
+    rivals, contradicted = _rivals(candidates, added, library) if added else ((), ())
+    suspected, _ = _rivals(candidates, suspect, library) if suspect else ((), ())
     return ForwardStep(before, candidates, added, rivals, equivalent, suspected, contradicted)
 
 
@@ -149,12 +149,8 @@ def runners_up(step: EffectStep, library: Mapping[str, Effect]) -> tuple[EffectC
 
 def with_added(step: EffectStep, candidate: EffectCandidate, library: Mapping[str, Effect]) -> EffectStep:
     """Return a step with another of its candidates added."""
-    return replace(
-        step,
-        added=candidate,
-        indistinguishable=_rivals(step.candidates, candidate, library),
-        contradicted=_contradicted(step.candidates, candidate, library),
-    )
+    rivals, contradicted = _rivals(step.candidates, candidate, library)
+    return replace(step, added=candidate, indistinguishable=rivals, contradicted=contradicted)
 
 
 def leads_farther(one: EvaluatedModel, other: EvaluatedModel) -> bool:
@@ -239,52 +235,35 @@ def _suspect(candidates: Sequence[EffectCandidate], library: Mapping[str, Effect
 
 def _rivals(
     candidates: Sequence[EffectCandidate], best: EffectCandidate, library: Mapping[str, Effect]
-) -> tuple[EffectCandidate, ...]:
-    """Return what is not told from the best, accepted or not: what narrowly passes the rule proves no more.
+) -> tuple[tuple[EffectCandidate, ...], tuple[EffectCandidate, ...]]:
+    """Return what is not told from the best, accepted or not, and what the measured pressure alone tells from it.
 
-    Where the pressure was measured it must not speak against them.
+    What narrowly passes the rule proves no more than what narrowly does not.
     """
-    refitted = {each.name: each for each in candidates if each.model}
-    as_good = _as_good(candidates, best, library)
+    assert best.model
+    logs = best.model.errors.all_logs
+    may_be_there = [each for each in candidates if each.model and _may_be_there(each, library)]
+    as_good = [each for each in may_be_there if each.model and indistinguishable(logs, each.model.errors.all_logs)]
     models = [each.model for each in as_good if each.model]
-    backed = [each.name for each in as_good if each.model and not pressure_speaks_against(each.model, models)]
+    contradicted = tuple(each for each in as_good if each.model and pressure_speaks_against(each.model, models))
+    backed = [each.name for each in as_good if each not in contradicted]
+    refitted = {each.name: each for each in candidates if each.model}
     # A class is one by algebra, whether or not the search for each of its members succeeded.
-    return tuple(
+    rivals = tuple(
         refitted[name]
         for each in classes(backed, library)
         for name in sorted(algebraic_class(min(each), library))
         if name in refitted
     )
-
-
-def _as_good(
-    candidates: Sequence[EffectCandidate], best: EffectCandidate, library: Mapping[str, Effect]
-) -> list[EffectCandidate]:
-    """Return what the position does not tell from the best."""
-    assert best.model
-    logs = best.model.errors.all_logs
-    return [
-        each
-        for each in candidates
-        if each.model and _may_be_there(each, library) and indistinguishable(logs, each.model.errors.all_logs)
-    ]
+    return rivals, contradicted
 
 
 def _backed_by_pressure(
     best: EffectCandidate, candidates: Sequence[EffectCandidate], library: Mapping[str, Effect]
 ) -> EffectCandidate:
     """Return the best, or what does as well on the position, if the measured pressure speaks for that one."""
-    backed = _rivals(candidates, best, library)
+    backed, _ = _rivals(candidates, best, library)
     return best if best.name in {each.name for each in backed} else max(backed, key=_evidence, default=best)
-
-
-def _contradicted(
-    candidates: Sequence[EffectCandidate], added: EffectCandidate, library: Mapping[str, Effect]
-) -> tuple[EffectCandidate, ...]:
-    """Return what does as well on the position as the added one, and has a pressure that was not measured."""
-    as_good = _as_good(candidates, added, library)
-    models = [each.model for each in as_good if each.model]
-    return tuple(each for each in as_good if each.model and pressure_speaks_against(each.model, models))
 
 
 def pressure_speaks_against(model: EvaluatedModel, others: Sequence[EvaluatedModel]) -> bool:
