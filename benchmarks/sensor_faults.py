@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from config.codes import Mode
+from config.codes import InhibitReason, Mode
 from config.daemon_file import DaemonFile
 from config.slave_file import SlaveFile
 from config.valve_file import load_valve, shipped_valve
@@ -43,6 +43,7 @@ SMALLEST, LARGEST = 5e-4, 0.3
 """Of the stroke."""
 DEVIATIONS, ALLOWED = 3.0, 2e-3
 BEGINS_S = 0.1
+UNANSWERED = InhibitReason.STAIRCASE_UNANSWERED
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +140,8 @@ def identified(each: Experiment, fault: SensorFault, seed: int) -> tuple[Decisio
     def run(until_s: float) -> bool:
         while cycle.snapshot.sample.now_s < until_s:
             cycle.once()
-            if cycle.snapshot.decision.estimates.progress >= 1 or cycle.snapshot.decision.fault:
+            decision = cycle.snapshot.decision
+            if decision.estimates.progress >= 1 or decision.fault or decision.inhibit_reason is UNANSWERED:
                 return True
         return False
 

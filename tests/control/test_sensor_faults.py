@@ -65,6 +65,24 @@ def test_a_staircase_with_a_sensor_that_jumps_applies_nothing_wrong(fault: Senso
         assert min(off(SLOW, decision, each) for each in (0.0, fault.by_m)) < 1.0
 
 
+LOOKS_LIKE_A_SWING = [
+    (1, SensorFault(3.383, inf, -0.038 * STROKE_M), 269),
+    (2, SensorFault(13.9404, 0.8805, -0.2244 * STROKE_M), 15),
+    (2, SensorFault(4.0394, inf, -0.0076 * STROKE_M), 80),
+]
+
+
+@pytest.mark.parametrize(("number", "fault", "seed"), LOOKS_LIKE_A_SWING, ids=str)
+def test_a_jump_about_the_longest_way_is_not_taken_for_a_stem_that_swings(
+    number: int, fault: SensorFault, seed: int
+) -> None:
+    """One landing alone, or all before an instant, would have the stem swing past its balance."""
+    decision, _ = identified(EXPERIMENTS[number], fault, seed)
+    assert decision.static_law.swing == 0.0
+    if decision.applied.ratios is not None:
+        assert min(off(EXPERIMENTS[number], decision, each) for each in (0.0, fault.by_m)) < 1.0
+
+
 def test_a_staircase_without_a_fault_is_applied() -> None:
     decision, _ = identified(SLOW, NO_FAULT, 3)
     assert off(SLOW, decision, 0.0) < 1.0

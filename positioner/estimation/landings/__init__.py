@@ -10,6 +10,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
     extended_balance                  the same of a valve whose effects are known
     swing                             how far past its balance a stem swings and sticks there
+    parting                           the instant that parts landings best
     landing_shift                     was the sensor shifted while landings were gathered
     static_identification             all of it, sample by sample, and what it says of other estimates
     recording_landings                the same from a whole recording

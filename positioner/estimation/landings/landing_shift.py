@@ -2,10 +2,8 @@
 
     p_j = κ x_j + φ_up + δ d_j,   p_j = κ x_j - φ_down + δ d_j       d_j = 0 before an instant, 1 after it
 
-A position sensor that jumps shifts all that lands later by the same way, in either direction. Each instant between two
-landings that leaves the four unknowns apart is tried; the one that leaves the least residual is judged:
-
-    t = |δ| / std δ,   s^2 = max(Σ e^2 / (n - 4), (κ 2e-4 stroke)^2)
+A position sensor that jumps shifts all that lands later by the same way, in either direction. The instant that parts
+them best (`parting.py`) is judged by t = |δ| / std δ.
 
 A spring that hardens, or friction that grows over the travel, looks like a shift to a straight law, for S3 goes over
 the travel in time. So where there are landings enough, a law bent by x^2 and s x must be parted by the shift as well.
@@ -15,13 +13,13 @@ more in the first direction (the staircase does).
 """
 
 from collections.abc import Iterable
-from math import sqrt
 
 import numpy as np
 
 from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
-from positioner.estimation.landings.static_law import DEVIATIONS, FINEST, columns, t_of_three_deviations
+from positioner.estimation.landings.parting import best_parting
+from positioner.estimation.landings.static_law import DEVIATIONS, columns, t_of_three_deviations
 
 SURE = 2.0
 """Times three deviations, for the instant is sought, and a law that is bent looks like a small shift."""
@@ -29,8 +27,6 @@ LEAST_SHIFT = 2e-3
 """Of the stroke: a smaller shift counts as none."""
 ENOUGH = 10
 """Landings: fewer say nothing of a bend."""
-APART = 1e-3
-"""Least singular value of what tells the unknowns apart."""
 
 
 def shifted(landings: Iterable[SlideOutcome], stroke_m: float) -> bool:
@@ -51,22 +47,8 @@ def shifted(landings: Iterable[SlideOutcome], stroke_m: float) -> bool:
 
 def _shift_in(X: Array, p: Array) -> bool:
     """Return whether some instant parts landings beyond what they scatter by, the law being that of X."""
-    count, known = X.shape
-    free = count - known - 1
-    if free < 1:
+    best = best_parting(X, p)
+    if best is None:
         return False
-    least, found = np.inf, (0.0, np.inf, 1.0)
-    for first in range(1, count):
-        after = (np.arange(count) >= first).astype(float)
-        with_shift = np.column_stack((X, after))
-        if np.linalg.svd(with_shift, compute_uv=False)[-1] < APART:
-            continue
-        theta, _, _, _ = np.linalg.lstsq(with_shift, p)
-        left = float(np.square(p - with_shift @ theta).sum())
-        if left < least:
-            std = sqrt(float(np.linalg.inv(with_shift.T @ with_shift)[known, known]))
-            least, found = left, (float(theta[known]), std, abs(float(theta[0])))
-    shift_pa, std_per_pa, stroke_pa = found
-    s_pa = max(sqrt(least / free), FINEST * stroke_pa) if np.isfinite(least) else np.inf
-    surely_pa = SURE * DEVIATIONS * t_of_three_deviations(free) * s_pa * std_per_pa
-    return abs(shift_pa) > max(surely_pa, LEAST_SHIFT * stroke_pa)
+    surely_pa = SURE * DEVIATIONS * t_of_three_deviations(best.free) * best.std_pa
+    return abs(best.shift_pa) > max(surely_pa, LEAST_SHIFT * best.slope_pa)

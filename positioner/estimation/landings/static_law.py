@@ -37,6 +37,7 @@ from positioner.estimation.array import Array
 from positioner.estimation.estimates import Estimate, no_estimate
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.local_balance import bent_by_pa
+from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.swing import balanced, swing_of
 
 FEWEST, FEWEST_EACH = 5, 2
@@ -45,8 +46,6 @@ LARGEST_RELATIVE_STD = 0.05
 """Of κ."""
 LARGEST_SHIFT = 0.01
 """Of the stroke: by which a deviation of φ may shift where a slide lands."""
-FINEST = 2e-4
-"""Of the stroke: no law says better than this where a slide lands."""
 LARGEST_RESIDUAL = 0.05
 """Of the stroke: landings that miss the law by more, as a standard deviation, lie on no straight line."""
 HUBER, ROUNDS = 2.0, 6

@@ -13,15 +13,20 @@ So its landings lie on the static law with their balances, and ρ is one more co
 
 Whether there is such a column: ρ > 6 of its deviations, and the residuals fall by a third. A slow pressure (a lag of
 some 1/omega) leaves no swing.
+
+A sensor that jumped looks like a swing where the ways before it were long, or where it came back and the jump counts as
+a way. So there is none if without some one landing there is none, nor if an instant parts the landings (`parting.py`)
+and leaves less than two thirds of the residuals.
 """
 
 from collections.abc import Sequence
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
 from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.parting import FINEST, best_parting
 
 FEWEST = 8
 """Landings."""
@@ -30,23 +35,37 @@ FALL = 0.67
 """Of the residuals, at most, are left with the column."""
 MOST = 0.5
 """r = 1: no damping at all."""
-FINEST = 2e-4
-"""Of the stroke: no residual says less."""
+NONE = (0.0, 0.0)
+"""A stem that does not swing."""
 
 
 def swing_of(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: float) -> tuple[float, float]:
     """Return ρ and its standard deviation; 0, 0 where nothing shows that the stem swings.
 
     Args:
-        landings: (n,).
+        landings: (n,), in the order of time, either way.
         X, p: their columns, (n, 3), and pressures, (n,), Pa.
         stroke_m: full travel.
     """
-    n = len(landings)
+    if len(landings) < FEWEST:
+        return NONE
     ways = np.array([(each.position_m - each.from_m) / stroke_m for each in landings])
+    rho, std, residual_pa = _swing(ways, X, p)
+    if not rho:
+        return NONE
+    others = ~np.eye(ways.size, dtype=bool)
+    if not all(_swing(ways[each], X[each], p[each])[0] for each in others):
+        return NONE
+    parting = best_parting(X, p)
+    return NONE if parting and parting.residual_pa < FALL * residual_pa else (rho, std)
+
+
+def _swing(ways: Array, X: Array, p: Array) -> tuple[float, float, float]:
+    """Return ρ, its deviation, and that of the residuals, Pa; 0, 0 and infinite where there is no such column."""
+    n = ways.size
     with_ways = np.column_stack((X, -ways))
-    if n < FEWEST or np.linalg.matrix_rank(with_ways, tol=1e-3) < with_ways.shape[1]:
-        return 0.0, 0.0
+    if np.linalg.matrix_rank(with_ways, tol=1e-3) < with_ways.shape[1]:
+        return *NONE, inf
     without_pa = p - X @ np.linalg.lstsq(X, p)[0]
     theta = np.linalg.lstsq(with_ways, p)[0]
     left_pa = p - with_ways @ theta
@@ -55,8 +74,8 @@ def swing_of(landings: Sequence[SlideOutcome], X: Array, p: Array, stroke_m: flo
     std_pa = s * sqrt(float(np.linalg.inv(with_ways.T @ with_ways)[3, 3]))
     before = max(sqrt(float(without_pa @ without_pa) / (n - 3)), FINEST * abs(slope_pa))
     if slope_pa <= 0.0 or s > FALL * before or not DEVIATIONS * std_pa < theta[3] < MOST * slope_pa:
-        return 0.0, 0.0
-    return float(theta[3]) / slope_pa, std_pa / slope_pa
+        return *NONE, inf
+    return float(theta[3]) / slope_pa, std_pa / slope_pa, s
 
 
 def balanced(landing: SlideOutcome, swing: float) -> SlideOutcome:
