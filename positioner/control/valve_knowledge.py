@@ -17,7 +17,7 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, Estimates
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
-from positioner.estimation.landings.static_law import FINEST
+from positioner.estimation.landings.parting import FINEST
 
 Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 

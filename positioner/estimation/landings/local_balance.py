@@ -24,6 +24,7 @@ import numpy as np
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.parting import FINEST
 
 WIDTH = 0.04
 """h, of the stroke."""
@@ -35,8 +36,6 @@ LATEST = 3
 """Landings in a direction, of which l_s is taken."""
 BENDS = (0.05, 0.05, 0.05, 0.1, 0.04, 0.03)
 """Of the pressure over the stroke: standard deviations of q, the root of P."""
-FINEST = 2e-4
-"""Of the stroke: no landing says more."""
 FEWEST = 5
 """Landings: fewer do not say how they are bent."""
 FADES = 0.97
