@@ -16,8 +16,8 @@ from positioner.control.slide_memory import SlideMemory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, Estimates
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
-from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.landings.parting import FINEST
+from positioner.estimation.landings.static_identification import StaticIdentification
 
 Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
