@@ -43,7 +43,7 @@ SMALLEST, LARGEST = 5e-4, 0.3
 """Of the stroke."""
 DEVIATIONS, ALLOWED = 3.0, 2e-3
 BEGINS_S = 0.1
-UNANSWERED = InhibitReason.STAIRCASE_UNANSWERED
+GAVE_UP = (InhibitReason.STAIRCASE_IN_VAIN, InhibitReason.STAIRCASE_UNANSWERED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ def identified(each: Experiment, fault: SensorFault, seed: int) -> tuple[Decisio
         while cycle.snapshot.sample.now_s < until_s:
             cycle.once()
             decision = cycle.snapshot.decision
-            if decision.estimates.progress >= 1 or decision.fault or decision.inhibit_reason is UNANSWERED:
+            if decision.estimates.progress >= 1 or decision.fault or decision.inhibit_reason in GAVE_UP:
                 return True
         return False
 

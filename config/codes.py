@@ -118,10 +118,7 @@ class InhibitReason(Code):
     EXCITATION_NO_CONSENT = 20, "excitation: no consent of the DCS"
     EXCITATION_VETOED = 21, "excitation: vetoed"
     EXCITATION_UNMEASURED = 22, "excitation waits for a good measurement"
-    STAIRCASE_UNANSWERED = (
-        23,
-        "the staircase of slides: the stem does not answer what moved it before: its sensor is frozen, or it is stuck",
-    )
+    STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer: its sensor is frozen, or it is stuck"
 
 
 class Restored(Code):

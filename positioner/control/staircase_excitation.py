@@ -22,8 +22,7 @@ all that the pressure went over since the stem last answered, is bounded by what
     going on           W <= 1.5 of the most in this direction, or of the most of a turn, and a first step
     after a turn       W <= 1.5 of the most of a turn, for friction differs over the travel, and a first step
     after the first    W <= what spring balances over the whole stroke: friction that is more leaves no valve
-
-Until it has gone on once nothing is known, and it may be searched up to the pressure limits.
+    before that        W < all that the pressure limits allow: nothing is known, and what breaks it loose is sought once
 """
 
 from dataclasses import dataclass, replace
@@ -102,7 +101,7 @@ class Staircase:
         complete: whether it has given a static law.
         slid_pa: level under which the stem last slid; NaN: not known, for it has not yet, or rests at a stop, which
             bears any excess.
-        lowest_pa, highest_pa: levels since it last moved visibly at all; NaN likewise.
+        lowest_pa, highest_pa: levels since it last moved visibly at all, or since the staircase began; NaN at a stop.
         most_up_pa, most_down_pa, most_turn_pa: longest way of the level from slide to slide, going on and turning.
     """
 
@@ -125,8 +124,8 @@ class Staircase:
     closed: bool = False
     complete: bool = False
     slid_pa: float = nan
-    lowest_pa: float = nan
-    highest_pa: float = nan
+    lowest_pa: float = inf
+    highest_pa: float = -inf
     most_up_pa: float = 0.0
     most_down_pa: float = 0.0
     most_turn_pa: float = 0.0
@@ -185,8 +184,8 @@ class Staircase:
         return self if outcome is None else self._slid(outcome)._answered(outcome, limits)
 
     def unanswered(self, limits: StaircaseLimits) -> bool:
-        """Return whether the stem has not answered what has always moved it before."""
-        return self.highest_pa - self.lowest_pa > self._most_pa(limits)
+        """Return whether the stem has not answered what has always moved it before, or anything."""
+        return self.highest_pa - self.lowest_pa >= self._most_pa(limits)
 
     def _most_pa(self, limits: StaircaseLimits) -> float:
         """Return the longest way of the level for which the stem may leave it without an answer."""
@@ -194,7 +193,7 @@ class Staircase:
         needed_pa = (going_on_pa if self.slide_m else 0.0) or self.most_turn_pa
         if needed_pa:
             return UNANSWERED * needed_pa + FIRST_STEP * limits.span_pa
-        return self.slope_pa_per_m * limits.stroke_m or inf
+        return self.slope_pa_per_m * limits.stroke_m or limits.span_pa
 
     def _answered(self, outcome: SlideOutcome, limits: StaircaseLimits) -> "Staircase":
         """Return it with the way of the level begun anew, if the stem moved visibly, or its packing gave way."""

@@ -464,14 +464,15 @@ def test_a_stem_has_to_answer_what_has_moved_it_before(known: dict[str, Any], bo
     assert held_after(bound_pa + 1.0, stairs).unanswered(LIMITS)
 
 
-def test_what_gives_way_has_answered_and_before_anything_has_moved_all_is_searched() -> None:
+def test_what_gives_way_has_answered_and_before_anything_has_moved_all_is_searched_once() -> None:
     far = replace(UNDER_WAY, most_up_pa=5e3, lowest_pa=0.0, highest_pa=80e3)
     assert far.unanswered(LIMITS)
     assert not far.counted(outcome(1, 0.05, 0.0503), LIMITS).unanswered(LIMITS)
-    stairs = Staircase(0.0)
-    while stairs.turns < 2:
+    stairs = Staircase(80e3)
+    while not stairs.unanswered(LIMITS):
+        assert stairs.turns < 2
         stairs = stairs.counted(outcome(stairs.direction, 0.05, 0.05), LIMITS).stepped(0.05, LIMITS)
-        assert not stairs.unanswered(LIMITS)
+    assert (stairs.lowest_pa, stairs.highest_pa) == (LIMITS.minimum_pa, LIMITS.maximum_pa)
 
 
 def test_a_stem_at_a_stop_need_not_answer() -> None:
