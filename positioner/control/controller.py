@@ -5,9 +5,9 @@ the running integrals of the identification. It reads no clock.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode, Refusal, Restored, State
-from config.extended_valve import ExtendedValve, Inverse
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
@@ -25,7 +25,7 @@ from positioner.control.settings import Settings
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
 from positioner.control.valve_knowledge import ValveKnowledge, known, with_learnt
-from positioner.estimation.acceptance import Applied
+from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
 from positioner.estimation.online import Identification
@@ -104,118 +104,69 @@ class Controller:
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
-        self._memory, decision = step(
-            self._memory, sample, requests, self._settings, self._identification, self._statics
-        )
+        now = Now(self._memory, sample, requests, self._settings, self._identification, self._statics)
+        self._memory, decision = step(now)
         return decision
 
 
-def step(
-    memory: ControllerMemory,
-    sample: Sample,
-    requests: Requests,
-    settings: Settings,
-    identification: Identification,
-    statics: StaticIdentification,
-) -> tuple[ControllerMemory, Decision]:
+class Now(NamedTuple):
+    """What one step is decided from."""
+
+    memory: ControllerMemory
+    sample: Sample
+    requests: Requests
+    settings: Settings
+    identification: Identification
+    statics: StaticIdentification
+
+    @property
+    def stem_m(self) -> float | None:
+        """Measured position of the stem, m; None without a good measurement."""
+        return self.sample.position_m if usable(self.sample, self.settings.limits) else None
+
+
+def step(now: Now) -> tuple[ControllerMemory, Decision]:
     """Return what is remembered and what is decided after one sample."""
-    fresh = usable(sample, settings.limits)
-    acknowledged = requests.acknowledgements != memory.supervision.acknowledgements
-    monitoring = after_cycle(
-        MonitorMemory() if acknowledged else memory.monitoring,
-        settings.monitoring,
-        sample.now_s,
-        sample.position_m if fresh else None,
-        memory.command_pa,
-        _sent_to_m(memory),
-        faulty=memory.supervision.fault is not NO_FAULT,
-    )
-    supervision = supervise(
-        memory.supervision,
+    sample, settings = now.sample, now.settings
+    monitoring, supervision = _supervised(now)
+    consumed = _consumed(now, supervision)
+    waits = _waits(now, supervision.mode)
+    reference = _reference(now, supervision.mode, consumed, waits=waits)
+    experiment = _experiment(now, supervision)
+    excitation, excitation_inhibit, outcome = _excited(now, supervision.mode, reference)
+    identifying, found = identify(
+        now.memory,
+        excitation,
         sample,
-        memory.command_pa,
-        requests,
-        settings.limits,
-        good=fresh,
-        monitored=monitoring.fault_among(settings.monitoring) if monitoring.holding else NO_FAULT,
+        now.stem_m is not None,
+        now.requests,
+        now.identification,
+        now.statics,
+        by_slides=settings.staircase is not None,
     )
-    consumed = _consumed(memory, supervision, requests)
-    waits = _waits(memory, supervision.mode, requests, settings, statics)
-    reference = _reference(memory, supervision.mode, consumed, requests, sample.position_m if fresh else None, waits)
-    excitation, excitation_inhibit = excitation_after(
-        memory.excitation,
-        supervision.mode,
-        sample.now_s,
-        sample.position_m if fresh else None,
-        requests,
-        settings,
-        held_pa=memory.wanted_pa,
-        reference=reference,
-        ratios=memory.applied.ratios,
-    )
-    if excitation is not None and memory.excitation is None and not excitation.ended:
-        statics.restart()
-    experiment = _experiment(memory, supervision, sample.now_s, requests, settings)
-    playing = experiment.commands
-    outcome = _outcome(memory, sample, settings, statics) if fresh else None
-    if excitation is not None and fresh:
-        excitation = climbed(excitation, outcome, statics, settings)
-        excitation_inhibit = excitation.inhibit_reason
-    by_slides = settings.staircase is not None
-    identifying, applied = identify(
-        memory, excitation, sample, fresh, requests, identification, statics, by_slides=by_slides
-    )
-    ordinary = excitation is None and not playing
-    restoration = _restoration(memory, applied, outcome if ordinary else None, settings)
-    dropped = restoration.trust is Restored.DROPPED
-    if dropped and memory.restoration.provisional:
-        memory, applied = _nothing_known(memory, applied, settings, statics)
-    elif outcome is not None and outcome.landing and not playing:
-        applied = statics.corrected(applied)
+    memory, applied, restoration = _confirmed(now, found, outcome, excitation, experiment)
+    now = now._replace(memory=memory)
     situation = Situation(
         supervision.mode is AUTOMATIC,
-        playing or (excitation is not None and not excitation.ended),
+        experiment.commands or (excitation is not None and not excitation.ended),
         applied.ratios is not None and not (excitation is not None and excitation.unanswered),
         reference.delta_m,
-        dropped,
+        restoration.trust is Restored.DROPPED,
     )
     state = state_in(situation)
-    held_pa = _held_pa(memory, state, supervision, sample)
-    law_memory = None
-    if memory.law is not None:
-        seen = LawInput(
-            sample=sample,
-            usable=fresh,
-            command_pa=memory.wanted_pa,
-            reference_m=reference.value_m,
-            ratios=applied.ratios if state in FOLLOWING else None,
-            estimates=identification.estimates,
-            outcome=outcome,
-            statics=statics,
-            stroke_m=settings.limits.stroke_m,
-            valve=settings.valve,
-            provisional=restoration.provisional,
-        )
-        law_memory = after_step(memory.law, settings.law_with_memory, seen)
+    held_pa = _held_pa(now, state, supervision)
+    law = _law_memory(now, reference, applied.ratios if state in FOLLOWING else None, outcome, restoration)
 
-    if supervision.mode is MANUAL and requests.manual_writes != consumed.manual_writes:
-        asked_pa = requests.manual_pa
-    elif supervision.fault:
-        asked_pa = settings.safe_pa(settings.limits.action_on(supervision.fault), held_pa)
-    else:
-        exciting = experiment if playing else excitation
-        asked_pa = _pressure_pa(
-            state, held_pa, exciting, sample.now_s, reference, applied, settings, law_memory, statics.valve
-        )
+    asked_pa = _asked_pa(now, consumed, supervision, held_pa)
+    if asked_pa is None:
+        exciting = experiment if experiment.commands else excitation
+        asked_pa = _pressure_pa(now, state, held_pa, exciting, reference, applied, law)
     limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
     wanted_pa = settings.delivered_pa(limited_pa)
-    path, command_pa = None, wanted_pa
-    if memory.path is not None and settings.valve is not None:
-        follows = not supervision.fault and state in FOLLOWING
-        path = _path(memory.path, sample.now_s, wanted_pa, settings, settings.valve.inverse, lead=follows)
-        command_pa = path.command_pa
+    path = _path(now, wanted_pa, lead=not supervision.fault and state in FOLLOWING)
+    command_pa = wanted_pa if path is None else path.command_pa
 
-    by_law = NOTHING if law_memory is None else law_memory.inhibit_reason
+    by_law = NOTHING if law is None else law.inhibit_reason
     inhibit_reason = (
         excitation_inhibit
         or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
@@ -230,9 +181,9 @@ def step(
         reference.value_m,
         reference.delta_m,
         sample.now_s - supervision.good_s,
-        estimates_tested(excitation, identification, statics),
+        estimates_tested(excitation, now.identification, now.statics),
         applied,
-        statics.law,
+        now.statics.law,
         restoration,
         experiment,
         monitoring.holding,
@@ -251,10 +202,108 @@ def step(
         excitation,
         experiment,
         identifying,
-        law_memory,
+        law,
         path,
         restoration,
     ), decision
+
+
+def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
+    """Return what the monitors and the supervision know after this sample."""
+    memory, settings = now.memory, now.settings
+    acknowledged = now.requests.acknowledgements != memory.supervision.acknowledgements
+    monitoring = after_cycle(
+        MonitorMemory() if acknowledged else memory.monitoring,
+        settings.monitoring,
+        now.sample.now_s,
+        now.stem_m,
+        memory.command_pa,
+        _sent_to_m(memory),
+        faulty=memory.supervision.fault is not NO_FAULT,
+    )
+    return monitoring, supervise(
+        memory.supervision,
+        now.sample,
+        memory.command_pa,
+        now.requests,
+        settings.limits,
+        good=now.stem_m is not None,
+        monitored=monitoring.fault_among(settings.monitoring) if monitoring.holding else NO_FAULT,
+    )
+
+
+def _excited(
+    now: Now, mode: Mode, reference: Reference
+) -> tuple[ActiveExcitation | None, InhibitReason, SlideOutcome | None]:
+    """Return the excitation after this sample, what inhibits it, and what the last change of the command did."""
+    memory, settings, statics = now.memory, now.settings, now.statics
+    excitation, inhibit_reason = excitation_after(
+        memory.excitation,
+        mode,
+        now.sample.now_s,
+        now.stem_m,
+        now.requests,
+        settings,
+        held_pa=memory.wanted_pa,
+        reference=reference,
+        ratios=memory.applied.ratios,
+    )
+    if excitation is not None and memory.excitation is None and not excitation.ended:
+        statics.restart()
+    outcome = _outcome(now)
+    if excitation is None or now.stem_m is None:
+        return excitation, inhibit_reason, outcome
+    excitation = climbed(excitation, outcome, statics, settings)
+    return excitation, excitation.inhibit_reason, outcome
+
+
+def _confirmed(
+    now: Now,
+    found: Applied,
+    outcome: SlideOutcome | None,
+    excitation: ActiveExcitation | None,
+    experiment: PlayedExperiment,
+) -> tuple[ControllerMemory, Applied, Restoration]:
+    """Return the memory, what is applied, and what has become of what was restored, after what a slide said of them."""
+    memory = now.memory
+    playing = experiment.commands
+    restoration = _restoration(now, found, outcome if excitation is None and not playing else None)
+    if restoration.trust is Restored.DROPPED and memory.restoration.provisional:
+        return *_nothing_known(now, found), restoration
+    if outcome is not None and outcome.landing and not playing:
+        return memory, now.statics.corrected(found), restoration
+    return memory, found, restoration
+
+
+def _law_memory(
+    now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None, restoration: Restoration
+) -> LawMemory | None:
+    """Return what the law remembers after this sample; its ratios are None where it does not command."""
+    if now.memory.law is None:
+        return None
+    seen = LawInput(
+        sample=now.sample,
+        usable=now.stem_m is not None,
+        command_pa=now.memory.wanted_pa,
+        reference_m=reference.value_m,
+        ratios=ratios,
+        estimates=now.identification.estimates,
+        outcome=outcome,
+        statics=now.statics,
+        stroke_m=now.settings.limits.stroke_m,
+        valve=now.settings.valve,
+        provisional=restoration.provisional,
+    )
+    return after_step(now.memory.law, now.settings.law_with_memory, seen)
+
+
+def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemory, held_pa: float) -> float | None:
+    """Return what an operator or a fault asks for, Pa; None where the state says it."""
+    if supervision.mode is MANUAL and now.requests.manual_writes != consumed.manual_writes:
+        return now.requests.manual_pa
+    if supervision.fault:
+        return now.settings.safe_pa(now.settings.limits.action_on(supervision.fault), held_pa)
+    return None
 
 
 def _sent_to_m(memory: ControllerMemory) -> float | None:
@@ -265,22 +314,17 @@ def _sent_to_m(memory: ControllerMemory) -> float | None:
     return reference.value_m
 
 
-def _experiment(
-    memory: ControllerMemory,
-    supervision: SupervisionMemory,
-    now_s: float,
-    requests: Requests,
-    settings: Settings,
-) -> PlayedExperiment:
+def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
     """Return the experiment after this sample; as it was where none is under way and none is asked for.
 
     It may begin on a sample that is repeated or lost: how old the last good one may be, supervision watches.
     """
+    memory, requests = now.memory, now.requests
     before = memory.experiment
     if before.is_idle(requests.experiment):
         return before
     around = Surroundings(
-        now_s=now_s,
+        now_s=now.sample.now_s,
         mode=supervision.mode,
         fault=supervision.fault,
         excited=requests.eta[0] == 0,
@@ -288,73 +332,72 @@ def _experiment(
         command_pa=memory.command_pa,
         held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
     )
-    return experiment_after(before, requests.experiment, around, settings.experiment)
+    return experiment_after(before, requests.experiment, around, now.settings.experiment)
 
 
-def _outcome(
-    memory: ControllerMemory, sample: Sample, settings: Settings, statics: StaticIdentification
-) -> SlideOutcome | None:
+def _outcome(now: Now) -> SlideOutcome | None:
     """Return what a change of the command did, in the step in which it is known.
 
     Of a device that was left alone, or is found with another command than it was given, nobody knows what it did
     meanwhile: that is no slide of a command. One that still holds what it was given after a lost reply has obeyed.
     """
-    if sample.unattended_s > 0.0 or not _obeyed(memory, sample, settings):
-        statics.detector.interrupt()
+    if now.stem_m is None:
         return None
-    path, valve = memory.path, settings.valve
+    sample, wanted_pa = now.sample, now.memory.wanted_pa
+    if sample.unattended_s > 0.0 or not _obeyed(now):
+        now.statics.detector.interrupt()
+        return None
+    path, valve = now.memory.path, now.settings.valve
     arrived = path is None or valve is None or path.has_arrived(sample.now_s, valve.inverse)
-    return statics.update(sample.now_s, sample.position_m, memory.wanted_pa, sample.pressure_pa, arrived=arrived)
+    return now.statics.update(sample.now_s, now.stem_m, wanted_pa, sample.pressure_pa, arrived=arrived)
 
 
-def _obeyed(memory: ControllerMemory, sample: Sample, settings: Settings) -> bool:
+def _obeyed(now: Now) -> bool:
     """Whether the device holds the last command, where it was looked at anew."""
-    held_pa = sample.held_pa
-    return held_pa is None or abs(held_pa - memory.command_pa) <= settings.limits.restart_tolerance_pa
+    held_pa = now.sample.held_pa
+    return held_pa is None or abs(held_pa - now.memory.command_pa) <= now.settings.limits.restart_tolerance_pa
 
 
-def _path(
-    memory: PathMemory, now_s: float, wanted_pa: float, settings: Settings, inverse: Inverse, *, lead: bool
-) -> PathMemory:
+def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
     """Return what is remembered of the pressure on its way, and with it the command."""
+    memory, settings = now.memory.path, now.settings
+    if memory is None or settings.valve is None:
+        return None
     limits_pa = (settings.minimum_pa, settings.maximum_pa)
-    path = pressure_path.after_step(memory, now_s, wanted_pa, inverse, limits_pa, lead=lead)
+    inverse = settings.valve.inverse
+    path = pressure_path.after_step(memory, now.sample.now_s, wanted_pa, inverse, limits_pa, lead=lead)
     return path._replace(command_pa=settings.delivered_pa(path.command_pa))
 
 
-def _nothing_known(
-    memory: ControllerMemory, applied: Applied, settings: Settings, statics: StaticIdentification
-) -> tuple[ControllerMemory, Applied]:
+def _nothing_known(now: Now, applied: Applied) -> tuple[ControllerMemory, Applied]:
     """Forget what was restored, with all that a law has learnt by it: nothing is left to command by."""
-    statics.restart()
-    law = first_memory(settings.law_with_memory, memory.wanted_pa)
-    return memory._replace(law=law), replace(applied, ratios=None, last_refusal=Refusal.CONTRADICTED_BY_LANDINGS)
+    now.statics.restart()
+    law = first_memory(now.settings.law_with_memory, now.memory.wanted_pa)
+    return now.memory._replace(law=law), replace(applied, ratios=None, last_refusal=Refusal.CONTRADICTED_BY_LANDINGS)
 
 
-def _waits(
-    memory: ControllerMemory, mode: Mode, requests: Requests, settings: Settings, statics: StaticIdentification
-) -> bool:
+def _waits(now: Now, mode: Mode) -> bool:
     """Whether a reference must wait for the landing of the move before it, which says whether what was restored holds.
 
     A law that commands all the while has no such moves.
     """
-    if not memory.restoration.provisional or mode is not AUTOMATIC or not settings.moves_by_single_steps:
+    memory, requests = now.memory, now.requests
+    if not memory.restoration.provisional or mode is not AUTOMATIC or not now.settings.moves_by_single_steps:
         return False
     asked = requests.reference_writes != memory.consumed.reference_writes
-    return asked and requests.reference_m != memory.reference.value_m and statics.detector.rest is None
+    return asked and requests.reference_m != memory.reference.value_m and now.statics.detector.rest is None
 
 
-def _restoration(
-    memory: ControllerMemory, applied: Applied, outcome: SlideOutcome | None, settings: Settings
-) -> Restoration:
+def _restoration(now: Now, applied: Applied, outcome: SlideOutcome | None) -> Restoration:
     """Return what has become of what was restored; an identification that is applied takes its place."""
-    if applied.count != memory.applied.count:
-        return memory.restoration.replaced()
-    return memory.restoration.after(outcome, settings.limits.stroke_m)
+    if applied.count != now.memory.applied.count:
+        return now.memory.restoration.replaced()
+    return now.memory.restoration.after(outcome, now.settings.limits.stroke_m)
 
 
-def _consumed(memory: ControllerMemory, supervision: SupervisionMemory, requests: Requests) -> ConsumedRequests:
+def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
     """Return which writes are consumed: those whose mode is left now, or that a fault to be met by hand found."""
+    memory, requests = now.memory, now.requests
     before, mode, consumed = memory.supervision.mode, supervision.mode, memory.consumed
     latched = supervision.fault is not NO_FAULT and supervision.fault is not memory.supervision.fault
     by_hand = mode is MANUAL and latched
@@ -366,28 +409,23 @@ def _consumed(memory: ControllerMemory, supervision: SupervisionMemory, requests
     )
 
 
-def _reference(
-    memory: ControllerMemory,
-    mode: Mode,
-    consumed: ConsumedRequests,
-    requests: Requests,
-    stem_m: float | None,
-    waits: bool,
-) -> Reference:
+def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> Reference:
     """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
+    memory, requests = now.memory, now.requests
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
     if mode is not AUTOMATIC or memory.supervision.mode is not mode:
-        start = Reference(start.value_m if stem_m is None else stem_m)
+        start = Reference(start.value_m if now.stem_m is None else now.stem_m)
     follows = mode is AUTOMATIC and written and not waits
     return start.follow(requests.reference_m) if follows else start
 
 
-def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMemory, sample: Sample) -> float:
+def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
     """Return what to hold: the last command, for a push what follows it; over S3 the one before it.
 
     After a fault what a device came back with.
     """
+    memory, sample = now.memory, now.sample
     if sample.held_pa is not None and supervision.fault:
         return sample.held_pa
     if state is S3 or memory.state is S3:
@@ -396,24 +434,22 @@ def _held_pa(memory: ControllerMemory, state: State, supervision: SupervisionMem
 
 
 def _pressure_pa(
+    now: Now,
     state: State,
     held_pa: float,
     exciting: ActiveExcitation | PlayedExperiment | None,
-    now_s: float,
     reference: Reference,
     applied: Applied,
-    settings: Settings,
-    law_memory: LawMemory | None,
-    extended: ExtendedValve | None,
+    law: LawMemory | None,
 ) -> float:
     """Return the pressure of a state, Pa."""
     if state is S3 and exciting is not None:
-        return exciting.pressure_pa(now_s)
+        return exciting.pressure_pa(now.sample.now_s)
     if state in FOLLOWING and applied.ratios is not None:
-        if law_memory is not None:
-            return law_memory.level_pa
+        if law is not None:
+            return law.level_pa
         s = 1 if state is S1 else -1
-        if extended is not None:
-            return extended.landing_pa(reference.value_m, s)
-        return settings.law(reference.value_m, s, applied.ratios)
+        if now.statics.valve is not None:
+            return now.statics.valve.landing_pa(reference.value_m, s)
+        return now.settings.law(reference.value_m, s, applied.ratios)
     return held_pa
