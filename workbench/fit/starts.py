@@ -230,13 +230,48 @@ def told_starts(
             solved.append((there.cost(z), there.theta(z)))
     least = min((cost for cost, _ in solved), default=0.0)
     best = [theta for cost, theta in solved if cost <= AS_GOOD * least]
-    static = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
     broken_loose = [
-        _in_motion(error, z, static)
+        _breaking_loose(error, z)
         for theta in best
         for z in error.screened([error.coordinates(scaled(theta, STATIC, each)) for each in STATIC_FACTORS], count)
     ]
+    if broken_loose:
+        least_z = error.least(broken_loose, MIDDLE)
+        broken_loose += [_along(error, run, least_z, each) for each in _not_told(best, added)]
     return [Place(z, "landings") for z in _apart(error, broken_loose, count)]
+
+
+def _breaking_loose(error: SimulationError, z: Vector) -> Vector:
+    """Return z with static friction moved to where the simulation comes closest."""
+    return _in_motion(error, z, [i for i, each in enumerate(error.parameters) if each.index == STATIC])
+
+
+def _not_told(as_good: Sequence[Vector], added: Sequence[Parameter]) -> list[Parameter]:
+    """Return what the landings leave open: solutions as good as each other have it wherever they began."""
+    return [each for each in added if float(np.ptp([each.coordinate(theta) for theta in as_good])) > ABOUT[-1]]
+
+
+def _along(error: SimulationError, run: FreeRun, z: Vector, open_parameter: Parameter) -> Vector:
+    """Return z with what the landings leave open moved to where the simulation comes closest, the landings kept.
+
+    A preload and an asymmetry that make up for each other land alike, and break loose elsewhere.
+    """
+    i = error.parameters.index(open_parameter)
+    kept = tuple(each for each in error.parameters if each.index not in (STATIC, open_parameter.index))
+
+    def landed(distance: float) -> Vector:
+        there = z.copy()
+        there[i] = np.clip(z[i] + distance, error.lower[i], error.upper[i])
+        theta = error.theta(there)
+        landing = SimulationError(run, error.composition, kept, theta)
+        return error.coordinates(landing.theta(descended(landing, landing.coordinates(theta), MIDDLING)))
+
+    for _ in range(ALTERNATIONS):
+        before = z
+        z = _breaking_loose(error, error.least([z, *(landed(each) for each in (*ABOUT, *-ABOUT))], MIDDLE))
+        if np.array_equal(z, before):
+            break
+    return z
 
 
 def _apart(error: SimulationError, pool: Sequence[Vector], count: int) -> list[Vector]:
