@@ -103,6 +103,20 @@ def test_few_slips_leave_static_friction_a_wide_interval(part: Part, percent: in
     assert knife_edges(higher, whole(record_of(higher, 20)), part, error_m, NOISE_M, from_pressure=False) == ()
 
 
+def test_a_lone_sample_far_off_does_not_hide_that_one_change_puts_all_slips_right(part: Part) -> None:
+    higher = changed(static_n=1.0 / 0.95)
+    recording = record_of(TRUE, 19)
+    at_rest = int(np.argmin(np.abs(error_of(higher, part))))
+    position_m = recording.columns["position_m"].copy()
+    position_m[at_rest] += 7.0 * NOISE_M
+    spiked = whole(replace(recording, columns={**recording.columns, "position_m": position_m}))
+    error_m = error_of(higher, spiked)
+    edges = knife_edges(higher, whole(record_of(TRUE, 23, 400)), spiked, error_m, NOISE_M, from_pressure=False)
+    assert {(each.parameter, each.change) for each in edges} == {("static_n", -0.05)}
+    spike_s = spiked.record.time_s[at_rest]
+    assert not any(each.from_s <= spike_s <= each.to_s for each in edges), "no friction puts it right"
+
+
 def test_a_stretch_of_many_slips_is_no_knife_edge(part: Part) -> None:
     other = changed(coulomb_n=1.0 / 1.02)
     assert np.nanstd(error_of(other, part)) > 3.0 * NOISE_M

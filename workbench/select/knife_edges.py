@@ -13,8 +13,9 @@ Of few slips, static friction is known to a tenth of itself, or to a half: any v
 came and those that stayed away does as well.
 
 An error that no such change takes away is no knife edge. Nor are many: where these stretches hold more than a tenth of
-the slips it is the model's, unless one change puts all of them right and what was fitted allows it. A friction that
-what was fitted refutes is another friction, and no narrow miss.
+the slips it is the model's, unless one change puts all of them right, or leaves of all that was held out no more than
+1.75 floors (a lone sample far off may stay), and what was fitted allows it. A friction that what was fitted refutes is
+another friction, and no narrow miss.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -102,7 +103,7 @@ def knife_edges(
             for first, end in stretches
             if rms(other_m[first:end]) <= max(AT_MOST * floor_m, FELL * rms(error_m[first:end]))
         }
-        new, all_right = right.keys() - found, len(right) == len(stretches)
+        new, all_right = right.keys() - found, len(right) == len(stretches) or rms(other_m) <= AT_MOST * floor_m
         if not (new or all_right):
             continue
         needs_leave = all_right or abs(change) > CHANGES[-1]
