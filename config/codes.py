@@ -119,6 +119,7 @@ class InhibitReason(Code):
     EXCITATION_VETOED = 21, "excitation: vetoed"
     EXCITATION_UNMEASURED = 22, "excitation waits for a good measurement"
     STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer: its sensor is frozen, or it is stuck"
+    NOT_AT_REST = 24, "a slide waits, for the stem does not come to rest: it creeps, or is moved by something else"
 
 
 class Restored(Code):
@@ -228,6 +229,7 @@ class Ne107Cause(Code):
     SATURATED = 16, "command at its limit"
     OVERRUN = 17, "cycles or replies too slow"
     COMMAND_RATE = 18, "command changes too fast"
+    NOT_AT_REST = 19, "the stem does not come to rest"
 
 
 class EventKind(Code):

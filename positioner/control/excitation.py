@@ -46,6 +46,11 @@ class ActiveExcitation:
         """Whether it is a staircase."""
         return isinstance(self.signal, Staircase)
 
+    def waits_for(self, statics: StaticIdentification) -> InhibitReason:
+        """Return why the next step of a staircase waits longer than any stem takes that comes to rest."""
+        waits = self.by_slides and not self.ended and statics.detector.unsettled
+        return InhibitReason.NOT_AT_REST if waits else NOTHING
+
     def pressure_pa(self, now_s: float) -> float:
         """Return the pressure at a time, Pa."""
         if isinstance(self.signal, Staircase):

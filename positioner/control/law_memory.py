@@ -130,6 +130,7 @@ def _observed(seen: LawInput) -> StemObservation:
         rest=detector.rest,
         quantum_m=detector.quantum_m,
         outcome=seen.outcome,
+        unsettled=detector.unsettled,
     )
     return observation if seen.valve is None else stem_observed(observation, seen.valve, seen.statics.way)
 

@@ -17,7 +17,8 @@ farther than m_-s beyond r and slow, it need not rest. An excursion goes the oth
 M = max(1.02 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. Only resting times
 depend on the period of the loop, not where the stem lands.
 
-While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest.
+While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. A
+stem that does not come to rest, off its reference, is not moved, and that is said.
 While references keep coming, one slide lands ahead of a ramp, and two are given only for an error that the coming ones
 do not take back (reference_course.py).
 Why there is no limit cycle: what a slide missed corrects B for the next (each miss is a fraction of the one before),
@@ -164,7 +165,7 @@ def step(
     if memory.excursion:
         memory = replace(memory, last_m=observation.position_m)
     if observation.rest is None:
-        return _redirected(memory, observation, reference_m, balance, settings)
+        return _waiting(_redirected(memory, observation, reference_m, balance, settings), observation, settings)
     if reference_m != memory.target_m:
         memory = replace(memory, target_m=reference_m, inhibit_reason=InhibitReason.NOTHING)
     return _next_slide(memory, observation, balance, settings)
@@ -274,7 +275,15 @@ def _redirected(
         excursion=False,
         slides=1,
         slide_s=observation.now_s,
+        inhibit_reason=InhibitReason.STUCK if memory.held.stuck else InhibitReason.NOTHING,
     )
+
+
+def _waiting(memory: SlideMemory, observation: StemObservation, settings: SlideSettings) -> SlideMemory:
+    """Say it if the stem is off its reference and does not come to rest; said once, that stays until it does."""
+    assert memory.target_m is not None
+    off = abs(memory.target_m - observation.position_m) > settings.dead_band_m + observation.quantum_m
+    return _because(memory, InhibitReason.NOT_AT_REST) if observation.unsettled and off else memory
 
 
 def _next_slide(

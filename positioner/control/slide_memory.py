@@ -44,6 +44,8 @@ class StemObservation:
     quantum_m: float
     outcome: SlideOutcome | None
     """Of the last change of the command, in the step in which it is known."""
+    unsettled: bool = False
+    """Whether it should long have come to rest."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ answer seen, for the size of the step (a rate limit), or, where the pressure is 
 longest answer has gone by has been set free by something else: that says nothing of how long it takes.
 """
 
-from math import isnan, nan, sqrt
+from math import hypot, isnan, nan, sqrt
 from typing import NamedTuple
 
 from positioner.estimation.landings.pressure_arrival import PressureArrival
@@ -45,6 +45,10 @@ FINEST_QUANTUM = 1e-6
 LARGE, LARGER = 0.5, 2.0
 """Of the largest step: from a smaller one nothing is learnt of a rate limit; one so much larger says more than all
 before, for what a small step takes may be a lag, which a large one takes but once."""
+CREPT_SINCE = 0.75
+"""Of the time, for which `Rest.crept_m` counts: what a stem crept is no slide."""
+CREEPS_PER_S, DRIFTS_PER_S = 5e-4, 5e-3
+"""Of the stroke: a stem that answers late goes faster; and one that goes on after its answer does not for it."""
 CREEP, INSTANTS = 1e-3, 2
 """Of the stroke, for each second that a slide takes beyond two samples: behind a slow pressure the stem creeps into its
 rest and sticks, its friction risen, a little before the pressure has come to an end."""
@@ -111,6 +115,8 @@ class LandingDetector:
         self._away = 0
         self._known = True
         """Whether what the last change of the command did is known."""
+        self._answered = False
+        """Whether the stem has answered that: what moves it now is something else."""
         self.answers = Answers()
         self._step_pa = 0.0
         self._level_s = self._interval_s = self._time_s = 0.0
@@ -128,6 +134,23 @@ class LandingDetector:
         """How long the stem takes to answer the last change of the command, as far as is learnt, s; 0: it is not."""
         longest_s, slowness_s_per_pa, _ = self.answers
         return max(longest_s, slowness_s_per_pa * self._step_pa)
+
+    @property
+    def _late(self) -> bool:
+        """Whether the last change of the command is so long ago that what moves the stem is no answer to it."""
+        return self._time_s - self._level_s > LATE * max(self._answers_s, FIRST_ANSWER_S)
+
+    @property
+    def _no_answer_m_per_s(self) -> float:
+        """Return how slow a stem must go for that to be no answer to the command any more; 0: it may always be one."""
+        if self._answered:
+            return DRIFTS_PER_S * self._stroke_m
+        return CREEPS_PER_S * self._stroke_m if self._late else 0.0
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether the stem, by the time it should long have answered, neither rests nor creeps slowly and evenly."""
+        return self.rest is None and self._late
 
     def _visible_m(self, rest: Rest) -> float:
         noise_m, least_m = VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m
@@ -149,13 +172,13 @@ class LandingDetector:
         self._position_m, self._interval_s, self._time_s = position_m, time_s - self._time_s, time_s
         if not arrived:
             self._level_s = time_s
-            self._window.restart(time_s)
+            self._window.restart(time_s, self._from_m)
         if self.rest is None or self.rest.count < ENOUGH:
-            self._window.add(time_s, position_m, pressure_pa)
+            self._window.add(time_s, position_m, pressure_pa, self._no_answer_m_per_s)
         rest, known = self._window.rest, self.rest
         if known is not None:
             self._watch(time_s, position_m, known)
-            if self.rest is not None and rest is not None:
+            if self.rest is not None and rest is not None and not rest.crept_m:
                 self.rest = rest
             return None
         if rest is None or time_s - self._level_s < self._patience_s(rest):
@@ -165,12 +188,13 @@ class LandingDetector:
         self.rest, self._away = rest, 0
         self._window.learn_noise(rest)
         outcome = None if self._known else self._outcome(time_s, rest)
-        self._known = self._known or (outcome is not None and outcome.moved)
+        self._answered = self._answered or (outcome is not None and outcome.moved)
+        self._known = self._known or self._answered
         return outcome
 
     def interrupt(self) -> None:
         """Take note that something else than the commands may have moved the stem: what they did is not known."""
-        self._level_pa, self.rest, self._known = nan, None, True
+        self._level_pa, self.rest, self._known, self._answered = nan, None, True, False
 
     def _learn_quantum(self, position_m: float) -> None:
         step_m = abs(position_m - self._position_m)
@@ -193,15 +217,15 @@ class LandingDetector:
             self._arrival.restart(time_s, pressure_pa, self._level_pa, command_pa, at_rest=self.rest is not None)
         elif self._arrival.followed:
             self._arrival.lost()
-        if self.rest is None and not self._known and self._under_way:
+        if self.rest is None and not self._known and self._under_way and not self._late:
             self._learn_answer(time_s - self._level_s)
         self._step_pa = step_pa if self.rest is not None else self._step_pa + step_pa
         self._running_on = self.rest is None
         self._from_m = nan if isnan(self._level_pa) else self._position_m if self.rest is None else self.rest.position_m
         self._sense = 1 if command_pa > self._level_pa else -1
         self._level_pa, self._level_s = command_pa, time_s
-        self.rest, self._known = None, isnan(self._from_m)
-        self._window.restart(time_s)
+        self.rest, self._known, self._answered = None, isnan(self._from_m), False
+        self._window.restart(time_s, self._from_m)
 
     @property
     def _under_way(self) -> bool:
@@ -217,9 +241,8 @@ class LandingDetector:
         if self._away < DISTURBED:
             return
         self.rest = None
-        late = time_s - self._level_s > LATE * max(self._answers_s, FIRST_ANSWER_S)
-        if self._known or late:
-            self._known, self._level_s = True, time_s
+        if self._known or self._late:
+            self._known, self._answered, self._level_s = True, True, time_s
             self._window.restart(time_s)
         else:
             self._learn_answer(time_s - self._level_s)
@@ -239,7 +262,8 @@ class LandingDetector:
         self.answers = Answers(max(answer_s, longest_s), slowness_s_per_pa, large_pa)
 
     def _outcome(self, time_s: float, rest: Rest) -> SlideOutcome:
-        moved = self._sense * (rest.position_m - self._from_m) > self._visible_m(rest)
+        slid_m = self._sense * (rest.position_m - self._from_m) - rest.crept_m / CREPT_SINCE
+        moved = slid_m > self._visible_m(rest)
         creep_s = max(0.0, rest.came_to_rest_s - INSTANTS * self._interval_s)
         if moved:
             self._learn_answer(rest.came_to_rest_s)
@@ -250,7 +274,7 @@ class LandingDetector:
             from_m=self._from_m,
             command_pa=self._level_pa,
             position_m=rest.position_m,
-            std_m=sqrt(rest.std_m**2 + self.quantum_m**2 / 12 + (CREEP * self._stroke_m * creep_s) ** 2),
+            std_m=hypot(rest.std_m, rest.crept_m, self.quantum_m / sqrt(12), CREEP * self._stroke_m * creep_s),
             moved=moved,
             landing=moved and self._free_m[0] < rest.position_m < self._free_m[1],
             short_m=rest.short_m if moved else 0.0,

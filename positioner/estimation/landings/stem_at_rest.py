@@ -15,6 +15,12 @@ the creep it is waited for longer: a creep from A down to the tolerance goes on 
 
 A measured pressure has to rest, too.
 
+A stem whose packing flows under its load creeps on and on, and never rests so. It is taken to stand where it is if it
+creeps evenly, by w_1 from T/4 to T/2 and by w_2 >= w_1/2 from T/2 to T, and that is no pressure still to come:
+
+    w_2 <= a tenth of its way     no lag does that: while w_2 >= w_1/2 it goes 12 % of its way in w_2, or more
+    w_2 <= v T/2                  v the speed that is no answer any more (landing_detector)
+
 How short of its balance may it rest? Friction rises as a stem that creeps behind a slow pressure comes to an end, and
 it sticks; or it goes by jumps. Neither shows where it rests, but in how abruptly it came there. With w_1 to w_4 the
 ways in the quarters of the time from a tenth of the way to T_s, a creep that stopped before its end was to go on by
@@ -27,7 +33,7 @@ nothing is short. A creep of which no sample was seen cannot be judged.
 
 from array import array
 from dataclasses import dataclass
-from math import log, sqrt
+from math import isnan, log, nan, sqrt
 
 import numpy as np
 
@@ -53,8 +59,12 @@ BEGUN = 0.1
 """Of the way: a stem that went so far is under way."""
 ALIKE, A_JUMP = 0.25, 0.5
 """Share of their mean by which quarters at a constant rate may differ; of a quarter's way: a sample that is a jump."""
+FEWEST_OF_A_LINE = 3
+"""Samples that say how far a creep goes."""
 FEWEST_OF_A_CREEP = 6
 """Samples from which r says something."""
+SLACKENS, OF_ITS_WAY = 0.5, 0.1
+"""Of w_1, of the whole way: a stem that creeps goes on by at least, and at most, so much."""
 LOOKED_AGAIN = 1.1
 """Factor on the time between two looks."""
 
@@ -74,6 +84,8 @@ class Rest:
     """When it was first seen there for good, after the change of the pressure."""
     short_m: float = 0.0
     """How far short of its balance it may have stuck."""
+    crept_m: float = 0.0
+    """How far it has crept towards it since a quarter of the time; it goes on."""
 
 
 class RestWindow:
@@ -90,8 +102,9 @@ class RestWindow:
         self._variance_m2: float | None = None
         self.restart(0.0)
 
-    def restart(self, time_s: float) -> None:
-        """Begin anew: the pressure is changed now."""
+    def restart(self, time_s: float, from_m: float = nan) -> None:
+        """Begin anew: the pressure is changed now, and the stem leaves a position, m; NaN: that of the first sample."""
+        self._from_m = from_m
         self._each, self._in_row = 1, 0
         self._sums = (0.0, 0.0, 0.0)
         # Rows by columns: to append to these costs a tenth of a row of a matrix.
@@ -100,15 +113,20 @@ class RestWindow:
         self._look_s = time_s
         self.rest: Rest | None = None
 
-    def add(self, time_s: float, position_m: float, pressure_pa: float) -> None:
-        """Take a sample; a pressure that is not measured is NaN."""
+    def add(self, time_s: float, position_m: float, pressure_pa: float, no_answer_m_per_s: float = 0.0) -> None:
+        """Take a sample; a pressure that is not measured is NaN.
+
+        Args:
+            time_s, position_m, pressure_pa: of the sample.
+            no_answer_m_per_s: what is slower is no answer to the change of the pressure any more.
+        """
         if self._each == 1:
             self._append(time_s - self._start_s, position_m, pressure_pa)
         else:
             self._add_up(time_s - self._start_s, position_m, pressure_pa)
         if time_s >= self._look_s and len(self._times_s) >= 2 * FEWEST:
             self._look_s = self._start_s + LOOKED_AGAIN * (time_s - self._start_s)
-            self.rest = self._rest()
+            self.rest = self._rest(no_answer_m_per_s)
 
     def _append(self, after_s: float, position_m: float, pressure_pa: float) -> None:
         """Add a row; when they are full, each becomes the mean of two."""
@@ -146,7 +164,7 @@ class RestWindow:
         hidden = log(within_m / self._tolerance_m) / log(way_m / within_m) if way_m > within_m else 0.0
         return near_s * (1.0 + min(hidden, LONGEST_HIDDEN))
 
-    def _rest(self) -> Rest | None:
+    def _rest(self, no_answer_m_per_s: float) -> Rest | None:
         time_s, position_m, pressure_pa = (
             np.array(each) for each in (self._times_s, self._positions_m, self._pressures_pa)
         )
@@ -160,10 +178,10 @@ class RestWindow:
             noise_m = min(noise_m, NOISIER * usual_m / sqrt(self._each))
         within_m = max(SCATTER * noise_m, 1.01 * self.quantum_m, self._tolerance_m)
         mean_m = float(late_m.mean())
-        if np.abs(late_m - mean_m).max() > within_m or not _flat(late_m, 0.5 * max(self._tolerance_m, self.quantum_m)):
-            return None
         if np.isfinite(pressure_pa).all() and not _flat(pressure_pa[half:], PRESSURE_LEFT * float(np.ptp(pressure_pa))):
             return None
+        if np.abs(late_m - mean_m).max() > within_m or not _flat(late_m, 0.5 * max(self._tolerance_m, self.quantum_m)):
+            return self._creeping(time_s, position_m, half, noise_m, within_m, no_answer_m_per_s)
         elsewhere = np.flatnonzero(np.abs(position_m - mean_m) > within_m)
         first = int(elsewhere[-1]) + 1 if elsewhere.size else 0
         if elsewhere.size and 0.5 * time_s[-1] < self._creep_ends_s(time_s[first], position_m - mean_m, within_m):
@@ -175,6 +193,37 @@ class RestWindow:
             count=late_m.size * self._each,
             came_to_rest_s=float(time_s[first]) if first else 0.0,
             short_m=_short_m(time_s[: first + 1], position_m[: first + 1]),
+        )
+
+    def _creeping(
+        self, time_s: Array, position_m: Array, half: int, noise_m: float, within_m: float, no_answer_m_per_s: float
+    ) -> Rest | None:
+        """Return where a stem stands that creeps on: samples, (n,), the index of the second half, m; None: it does not.
+
+        No sample of the second half is farther off an even creep than `within_m`.
+        """
+        end_s = float(time_s[-1])
+        quarter = int(np.searchsorted(time_s, 0.25 * end_s))
+        if half - quarter < FEWEST_OF_A_LINE:
+            return None
+        before = np.polyfit(time_s[quarter:half], position_m[quarter:half], 1)
+        late = np.polyfit(time_s[half:], position_m[half:], 1)
+        w_1, w_2 = float(before[0]) * 0.25 * end_s, float(late[0]) * 0.5 * end_s
+        from_m = position_m[0] if isnan(self._from_m) else self._from_m
+        way_m = float(np.abs(position_m - from_m).max())
+        slow = abs(w_2) <= max(OF_ITS_WAY * way_m, 0.5 * end_s * no_answer_m_per_s)
+        even = float(np.abs(position_m[half:] - np.polyval(late, time_s[half:])).max()) <= within_m
+        if not (slow and even and w_1 * w_2 >= 0.0 and abs(w_2) >= SLACKENS * abs(w_1)):
+            return None
+        position_now_m = float(np.polyval(late, end_s))
+        elsewhere = np.flatnonzero(np.abs(position_m - position_now_m) > abs(w_1) + abs(w_2) + within_m)
+        return Rest(
+            position_m=position_now_m,
+            std_m=2.0 * noise_m / sqrt(position_m.size - half),  # of the end of a line
+            noise_m=noise_m * sqrt(self._each),
+            count=(position_m.size - half) * self._each,
+            came_to_rest_s=float(time_s[elsewhere[-1] + 1]) if elsewhere.size else 0.0,
+            crept_m=abs(w_1) + abs(w_2),
         )
 
 
