@@ -43,6 +43,8 @@ MONITORED = {
     Fault.COMMAND_RATE: Ne107Cause.COMMAND_RATE,
 }
 """What the monitors find, as a cause."""
+LEFT_AWAY = frozenset({InhibitReason.TRIM_ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT})
+"""Why the law has given a move up: out of specification where that is farther away than `[health] dead_band`."""
 
 FEWEST_MOVES = 5
 """Moves judged before the stiction index counts."""
@@ -71,6 +73,8 @@ def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
     """Return the condition of a valve."""
     silent = decision.fault is Fault.DCS_SILENT
     monitored = {MONITORED[fault] for fault in (*decision.alarms, decision.fault) if fault in MONITORED}
+    if decision.inhibit_reason in LEFT_AWAY and health.away_m > health.settings.dead_band_m:
+        monitored.add(Ne107Cause.TRAVEL_DEVIATION)
     holds = {
         Ne107Cause.FAULT: decision.fault is not Fault.NONE and not silent and decision.fault not in MONITORED,
         Ne107Cause.NOT_AUTOMATIC: decision.mode is not Mode.AUTOMATIC and not silent,

@@ -85,6 +85,8 @@ class Health:
         self._applied: Applied | None = None
         self._friction_pa = nan
         self._requests = Requests()
+        self.away_m = 0.0
+        """From stem to reference, m; 0 where nobody asks."""
 
     @classmethod
     def idle(cls, stroke_m: float) -> "Health":
@@ -124,8 +126,10 @@ class Health:
         self._travel.enter(sample.position_m)
         if decision.mode is Mode.AUTOMATIC and decision.state is not State.S3_IDENTIFY:
             self._stiction.enter(sample.now_s, sample.position_m, decision.reference_m)
+            self.away_m = abs(sample.position_m - decision.reference_m)
         else:
             self._stiction.interrupt()
+            self.away_m = 0.0
 
     def _take(self, applied: Applied) -> None:
         self._applied = applied

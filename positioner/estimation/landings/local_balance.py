@@ -9,14 +9,14 @@
 
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
-that lies apart for less, and σ is what the others scatter by. A slide to x that missed all the same says what is
+that lies apart for less, and σ is what the others lie off by. A slide to x that missed all the same says what is
 missing there: the next one lands. w_0 holds that correction back where there is little to go by. Friction that drifts
 makes the last slides miss alike everywhere: l_s.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
-from math import copysign, exp
+from math import copysign, exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -86,7 +86,7 @@ def bent_by_pa(
 
 
 def scatter_m(ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float) -> float:
-    """Return how far slides land off the bent law, a standard deviation, m; arguments as of `landing_pa`."""
+    """Return how far slides scatter from one to the next, a standard deviation, m; arguments as of `landing_pa`."""
     return _bend(ratios, tuple(landings), stroke_m).scatter_pa / -ratios.b_over_c
 
 
@@ -101,7 +101,7 @@ class _Bend(NamedTuple):
 
     q: tuple[float, ...]
     scatter_pa: float
-    """Of the landings about it, a standard deviation."""
+    """Of the landings from one to the next, a standard deviation: friction that drifts is gone by, and no scatter."""
     lately_pa: tuple[float, float]
     """l_s, down and up."""
 
@@ -128,8 +128,15 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
         sigma_pa = max(FINEST * stroke_pa, 1.4826 * float(np.median(off)))
         weights = known * np.minimum(1.0, HUBER * sigma_pa / np.maximum(off, 1e-9))
     left_pa = e - Q @ q
-    down_pa, up_pa = (_alike(left_pa[s == way][:LATEST].tolist()) for way in (-1.0, 1.0))
-    return _Bend(tuple(q.tolist()), sigma_pa, (down_pa, up_pa))
+    ways_pa = tuple(left_pa[s == way] for way in (-1.0, 1.0))
+    down_pa, up_pa = (_alike(each[:LATEST].tolist()) for each in ways_pa)
+    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, _scatter_pa(ways_pa)), (down_pa, up_pa))
+
+
+def _scatter_pa(ways_pa: Iterable[Array]) -> float:
+    """Return by what slides scatter, a standard deviation, from what successive ones in each direction differ by."""
+    apart_pa = np.abs(np.concatenate([np.diff(each) for each in ways_pa]))
+    return 1.4826 * float(np.median(apart_pa)) / sqrt(2.0) if apart_pa.size else 0.0
 
 
 def _alike(missed_pa: Sequence[float]) -> float:

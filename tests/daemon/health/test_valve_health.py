@@ -220,6 +220,21 @@ def test_the_class_of_each_fault(
     assert (now.status, now.cause) == (status, cause)
 
 
+@pytest.mark.parametrize("reason", [InhibitReason.TRIM_ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT])
+@pytest.mark.parametrize(("away", "causes"), [(0.006, (Ne107Cause.TRAVEL_DEVIATION,)), (0.004, ())])
+def test_a_move_given_up_away_from_its_reference_is_out_of_specification(
+    reason: InhibitReason, away: float, causes: tuple[Ne107Cause, ...]
+) -> None:
+    """It was good, with the stem 7 % away."""
+    panel = Panel(LAW)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(0.01)
+    sample, decision = panel.cycle.snapshot.sample, panel.cycle.snapshot.decision
+    decision = decision._replace(inhibit_reason=reason, reference_m=sample.position_m + away * STROKE_M)
+    panel.health.enter(sample, decision, panel.cycle.requests)
+    assert ne107_condition(decision, panel.health).causes == causes
+
+
 def test_an_overrun_is_told_as_itself_beyond_the_sixteenth_cause() -> None:
     """The first word is full: all its bits were set where cause 17 held."""
     panel = Panel(LAW)
