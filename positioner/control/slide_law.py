@@ -316,7 +316,7 @@ def _next_slide(
     to_m = target_m + _lead_m(memory, observation.now_s, s, way_m, balance, settings)
     if s * (to_m - anchor.position_m) >= way_m:
         return _slide(memory, observation.now_s, to_m, s, balance, settings, excursion=False)
-    if memory.course.takes_back(observation.now_s, error_m, way_m):
+    if memory.course.takes_back(observation.now_s, error_m, way_m, memory.away_s):
         return _because(memory, InhibitReason.REFERENCE_COMES)
     return _excursion(memory, observation, balance, settings)
 
@@ -457,5 +457,6 @@ def _slide(
         excursion=excursion,
         slides=memory.slides + 1,
         slide_s=now_s,
+        away_s=now_s - memory.slide_s if memory.excursion and not excursion else memory.away_s,
         inhibit_reason=InhibitReason.STUCK if memory.held.stuck else reason,
     )

@@ -115,6 +115,8 @@ class SlideMemory:
     """Where the margins are those of the extended valve; nan: none is known."""
     excursion_s: float = -inf
     """When the last excursion began ..."""
+    away_s: float = 0.0
+    """... how long the last that came back took until its second slide ..."""
     spent_m: float = 0.0
     """... and what was spent then of a day's travel."""
     inhibit_reason: InhibitReason = InhibitReason.NOTHING

@@ -25,16 +25,16 @@ RAMP_M = tuple(0.06 + 5e-4 * i for i in range(5))
 def test_steps_that_stand_are_corrected_at_once() -> None:
     course, now_s = written(NOISE_M, every_s=2.0)
     assert course.rests(now_s)
-    assert not course.takes_back(now_s, 1e-4, WAY_M)
+    assert not course.takes_back(now_s, 1e-4, WAY_M, 0.0)
 
 
 def test_errors_of_a_few_changes_are_left_until_the_reference_rests() -> None:
     course, now_s = written(NOISE_M)
     assert course.change_m == pytest.approx(2.75e-4)
-    assert course.takes_back(now_s, 8e-4, WAY_M)
-    assert not course.takes_back(now_s, 9e-4, WAY_M)
-    assert course.takes_back(now_s + 0.7, 8e-4, WAY_M)
-    assert not course.takes_back(now_s + 0.8, 8e-4, WAY_M)
+    assert course.takes_back(now_s, 8e-4, WAY_M, 0.0)
+    assert not course.takes_back(now_s, 9e-4, WAY_M, 0.0)
+    assert course.takes_back(now_s + 0.7, 8e-4, WAY_M, 0.0)
+    assert not course.takes_back(now_s + 0.8, 8e-4, WAY_M, 0.0)
 
 
 def test_what_scatters_is_corrected_to_its_middle_and_what_goes_somewhere_to_itself() -> None:
@@ -64,10 +64,10 @@ def test_a_ramp_is_led_by_half_a_way_and_carries_what_it_reaches(s: int) -> None
     assert course.trend == s
     assert course.lead_m(now_s, WAY_M) == pytest.approx(s * 2.5e-3)
     assert course.lead_m(now_s, 0.1) == pytest.approx(s * 4e-3), "no farther than eight references"
-    assert course.takes_back(now_s, s * 2.4e-3, WAY_M)
-    assert course.takes_back(now_s, -s * 3.9e-3, WAY_M), "it comes to the stem"
-    assert not course.takes_back(now_s, -s * 4.1e-3, WAY_M)
-    assert not course.takes_back(now_s, s * 2e-3, 0.02), "too slow to carry it"
+    assert course.takes_back(now_s, s * 2.4e-3, WAY_M, 0.0)
+    assert course.takes_back(now_s, -s * 3.9e-3, WAY_M, 0.0), "it comes to the stem"
+    assert not course.takes_back(now_s, -s * 4.1e-3, WAY_M, 0.0)
+    assert not course.takes_back(now_s, s * 2e-3, 0.02, 0.0), "too slow to carry it"
     assert course.lead_m(now_s + 0.8, WAY_M) == 0.0, "it has ended"
 
 
@@ -77,3 +77,11 @@ def test_three_changes_make_a_trend_and_one_ends_it() -> None:
     course = course.after(now_s + SCAN_S, 0.0620)
     assert course.trend == 1
     assert course.after(now_s + 2 * SCAN_S, 0.0615).trend == 0
+
+
+def test_a_slow_ramp_is_left_until_two_slides_cost_less_than_they_save() -> None:
+    """By hand, 53.3 um/s, m = 3 mm, away for 0.5 s: (3/2 9 mm^2 0.5 s 53.3 um/s)^(1/3) = 0.711 mm."""
+    course, now_s = written(0.06 + 0.02667e-3 * i for i in range(5))
+    assert course.takes_back(now_s, 0.70e-3, 3e-3, 0.5)
+    assert not course.takes_back(now_s, 0.72e-3, 3e-3, 0.5)
+    assert not course.takes_back(now_s, 0.70e-3, 3e-3, 0.0), "what it costs nobody knows yet"
