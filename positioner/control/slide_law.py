@@ -50,7 +50,7 @@ from positioner.control.slide_memory import (
 )
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.extended_balance import extended_landing_pa
-from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.landing_detector import STOP, SlideOutcome
 from positioner.estimation.landings.local_balance import landing_pa, scatter_m
 
 RETURN = 1.02
@@ -226,8 +226,9 @@ def _learnt(
 ) -> SlideMemory:
     """Return the memory after a slide: its margin, and where the stem stands. A slide onto a stop says nothing.
 
-    A stem that breaks loose lands where it is to. One that goes not half as far did not: the packing that holds it gave
-    way. One that lands elsewhere, as behind a slow I/P, has slid, and its way says nothing of the margin.
+    A stem that breaks loose lands where it is to. One that goes not half as far, and no farther than a packing gives
+    way, did not. One that lands elsewhere, as behind a slow I/P, has slid, and its way says nothing of the margin. If
+    that is not half as far, friction has grown: nor do the slides before it that held, by a balance that is no more.
     """
     s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
@@ -237,10 +238,12 @@ def _learnt(
     turning = s != anchor.direction
     way_m = s * (memory.aim_m - anchor.position_m) if ours else balance.way_m(outcome)
     missed_m = abs(memory.aim_m - to_m) if ours else 0.0
-    slid = outcome.moved and missed_m <= GAVE_WAY * way_m
+    short = missed_m > GAVE_WAY * way_m
+    slid = outcome.moved and (not short or abs(to_m - outcome.from_m) > CREEP * settings.stroke_m)
     unsure_m = max(SURELY * balance.scatter_m, settings.dead_band_m, outcome.std_m, quantum_m)
     hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
-    margin = memory.margins.own(s, turning=turning)
+    known = memory.learnt if slid and short else memory.margins
+    margin = known.own(s, turning=turning)
     held = memory.held
     if hit and anchor.direction:
         margin = margin.after_breaking(s * (to_m - anchor.position_m))
@@ -250,7 +253,7 @@ def _learnt(
         held = NONE_HELD
     elif way_m >= memory.learnt.of(s, turning=turning).sure_m:
         held = held.one_more(memory.margins)
-    margins = memory.margins.replaced(s, margin, turning=turning)
+    margins = known.replaced(s, margin, turning=turning)
     return replace(memory, margins=margins, held=held, anchor=Anchor(to_m, s) if slid else anchor)
 
 
@@ -298,11 +301,13 @@ def _next_slide(
     # Where the device is told whole numbers, a slide lands up to half a step beside, and no other command is better.
     beside_m = 0.5 * settings.command_step_pa / -balance.ratios.b_over_c
     known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m) + beside_m
-    # Another slide would miss as the ones before have: where they scatter by more than they are wanted to, so will it.
-    if memory.slides > FREE_SLIDES:
-        known_m = max(known_m, balance.scatter_m)
-    if abs(error_m) <= max(settings.dead_band_m, known_m) * widened:
+    band_m = max(settings.dead_band_m, known_m)
+    if abs(error_m) <= band_m:
         return _because(memory, InhibitReason.NOTHING)
+    # Another slide would miss as the ones before have: where they scatter by more than they are wanted to, so will it.
+    scatter_m = balance.scatter_m if memory.slides > FREE_SLIDES else 0.0
+    if abs(error_m) <= max(band_m, scatter_m) * widened or _on_stop(memory, rest.position_m, settings):
+        return _because(memory, InhibitReason.TRIM_ENDED)
     if memory.held.stuck and abs(rest.position_m - memory.held.at_m) > CREEP * settings.stroke_m:
         memory = replace(memory, held=NONE_HELD, slides=0)
     again = int((observation.now_s - memory.slide_s) / REFILL_S) if memory.slides else 0
@@ -319,6 +324,18 @@ def _next_slide(
     if memory.course.takes_back(observation.now_s, error_m, way_m, memory.away_s):
         return _because(memory, InhibitReason.REFERENCE_COMES)
     return _excursion(memory, observation, balance, settings)
+
+
+def _on_stop(memory: SlideMemory, rest_m: float, settings: SlideSettings) -> bool:
+    """Whether the last slide went onto a stop beyond a target beside it, though it was sent no farther.
+
+    Another one would, too: the stop bears the rest, so that it says nothing of the balance.
+    """
+    s, target_m, beside_m = memory.direction, memory.target_m, STOP * settings.stroke_m
+    stop_m = settings.stroke_m if s > 0 else 0.0
+    assert target_m is not None
+    sent = not memory.excursion and s * (memory.aim_m - target_m) <= 0.0 < s * (rest_m - target_m)
+    return sent and max(abs(stop_m - target_m), abs(stop_m - rest_m)) <= beside_m
 
 
 def _because(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
