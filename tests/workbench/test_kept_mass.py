@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
+from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, model_of
 from tests.workbench.valves import drawn_valve, record_of
 from workbench.blind.input_signal import excitation
 from workbench.select.diagnosis import diagnose
-from workbench.select.kept_mass import kept_mass
+from workbench.select.kept_mass import kept_mass, leaves_something
 
 LIGHT_KG = 1.4
+
+
+@pytest.mark.parametrize(("floors", "left"), [(1.0, False), (1.15, False), (1.4, True), (4.0, True)])
+def test_it_is_asked_wherever_more_is_left_than_the_noise_may_be_off_by(floors: float, left: bool) -> None:
+    """A mass that is off by 30 % leaves 1.4 floors of a fast record: at the floor, and yet not nothing."""
+    assert leaves_something(model_of(cost=floors**2 * AT_FLOOR, error_m=floors * FLOOR_M)) is left
 
 
 @pytest.mark.long

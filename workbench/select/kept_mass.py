@@ -1,7 +1,8 @@
 """The mass, which a fit keeps as the valve file says: what would be left of the error if it were fitted, too.
 
 Plate, stem and plug seldom show: the damping holds them. Where they do, a mass that was assumed leaves an error that no
-effect explains. Asked where a diagnosis leaves something; what it finds is said, never used: a mass is weighed.
+effect explains, or only the bare valve by another name. Asked where a diagnosis leaves something, be it no more than
+noise may hide; what it finds is said, never used: a mass is weighed.
 """
 
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from functools import partial
 from config.drive import Scale
 from config.results.result import Brief
 from workbench.fit.fitting import fit
+from workbench.select.block_errors import NOISE_KNOWN_TO
 from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
@@ -45,7 +47,7 @@ class KeptMass(Brief):
 def kept_mass(
     diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None, progress: Progress | None = None
 ) -> KeptMass | None:
-    """Return which mass leaves less than the valve file's; None where none does, or nothing is left to explain.
+    """Return which mass leaves less than the valve file's; None where none does, or nothing is left of the record.
 
     Nor is it asked where samples lie farther apart than slides last: there no mass shows.
 
@@ -57,7 +59,7 @@ def kept_mass(
     """
     best, recording = diagnosis.best, diagnosis.split.train.recording
     before = best.fit
-    if best.explained or before.by.slow or MASS in before.parameters:
+    if not leaves_something(best) or before.by.slow or MASS in before.parameters:
         return None
     kept_kg = before.valve.valve.mass_kg
     free = [*before.parameters, MASS]
@@ -81,6 +83,12 @@ def kept_mass(
         return None
     fitted_kg = model.fit.valve.valve.mass_kg
     return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m, before.kind.length)
+
+
+def leaves_something(best: EvaluatedModel) -> bool:
+    """Whether a model leaves more than the noise may be off by, be all explained or not."""
+    known = best.floor_m is not None and best.errors.floors_left(best.floor_m) <= NOISE_KNOWN_TO
+    return not (best.explained and known)
 
 
 def _tell(progress: Progress, number: int, done: float) -> None:
