@@ -1,6 +1,6 @@
 """Whether a command changed between the samples that show it: by where slides end, under a command that ramps.
 
-    x_i = a + b (u_(i-1) + w d_i) + s_i (c + e z_i) + f z_i^2 + g t_i      rows i to which the stem moved
+    x_i = a + b (u_(i-1) + w d_i) + s_i (c + e z_i + h t_i) + f z_i^2 + g t_i    rows i to which the stem moved
     d_i = s_i max(0, s_i (u_i - u_(i-1)))                                  how much farther the command had gone by then
 
 x position, m; s direction; u command, Pa; z that before, u_(i-1), less its mean, over its range; t time. A command that
@@ -10,8 +10,9 @@ of the way to the next one that is recorded: w is above 0. A controller that see
 far, so that its answer makes w smaller, never larger. The other terms are what springs, friction and areas that vary
 leave over the stroke and in time, lest they be taken for w.
 
-The line is fitted robustly (soft L1), w with its standard deviation. Where that leaves both open nobody knows which it
-was, as where movements are few, or the same again and again: then its deviation is infinite.
+The line is fitted robustly (soft L1), w with its standard deviation. What friction does besides, as where it wanders,
+is alike in all movements of one stroke, so that strokes are counted where that tells less. Where the line leaves both
+open nobody knows which it was, as where movements are few, or the same again and again: then its deviation is infinite.
 """
 
 from math import inf
@@ -28,13 +29,13 @@ MOVED = 6.0
 GOES_ON = 0.2
 """Share of the movements with which the command goes on, where it ramps: with fewer it is held, unless they tell."""
 FEWEST_MOVES, FEWEST_AHEAD = 20, 10
-"""Of movements, and of those with which the command goes on: seven numbers are fitted."""
+"""Of movements, and of those with which the command goes on: eight numbers are fitted."""
 DEVIATIONS, LEAST_PART = 3.0, 0.05
 """By so many standard deviations w must be more than this, for the command to have changed between samples."""
 HELD_DEVIATIONS, HELD_PART = 2.0, 0.3
 """And less than this, for it to have been held."""
 LEAST_ALONE = 0.3
-"""Part of d that the other terms must not imitate: a few movements, again and again, tell no seven numbers."""
+"""Part of d that the other terms must not imitate: a few movements, again and again, tell no eight numbers."""
 LINEAR_FROM = 2.0
 """Robust deviations from which an error counts by its size, not by its square."""
 ROUNDS = 30
@@ -74,13 +75,14 @@ def part_of_the_way(record: Record) -> PartOfTheWay | None:
     z = (before_pa - float(np.mean(u))) / span_pa
     t = (record.time_s[rows] - record.time_s[0]) / span_s
     b, ahead = 0, 1
-    matrix = np.column_stack([z, ahead_pa / span_pa, np.ones(rows.size), way, way * z, z**2, t])
+    matrix = np.column_stack([z, ahead_pa / span_pa, np.ones(rows.size), way, way * z, way * t, z**2, t])
     if _left_alone(matrix, ahead) < LEAST_ALONE:
         return untold
-    found, covariance = _robust_line(matrix, record.position_m[rows], record.scale_m)
+    strokes = np.cumsum(np.diff(way, prepend=way[0]) != 0.0)
+    found, variances = _robust_line(matrix, record.position_m[rows], record.scale_m, strokes)
     if not found[b] > 0.0:
         return untold
-    return PartOfTheWay(float(found[ahead] / found[b]), float(covariance[ahead, ahead] ** 0.5 / found[b]), rows.size)
+    return PartOfTheWay(float(found[ahead] / found[b]), float(variances[ahead] ** 0.5 / found[b]), rows.size)
 
 
 def _moved_to(record: Record) -> tuple[NDArray[np.int64], Column]:
@@ -100,8 +102,13 @@ def _left_alone(matrix: NDArray[np.float64], column: int) -> float:
     return float(np.linalg.norm(left) / np.linalg.norm(one))
 
 
-def _robust_line(matrix: NDArray[np.float64], y: Column, least: float) -> tuple[Column, NDArray[np.float64]]:
-    """Return the coefficients of a robust line and their covariance; errors below `least` are none."""
+def _robust_line(
+    matrix: NDArray[np.float64], y: Column, least: float, strokes: NDArray[np.int64]
+) -> tuple[Column, Column]:
+    """Return the coefficients of a robust line and their variances; errors below `least` are none.
+
+    Of errors that are independent, or that hang together in each of the strokes, the larger ones.
+    """
     weights = np.ones(y.size)
     for _ in range(ROUNDS):
         weighted = matrix * weights[:, None]
@@ -109,5 +116,9 @@ def _robust_line(matrix: NDArray[np.float64], y: Column, least: float) -> tuple[
         errors = y - matrix @ found
         scale = max(LINEAR_FROM * NORMAL_MAD * float(np.median(np.abs(errors))), least) or 1.0
         weights = (1.0 + (errors / scale) ** 2) ** -0.25
-    variance = float(np.sum((weights * errors) ** 2)) / max(y.size - matrix.shape[1], 1)
-    return np.asarray(found), variance * np.linalg.pinv(weighted.T @ weighted)
+    inverse = np.linalg.pinv(weighted.T @ weighted)
+    alone = float(np.sum((weights * errors) ** 2)) / max(y.size - matrix.shape[1], 1) * np.diag(inverse)
+    pulls = np.zeros((int(strokes[-1]) + 1, matrix.shape[1]))
+    np.add.at(pulls, strokes, weighted * (weights * errors)[:, None])
+    together = np.sum((pulls @ inverse) ** 2, axis=0)
+    return np.asarray(found), np.maximum(alone, together)
