@@ -21,6 +21,10 @@ of freedom, motion from sample to sample throughout) the noise is unknown, which
 those within 1.25 times the least σ count, for motion only adds, and of these the longest that finds half as many
 samples as any.
 
+Where the drive is held for three windows, the stem rests in the last: what scatters there, about a parabola lest it
+creep on, may be no more than 1.2 times the σ found. Else that was the white part of a noise that hangs together (a
+filter before the rounding, the mains), and the noise is unknown, too.
+
 A position rounded to q is taken with an even noise of q added, under which rounding becomes white. What is left, s^2,
 lacks what the rounding of a stem at rest hides, for it rests at one place of the quantum for long:
 
@@ -71,6 +75,12 @@ FOLLOWS = 0.3
 """Correlation with the drive from which a stem is not at rest."""
 LATEST = 3
 """Samples by which the stem follows its drive at most."""
+HELD_WIDTHS = (256, 128, 64, 32, 16)
+HELD_FOR, PARABOLA = 3, 3
+"""Windows; terms of what a stem that creeps on goes by in the last."""
+RESTS, STILL = 0.1, 1.5
+"""Share of these in which a stem rests, however slowly its pressure settles; times their most scatter up to which
+others count."""
 HARMONICS = np.arange(1, 8)
 DIVISORS = range(1, 7)
 """The smallest step between two levels is so many quanta at most."""
@@ -153,7 +163,8 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
         return None  # a stem that hardly moves, in numbers that are rounded who knows how
     if drive_pa is None and np.nanmax(position_m) - np.nanmin(position_m) < ALL_NOISE * noise_m:
         return None  # noise, or a stem that goes elsewhere from sample to sample: the drive would tell
-    return _with_rounding(noise_m, quantum) if quantum else noise_m
+    whole_m = _with_rounding(noise_m, quantum) if quantum else noise_m
+    return None if drive_pa is not None and _scatters_more(position_m, drive_pa, whole_m, quantum) else whole_m
 
 
 def quantum_m(position_m: Array) -> float:
@@ -278,6 +289,34 @@ def _follows(windows: _Windows, count: int, freedom: float) -> bool:
         if power > 0.0 and float(np.sum(u * left)) > max(FOLLOWS, 4.0 / sqrt(freedom * count)) * sqrt(power):
             return True
     return False
+
+
+def _scatters_more(position_m: Array, drive_pa: Array, noise_m: float, quantum: float) -> bool:
+    """Return whether a stem scatters by more than a noise, m, where its drive has long been held."""
+    for width in HELD_WIDTHS:
+        left = _held(position_m, drive_pa, width)
+        if len(left) < FEWEST_WINDOWS:
+            continue
+        slow, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, width), PARABOLA))
+        left = left - (left @ slow) @ slow.T
+        squares = np.sum(left**2, axis=1) / (width - PARABOLA)
+        squares = squares[squares <= STILL**2 * np.quantile(squares, RESTS)]
+        scatter_m = float(np.mean(squares)) ** 0.5
+        whole_m = _with_rounding(scatter_m, quantum) if quantum else scatter_m
+        # Windows begin half a one after another: so many are half as many.
+        chance = 3.0 / sqrt(squares.size * (width - PARABOLA))
+        return whole_m > (1.0 + WHITE + chance) * noise_m
+    return False
+
+
+def _held(position_m: Array, drive_pa: Array, width: int) -> Array:
+    """Return the windows before which the drive was held for some more already, (windows, width)."""
+    length = HELD_FOR * width
+    if position_m.size < length:
+        return np.empty((0, width))
+    drive = sliding_window_view(drive_pa, length)[:: width // 2]
+    last = sliding_window_view(position_m, length)[:: width // 2][:, -width:]
+    return np.asarray(last[(np.ptp(drive, axis=1) == 0.0) & np.isfinite(last).all(axis=1)])
 
 
 def _with_rounding(scatter_m: float, quantum: float) -> float:

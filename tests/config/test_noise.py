@@ -125,3 +125,37 @@ def test_positions_are_rounded_or_not(rounded_to_m: float, found_m: float) -> No
         position_m = np.round(position_m / rounded_to_m) * rounded_to_m
     position_m[5] = np.nan
     assert quantum_m(position_m) == pytest.approx(found_m, rel=1e-9)
+
+
+def filtered(white: Array, samples: float) -> Array:
+    """Return noise of the same variance that hangs together over so many samples, as behind a transmitter's filter."""
+    kept = float(np.exp(-1.0 / samples))
+    noise = [float(white[0])]
+    for each in white[1:]:
+        noise.append(kept * noise[-1] + (1.0 - kept**2) ** 0.5 * float(each))
+    return np.asarray(noise)
+
+
+@pytest.mark.parametrize("samples", [5.0, 20.0])
+def test_noise_that_hangs_together_before_it_is_rounded_is_unknown_and_not_the_rounding_alone(samples: float) -> None:
+    """Rounding makes it look white in windows too short to see the rest of it: a half was found, and called known."""
+    quantum = 1.8 * NOISE_M
+    noise = filtered(np.random.default_rng(5).normal(0.0, NOISE_M, 12000), samples)
+    seen = steps(600, 12000) + noise
+    assert position_noise_m(np.round(seen / quantum) * quantum, 1e5 * steps(600, 12000)) is None
+
+
+def test_the_mains_beside_white_noise_make_it_unknown() -> None:
+    """50 Hz at 2 kHz, of as much power as the noise: the white part alone is not what a reading is off by."""
+    hum = 2.0**0.5 * NOISE_M * np.sin(2.0 * np.pi * 50.0 / 2000.0 * np.arange(12000.0))
+    assert position_noise_m(noisy(np.asarray(steps(1000, 12000) + hum)), 1e5 * steps(1000, 12000)) is None
+
+
+@pytest.mark.parametrize("samples", [20.0, 100.0, 300.0])
+def test_a_stem_that_creeps_on_behind_a_lag_shows_its_noise_all_the_same(samples: float) -> None:
+    drive = steps(600, 12000)
+    kept = 1.0 - np.exp(-1.0 / samples)
+    stem = [float(drive[0])]
+    for each in drive[1:]:
+        stem.append(stem[-1] + kept * (float(each) - stem[-1]))
+    assert position_noise_m(noisy(np.asarray(stem)), 1e5 * drive) == pytest.approx(NOISE_M, rel=0.1)

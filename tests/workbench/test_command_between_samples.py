@@ -68,7 +68,7 @@ def wandering(seed: int) -> Recording:
     """Record a command that ramps, held from sample to sample, and a stem at rest at its balance when each ends; its
     friction wanders up and down by a third."""
     generator = np.random.default_rng(seed)
-    time_s = 0.5 * np.arange(600)
+    time_s: Column = np.asarray(0.5 * np.arange(600), np.float64)
     turns_s = np.cumsum(generator.uniform(4.0, 14.0, 100))
     command_pa: Column = SPAN_PA * np.interp(time_s, turns_s, generator.uniform(0.1, 0.9, 100))
     half_band_pa = 0.05 * SPAN_PA * (1.0 + 0.3 * np.sin(0.13 * time_s + seed))
