@@ -302,7 +302,7 @@ def move(
     a = acceleration(valve, mode, sigma, stem_at(drive, tau, x, v), q, z)
     s = h - tau
     if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST_CHANGE * (abs(v) + valve.v_s):
-        s = FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a)
+        s = max(FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a), SHORTEST_SUBSTEP * s)
     shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
     while tau < h:
         exponential = mode == SLIP and s > shortest_exponential
@@ -489,9 +489,18 @@ def carry(
             t0 += s
             left -= s
             stem = Stem(t0, x, v, p)
+            x += unknown_m(excess(valve, stem, q, z))
             remember(x0, s, stem, q, z)
             _, indicated = sensor(x0, x, s, stem, q, z)
     return Condition(t + duration, x, v, p, mode, sigma, indicated)
+
+
+def unknown_m(force: float) -> float:
+    """Return 0, or NaN where a force is no finite number: nobody can say where such a stem is.
+
+    What is compared with NaN is not greater: without this the stem would count as one that friction holds.
+    """
+    return 0.0 * force
 
 
 def respond(

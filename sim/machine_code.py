@@ -18,6 +18,8 @@ import llvmlite
 import numpy as np
 from llvmlite import binding
 
+from config.errors import InputError
+
 NUMBER, VECTOR, MATRIX = range(3)
 """Kinds of arguments, by their dimensions: of float64, arrays contiguous."""
 TYPES: Mapping[int, tuple[Any, ...]] = {
@@ -40,7 +42,7 @@ class Entry(Generic[*Arguments]):
 
     Raises when called:
         TypeError: an array that is no contiguous one of float64, or of other dimensions.
-        RuntimeError: an effect raised an exception.
+        InputError: an effect raised an exception.
     """
 
     def __init__(self, name: str, kinds: Sequence[int], code: Any) -> None:
@@ -86,8 +88,9 @@ class Entry(Generic[*Arguments]):
             words += value.shape
         return words
 
-    def _failed(self) -> RuntimeError:
-        return RuntimeError(f"an effect failed in {self._name}")
+    def _failed(self) -> InputError:
+        problem = f"raised an exception in {self._name}; it must return a number, whatever it is given"
+        return InputError("an effect of the valve file", problem)
 
 
 def processor() -> str:

@@ -11,6 +11,7 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
+from config.errors import InputError
 from config.results.result import Brief
 from sim.composition import Composition
 from sim.karnopp import TOLERANCE, Vector
@@ -91,6 +92,7 @@ def follow(
 
     Raises:
         ValueError: as `respond`.
+        InputError: as `require_numbers`.
     """
     commands = checked_commands(command_pa)
     periods = checked_periods(period_s, commands)
@@ -98,7 +100,24 @@ def follow(
     composition.kernel.respond(theta, state, commands, periods, checked_step(step_s), tolerance, path)
     held = np.append(commands, commands[-1])
     time, pressure, position, velocity, indicated = path
+    require_numbers(composition, time, position, indicated)
     return Response(time, held, pressure, position, velocity, indicated)
+
+
+def require_numbers(composition: Composition, time_s: Vector, *answers: Vector) -> None:
+    """Check what a valve was simulated to do, each (n,) as the times, s: nothing of it may pass for an answer else.
+
+    Raises:
+        InputError: one holds what is no finite number, as an effect of one's own may make it; says from when on.
+    """
+    lost = np.flatnonzero(~np.isfinite(answers).all(axis=0))
+    if lost.size:
+        effects = ", ".join(each.name for each in composition.effects) or "none"
+        raise InputError(
+            composition.source,
+            f"nobody can say where the stem is from {time_s[lost[0]]:g} s on: a force, friction, pressure or "
+            f"indication is no finite number there; its effects: {effects}",
+        )
 
 
 def checked_commands(command_pa: npt.ArrayLike) -> Vector:

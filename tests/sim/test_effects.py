@@ -241,3 +241,31 @@ def test_an_own_effect_in_one_file(tmp_path: Path) -> None:
     assert valve.position_m == 0.0
     valve.advance((F_s - 980.0) / A, 0.01)
     assert valve.position_m > 0.0
+
+
+NO_NUMBER = {
+    "NaN at rest": "def force(x): return math.nan",
+    "NaN on the way": "def force(x): return math.sqrt(0.03 - x)",
+    "infinite": "def force(x): return 1.0 / (x - x)",
+    "an infinite slope": "def force(x): return math.log(x)",
+    "of friction": "def friction(F_c, F_s, x): return F_c, F_s * math.sqrt(0.03 - x)",
+    "of the pressure": "def pressure(u): return math.sqrt(60e3 - u)",
+    "of the indication": "def sensor(y): return math.sqrt(0.03 - y)",
+}
+
+
+@pytest.mark.parametrize("text", NO_NUMBER.values(), ids=NO_NUMBER)
+def test_a_valve_of_which_nobody_can_say_where_it_is_has_no_answer(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(f"import math\n{text}\n")
+    valve = Valve(Composition.of(file_with({"name": "own"}), [read_effect(path)], "v.toml"), step_s=1e-3)
+    with pytest.raises(InputError, match=r"^v\.toml: nobody can say where the stem is from .* its effects: own$"):
+        valve.run(np.linspace(0.0, 90e3, 50), 0.01)
+
+
+def test_a_force_that_outgrows_every_step_ends(tmp_path: Path) -> None:
+    path = tmp_path / "own.py"
+    path.write_text("def force(x): return 1e30 * (x + 1.0)\n")
+    valve = Valve(Composition.of(file_with({"name": "own"}), [read_effect(path)], "v.toml"), step_s=1e-3)
+    with pytest.raises(InputError, match="nobody can say"):
+        valve.run(np.full(3, 50e3), 1e-3)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.composition import Composition
 from sim.effect import read_effect
@@ -60,7 +61,7 @@ def test_what_fails_in_an_effect_is_an_error(tmp_path: Path) -> None:
     _, composition = own(tmp_path, "if x > 1e-4:\n        raise ValueError\n    return 0.0")
     valve = Valve(composition)
     valve.advance(0.0, 0.01)
-    with pytest.raises(RuntimeError, match="an effect failed in respond"):
+    with pytest.raises(InputError, match="an effect of the valve file: raised an exception in respond"):
         valve.advance(150e3, 1.0)
 
 

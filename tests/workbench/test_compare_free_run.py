@@ -1,12 +1,15 @@
 """Compare: the true valve is adequate; a hidden effect is not, and the sentences say how it fails."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from config.errors import InputError
 from config.recording import Recording
+from config.valve_file import EffectTable
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, record_of, with_effect
@@ -128,3 +131,21 @@ def test_everything_can_be_written_as_json() -> None:
     assert set(written["slips"]) == {"matched", "missed_s", "invented_s"}
     assert len(written["autocorrelation"]["value"]) == 26
     assert len(written["input_correlation"]["value"]) == 51
+
+
+@pytest.mark.parametrize("apart_s", [0.01, 1.0], ids=["fast", "without inertia"])
+def test_a_model_without_an_answer_is_not_judged_by_the_rest_of_the_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, apart_s: float
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own.py").write_text("import math\ndef sensor(y): return y + 0.0 * math.sqrt(0.05 - y)\n")
+    valve = drawn_valve(np.random.default_rng(0))
+    rising = np.repeat(np.linspace(0.2, 0.9, 15), 20) * valve.valve.spring_n_per_m * 0.1 / valve.valve.diaphragm_area_m2
+    composition = Composition.from_file(valve)
+    path = respond(composition, composition.theta, rising[:-1], apart_s, step_s=min(apart_s, 0.01))
+    noise = NOISE_M * np.random.default_rng(0).standard_normal(rising.size)
+    recording = Recording({"time_s": path.time_s, "command_pa": rising, "position_m": path.indicated_m + noise})
+    assert path.indicated_m.max() > 0.05
+    lacking = valve.model_copy(update={"effect": (EffectTable.model_validate({"name": str(tmp_path / "own.py")}),)})
+    with pytest.raises(InputError, match="nobody can say where the stem is"):
+        compare(recording, lacking)

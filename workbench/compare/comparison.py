@@ -207,6 +207,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
     composition = Composition.from_file(valve)
     free = FreeRun(composition, record)
     run = free.run(composition.theta)
+    free.require_answer(run.indicated_m)
     rows = valid_rows(record, run.indicated_m) & (free.by.held | free.judged)
     residual_m = np.where(rows, run.indicated_m - record.position_m, np.nan)
     segments = [_segment_findings(valve, record, run, first, end) for first, end in record.segments]

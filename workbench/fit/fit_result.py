@@ -86,9 +86,13 @@ class Fit(Result):
         return self.valve.valve.own
 
     def indicated_m(self, record: Record) -> Column:
-        """Return the same of a recording made ready."""
+        """Return the same of a recording made ready.
+
+        Raises:
+            InputError: the model has no answer, as an effect of one's own may be without (`FreeRun.require_answer`).
+        """
         run, theta = self._run_through(record)
-        return run.position_m(theta)
+        return run.require_answer(run.position_m(theta))
 
     def pressure_pa(self, record: Record) -> Column:
         """Return the actuator's pressure in a free run through a recording made ready, Pa; NaN as above."""

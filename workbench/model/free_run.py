@@ -32,7 +32,16 @@ from config.valve_file import EffectTable, ValveFile
 from sim.composition import AREA, COULOMB, STATIC, Composition
 from sim.karnopp import Vector, read, write
 from sim.misfit import AT_ONCE, Judge, put_back
-from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, at_rest, checked_commands, checked_periods, checked_step
+from sim.open_loop import (
+    INDICATED,
+    PATH_ROWS,
+    PRESSURE,
+    at_rest,
+    checked_commands,
+    checked_periods,
+    checked_step,
+    require_numbers,
+)
 from workbench.data.record import Mask, Record
 from workbench.model.initial_state import (
     BeforeStart,
@@ -174,6 +183,18 @@ class FreeRun:
             return indicated_m
         for first, end, path in self._paths(theta):
             indicated_m[first:end] = path[INDICATED]
+        return indicated_m
+
+    def require_answer(self, indicated_m: Column) -> Column:
+        """Return an indicated position, m, (n,), that says something of every row that is judged.
+
+        What is not there is not compared: a model without an answer would be judged by the rest of the record alone.
+
+        Raises:
+            InputError: as `sim.open_loop.require_numbers`.
+        """
+        judged = self.judged
+        require_numbers(self._composition, self.record.time_s[judged], indicated_m[judged])
         return indicated_m
 
     def misfit(self, theta: Vector, measured_m: Column, judge: Judge) -> tuple[Column, float]:

@@ -380,7 +380,10 @@ class EffectSearch:
             if isinstance(each, str):
                 return each
             lost = racing and each.cost > OUT_OF_RACE * least
-            return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
+            try:
+                return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
+            except InputError as error:
+                return error.problem
 
         return self._each(number, "refitting", finished, fits, 0.8, 1.0, self._known.models)
 

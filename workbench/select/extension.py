@@ -201,5 +201,5 @@ def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
 def _rmse_m(valve: ValveFile, part: Part, by: Sampling) -> float:
     composition = Composition.from_file(valve)
     run = FreeRun(composition, part.record, by=by.of(part.record, valve.valve))
-    error_m = residual_m(part, run.position_m(composition.theta))
+    error_m = residual_m(part, run.require_answer(run.position_m(composition.theta)))
     return float(np.sqrt(np.nanmean(error_m**2)))
