@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     from math import inf
 
     from positioner.cli.parts.model_arguments import read_valve, require_effects
-    from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.naming import files_named, naming
     from positioner.cli.parts.next_step import discover_command, extend_commands
     from positioner.cli.parts.progress import Progress
     from workbench.data.imposed_motion import is_imposed
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     stroke_m = valve.valve.stroke_m
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
-    named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
+    named = files_named(arguments.recordings, arguments.test, arguments.valve)
     with naming(named), _known_at_all(), Progress() as progress:
         diagnosis = diagnose(
             recordings,

@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Discover and print; 0 if a form explains the recordings, or nothing is left to explain, else 1."""
     from config.extras import needed
     from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.naming import files_named, naming
     from positioner.cli.parts.progress import at_work
     from workbench.discover.discovery import discover
     from workbench.discover.discovery_json import as_json
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     stroke_m = valve.valve.stroke_m
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
-    named = {"recording": ", ".join(map(str, arguments.recordings)), "valve file": arguments.valve}
+    named = files_named(arguments.recordings, arguments.test, arguments.valve)
     with naming(named), at_work("discover") as progress:
         found = discover(
             recordings, valve, test=test, seed=arguments.seed, on_proposal=_tell_proposal, progress=progress
@@ -92,12 +92,13 @@ def _tell_proposal(names: tuple[str, ...]) -> None:
 def _write_form(found: "Discovery", arguments: argparse.Namespace) -> None:
     """Write the best form, and say how it is added; say so where there is none."""
     from positioner.cli.parts.next_step import extend_command
+    from positioner.cli.parts.output_files import write_text
 
     if not found.found:
         print(f"{arguments.out}: not written: {found.sentence}")
         return
     source = ", ".join(path.name for path in arguments.recordings)
-    arguments.out.write_text(found.found[0].text(source), encoding="utf-8")
+    write_text(arguments.out, found.found[0].text(source), "-o")
     name = str(arguments.out) if arguments.out.is_absolute() else f"./{arguments.out}"
     print(f"{arguments.out}: {found.found[0].form.words}: a form, not a cause")
     print(f"to add it: {extend_command([name], arguments)}")

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from config.valve_file import find_valve
     from positioner.cli.parts.model_arguments import read_valve, require_effects
-    from positioner.cli.parts.naming import naming
+    from positioner.cli.parts.naming import files_named, naming
     from positioner.cli.parts.progress import at_work
     from workbench.report import report_journal, require_plotly
     from workbench.select.extension import extend
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     recordings = [noise_said(read_any(each, arguments, valve.valve.stroke_m), arguments) for each in arguments.fit]
     test = noise_said(read_any(arguments.test, arguments, valve.valve.stroke_m), arguments) if arguments.test else None
     Journal.beside(path)  # what is none is refused before the work begins
-    named = {"recording": ", ".join(map(str, arguments.fit)), "valve file": arguments.valve}
+    named = files_named(arguments.fit, arguments.test, arguments.valve)
     with naming(named), at_work("extend") as progress:
         extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=progress)
     journal = write_extended(extension, path, arguments.out)

@@ -13,6 +13,7 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, SEED, record_of
 from workbench import compare, diagnose, extend, fit
+from workbench.data.held_out import split
 from workbench.data.record import MOST_WORK, ready, require_fittable
 
 Capture = pytest.CaptureFixture[str]
@@ -201,7 +202,6 @@ def commands(path: str, out: Path) -> list[list[str]]:
     return [
         ["compare", path, "--valve", "seed"],
         ["diagnose", path, "--valve", "seed"],
-        ["diagnose", path, "--valve", "seed", "--test", path],
         ["extend", "seed", "--effect", "backlash", "--fit", path, "-o", str(out / "new.toml")],
     ]
 
@@ -256,3 +256,33 @@ def test_a_parquet_file_cut_off_is_one_line(tmp_path: Path, capsys: Capture) -> 
     path.write_bytes(path.read_bytes()[:-100])
     for words in commands(str(path), tmp_path):
         refused_in_one_line(words, str(path), "is not a Parquet file of numbers", capsys)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda rec: ([rec], rec),
+        lambda rec: ([rec], Recording({name: column[100:] for name, column in rec.columns.items()})),
+        lambda rec: ([rec, rec], None),
+    ],
+    ids=["the same", "its end", "given twice"],
+)
+def test_what_is_fitted_is_not_held_out(given: Callable[[Recording], tuple[list[Recording], Recording | None]]) -> None:
+    fitted, held_out = given(Recording(sound()))
+    with pytest.raises(InputError, match=r"^held-out recording: \d+ of its \d+ samples are fitted as well"):
+        split(fitted, held_out)
+
+
+def test_another_recording_that_begins_alike_is_held_out() -> None:
+    first, second = sound(), sound()
+    half = first["time_s"].size // 2 - 30
+    second["position_m"] = np.concatenate([first["position_m"][:half], first["position_m"][half:] + 1e-6])
+    assert split([Recording(first)], Recording(second)).test.counted.any()
+
+
+def test_the_file_of_what_is_held_out_is_named(tmp_path: Path, capsys: Capture) -> None:
+    rec, test = tmp_path / "rec.csv", tmp_path / "test.csv"
+    write_recording(rec, Recording(sound()))
+    write_recording(test, Recording(sound() | {"command_pa": np.full(600, np.nan)}))
+    assert main(["diagnose", str(rec), "--valve", "seed", "--test", str(test)]) == 2
+    assert capsys.readouterr().err == f"positioner diagnose: {test}: command_pa: no sample is a number\n"

@@ -2,12 +2,17 @@
 
 The held-out end is simulated in one free run with what lies before it, so that its start needs no guess; only its rows
 count. Several recordings become one: where the clock is set back, the workbench simulates anew.
+
+What was fitted cannot judge: a held-out part of which most samples stand in the fitted one, to the last bit and at the
+same times, is the same recording under another name, or one that was given twice, and is refused.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from config.errors import InputError
 from config.recording import Column, Recording
@@ -19,6 +24,10 @@ HELD_OUT = 1.0 / 3.0
 """Part of the recording that is held out where no other is given."""
 FEWEST = 40
 """Samples on either side."""
+KNOWN = 0.5
+"""Share of the held-out samples that may stand in what is fitted, too: two recordings may begin alike."""
+HELD_OUT_RECORDING = "held-out recording"
+"""What errors call it."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -63,22 +72,49 @@ def split(recordings: Sequence[Recording], test: Recording | None = None) -> Spl
     """Set apart what is held out.
 
     Raises:
-        InputError: no recording, too few samples, or more than can be fitted.
+        InputError: no recording, too few samples, more than can be fitted, or what is held out is fitted as well.
     """
     whole = joined(recordings)
-    for each in (whole, test):
-        if each:
-            require_few_samples(each)
+    require_few_samples(whole)
     whole = informative(whole)
-    test = test and informative(test)
+    if test:
+        with _of_held_out():
+            require_few_samples(test)
+            test = informative(test)
     end = len(whole) if test else round(len(whole) * (1.0 - HELD_OUT))
     train = _part(_head(whole, end), 0)
-    held_out = _part(test, 0) if test else _part(whole, end)
+    with _of_held_out():
+        held_out = _part(test, 0) if test else _part(whole, end)
     for part, what in ((train, "to fit"), (held_out, "held out")):
         if part.counted.sum() < FEWEST:
             raise InputError("recording", f"{part.counted.sum()} samples {what} are too few: {FEWEST} are needed")
+    _require_unseen(train, held_out)
     floors_m = [each.record.floor_m for each in (train, held_out) if each.record.floor_m is not None]
     return Split(train, held_out, max(floors_m, default=None))
+
+
+@contextmanager
+def _of_held_out() -> Iterator[None]:
+    """Say of what is wrong with a recording that it is the one held out."""
+    try:
+        yield
+    except InputError as error:
+        raise error.named({"recording": HELD_OUT_RECORDING}) from None
+
+
+def _require_unseen(train: Part, test: Part) -> None:
+    names = sorted(train.recording.columns.keys() & test.recording.columns.keys())
+    held_out = _samples(test, names)
+    known = int(np.isin(held_out, _samples(train, names)).sum())
+    if known > KNOWN * held_out.size:
+        problem = f"{known} of its {held_out.size} samples are fitted as well, so it judges nothing; allowed is another"
+        raise InputError(HELD_OUT_RECORDING, problem)
+
+
+def _samples(part: Part, names: Sequence[str]) -> npt.NDArray[np.void]:
+    """Return what the columns of these names hold in each row that counts, as so many bytes, (rows,)."""
+    rows = np.column_stack([part.recording.columns[name][part.counted] for name in names])
+    return rows.view(f"V{rows.itemsize * len(names)}").ravel()
 
 
 def _part(recording: Recording, first: int) -> Part:

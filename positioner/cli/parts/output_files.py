@@ -76,11 +76,19 @@ def write_json(path: Path, values: Mapping[str, object], indent: int | None = No
     Raises:
         InputError: it cannot be written.
     """
-    text = json.dumps(values, indent=indent, allow_nan=False) + "\n"
+    write_text(path, json.dumps(values, indent=indent, allow_nan=False) + "\n", "--json")
+
+
+def write_text(path: Path, text: str, option: str) -> None:
+    """Write a file that an option asks for.
+
+    Raises:
+        InputError: it cannot be written.
+    """
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise _unwritable("--json", path, error) from None
+        raise _unwritable(option, path, error) from None
 
 
 def _unwritable(option: str, path: Path, error: OSError) -> InputError:
