@@ -20,8 +20,10 @@ import zlib
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
@@ -234,7 +236,7 @@ def _number(value: float) -> str:
 
 
 def write_recording(path: Path, recording: Recording) -> None:
-    """Write a recording as CSV, or as Parquet if the file is named so; numbers keep every bit.
+    """Write a recording as CSV, compressed or as Parquet if the file is named so; numbers keep every bit.
 
     Raises:
         InputError: Parquet without pyarrow, or the file cannot be written.
@@ -243,7 +245,7 @@ def write_recording(path: Path, recording: Recording) -> None:
         if path.suffix == ".parquet":
             _write_parquet(path, recording)
             return
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with _text_to(path) as file:
             file.writelines(f"# {key}: {value}\n" for key, value in recording.metadata.items())
             file.write(",".join(recording.own_columns) + "\n")
             for row in zip(*(column.tolist() for column in recording.columns.values()), strict=True):
@@ -251,6 +253,21 @@ def write_recording(path: Path, recording: Recording) -> None:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise InputError(str(path), f"cannot be written: {reason}") from None
+
+
+@contextmanager
+def _text_to(path: Path) -> Iterator[TextIO]:
+    """Open a CSV file to be written, compressed if it is named so; the same recording, the same bytes."""
+    with path.open("wb") as file:
+        if path.suffix != ".gz":
+            with TextIOWrapper(file, encoding="utf-8", newline="") as text:
+                yield text
+            return
+        with (
+            gzip.GzipFile("", "wb", fileobj=file, mtime=0) as packed,
+            TextIOWrapper(packed, encoding="utf-8", newline="") as text,
+        ):
+            yield text
 
 
 def read_recording(path: Path) -> Recording:

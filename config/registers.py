@@ -70,7 +70,8 @@ class Register:
         low = self.minimum is None or value >= self.minimum
         high = self.maximum is None or value <= self.maximum
         if not (low and high):
-            return f"{self.name}: allowed is {self.minimum:g} to {self.maximum:g} {self.unit}, got {value:g}"
+            unit = "" if self.unit == "1" else f" {self.unit}"
+            return f"{self.name}: allowed is {self.minimum:g} to {self.maximum:g}{unit}, got {value:.9g}"
         if not self.format.holds(value):
             return f"{self.name}: allowed is a whole number, {self.minimum:g} to {self.maximum:g}, got {value}"
         return None

@@ -1,4 +1,4 @@
-"""The response of a valve to a series of commands, each held over its period: one compiled call.
+"""The response of a valve to a series of commands, each held over its period, in compiled calls.
 
 Row 0 is the start; row i > 0 is the END of the i-th period. `command_pa` of a row is the command held FROM that time
 on (sampled, then commanded), so the last row repeats the last command; `pressure_pa` is the actuator pressure that has
@@ -19,6 +19,8 @@ from sim.karnopp import TOLERANCE, Vector
 STEP_S = 1e-5
 PATH_ROWS, PRESSURE, INDICATED = 5, 1, 4
 """Rows that the kernel writes: t, p, x, v, indicated; which of them are the second and the last."""
+AT_ONCE = 100
+"""Periods in one compiled call: nobody can break one off."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -97,11 +99,15 @@ def follow(
     commands = checked_commands(command_pa)
     periods = checked_periods(period_s, commands)
     path = np.empty((PATH_ROWS, commands.size + 1))
-    composition.kernel.respond(theta, state, commands, periods, checked_step(step_s), tolerance, path)
-    held = np.append(commands, commands[-1])
+    for begin in range(0, commands.size, AT_ONCE):
+        held = slice(begin, begin + AT_ONCE)
+        piece = np.empty((PATH_ROWS, commands[held].size + 1))
+        composition.kernel.respond(theta, state, commands[held], periods[held], checked_step(step_s), tolerance, piece)
+        path[:, begin : begin + piece.shape[1]] = piece
+    commanded = np.append(commands, commands[-1])
     time, pressure, position, velocity, indicated = path
     require_numbers(composition, time, position, indicated)
-    return Response(time, held, pressure, position, velocity, indicated)
+    return Response(time, commanded, pressure, position, velocity, indicated)
 
 
 def require_numbers(composition: Composition, time_s: Vector, *answers: Vector) -> None:

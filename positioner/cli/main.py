@@ -1,7 +1,8 @@
 """`positioner COMMAND ...`: finds the command, runs it, turns bad input into one line and an exit status.
 
 Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input; 130 and 141, as shells have it, when broken off
-by Ctrl-C and when nobody reads what is printed any more (`| head`).
+by Ctrl-C and when nobody reads what is printed any more (`| head`). Where it cannot be
+printed, on a full disk, that is 2 too.
 """
 
 import argparse
@@ -90,17 +91,35 @@ def _done(words: Sequence[str] | None) -> int:
     except BrokenPipeError:
         if not _unread():
             raise
+        _drop_output()
         return 141
+    except OSError as error:
+        if not _unprintable():
+            raise
+        _drop_output()
+        print(f"positioner {arguments.command}: standard output cannot be written: {error.strerror}", file=sys.stderr)
+        return 2
+
+
+def _unprintable() -> bool:
+    """Return whether standard output takes no more, such as a file on a full disk: not even the end of a line."""
+    try:
+        print(flush=True)
+    except OSError:
+        return True
+    return False
+
+
+def _drop_output() -> None:
+    """Drop what is left of standard output: the interpreter would try to write it as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _unread() -> bool:
-    """Return whether nobody reads standard output any more; what is left of it is then dropped."""
+    """Return whether nobody reads standard output any more."""
     poll = select.poll()
     poll.register(sys.stdout.fileno(), 0)
-    if not any(event & select.POLLERR for _, event in poll.poll(0)):
-        return False
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return True
+    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 def command_parser() -> argparse.ArgumentParser:

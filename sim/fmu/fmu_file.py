@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Sequence
 from hashlib import sha256
 from importlib.metadata import version
+from io import BytesIO
 from math import inf
 from pathlib import Path
 from uuid import UUID
@@ -35,7 +36,8 @@ def export_fmu(composition: Composition, path: Path) -> None:
     """Write the valve as an FMU.
 
     Raises:
-        InputError: this machine is none for which a library can be made, or it has no C compiler.
+        InputError: this machine is none for which a library can be made, it has no C compiler, or `path` cannot be
+            written.
         CommandFailed: the compiler refuses.
     """
     if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
@@ -45,9 +47,14 @@ def export_fmu(composition: Composition, path: Path) -> None:
     plain = model_description(composition, "", tool)
     guid = f"{{{UUID(bytes=sha256(composition.kernel.digest.encode() + plain).digest()[:16])}}}"
     library = _library(composition, guid)
-    with zipfile.ZipFile(path, "w") as unit:
+    whole = BytesIO()
+    with zipfile.ZipFile(whole, "w") as unit:
         _put(unit, "modelDescription.xml", model_description(composition, guid, tool))
         _put(unit, f"binaries/{PLATFORM}/{IDENTIFIER}.so", library)
+    try:
+        path.write_bytes(whole.getvalue())
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 
 
 def _put(unit: zipfile.ZipFile, name: str, content: bytes) -> None:

@@ -50,6 +50,21 @@ def test_output_that_nobody_reads_ends_a_command_without_a_word() -> None:
     assert (mapped.returncode, mapped.stderr) == (141, "")
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_a_full_disk_does_not_take_is_one_line_and_no_answer(unbuffered: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        mapped = subprocess.run(
+            [sys.executable, "-m", "positioner.cli", "map"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        )
+    said = "positioner map: standard output cannot be written: No space left on device\n"
+    assert (mapped.returncode, mapped.stderr) == (2, said)
+
+
 def test_help_names_every_command_and_each_has_an_example() -> None:
     everything = subprocess.run(
         [sys.executable, "-m", "positioner.cli", "--help"], capture_output=True, text=True, check=True

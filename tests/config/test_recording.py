@@ -77,3 +77,14 @@ def test_the_span_of_a_time_of_today_is_said_to_the_second() -> None:
     said = Recording({"time_s": time_s, "command_pa": time_s * 0.0, "position_m": time_s * 0.0}).summary()
     assert "1780000000" in said
     assert "1780000099" in said
+
+
+def test_a_recording_named_gz_is_compressed_and_read_again(tmp_path: Path) -> None:
+    recording = Recording({name: np.arange(3.0) for name in ("time_s", "command_pa", "position_m")}, {"valve": "seed"})
+    files = [tmp_path / name for name in ("one.csv.gz", "two.csv.gz")]
+    for path in files:
+        write_recording(path, recording)
+    assert files[0].read_bytes() == files[1].read_bytes()
+    again = read_recording(files[0])
+    assert again.metadata["valve"] == "seed"
+    assert all((again.columns[name] == column).all() for name, column in recording.columns.items())

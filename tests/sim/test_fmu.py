@@ -150,3 +150,8 @@ def test_without_a_compiler_it_is_one_line(tmp_path: Path, monkeypatch: pytest.M
     assert main(["export", "fmu", "seed", "-o", str(tmp_path / "valve.fmu")]) == 2
     assert capsys.readouterr().err.strip().endswith("needs a C compiler: apt install gcc, or name one in CC")
     assert not (tmp_path / "valve.fmu").exists()
+
+
+def test_an_fmu_on_a_full_disk_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "fmu", "seed", "-o", "/dev/full"]) == 2
+    assert capsys.readouterr().err == "positioner export: /dev/full: cannot be written: No space left on device\n"

@@ -83,6 +83,11 @@ def test_the_same_diagnosis_gives_the_same_bytes(diagnosed: tuple[Diagnosis, Sub
     assert (tmp_path / "one.html").read_bytes() == (tmp_path / "other.html").read_bytes()
 
 
+def test_a_file_whose_name_is_no_text_is_reported(compared: tuple[Comparison, Subject], tmp_path: Path) -> None:
+    report_comparison(compared[0], tmp_path / "page.html", replace(compared[1], recordings=("bad\udcff.csv",)))
+    assert "bad\\udcff.csv" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
 def test_a_comparison_is_reported_in_full(page: Page, compared: tuple[Comparison, Subject]) -> None:
     wanted = ["verdict", "overlay", "signature", "phases", "friction", "slips", "statistics", "recording", "words"]
     assert page.sections == wanted

@@ -89,7 +89,7 @@ def _write(path: Path, title: str, parts: Iterable[Html], library: str, script: 
         script=script,
     )
     try:
-        path.write_text(page, encoding="utf-8")
+        path.write_text(page, encoding="utf-8", errors="backslashreplace")  # a file's name need not be text
     except OSError as error:
         raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 
