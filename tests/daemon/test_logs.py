@@ -3,6 +3,7 @@
 import io
 import json
 import logging
+import math
 import sys
 import time
 from threading import Event
@@ -11,7 +12,7 @@ import pytest
 
 from positioner.daemon import logs
 from positioner.daemon.backoff import LinesPerPeer
-from positioner.daemon.logs import log_event, start_logging
+from positioner.daemon.logs import JsonLines, log_event, start_logging
 
 log = logging.getLogger("test")
 
@@ -26,6 +27,17 @@ class Pipe(io.StringIO):
     def write(self, text: str) -> int:
         self.read_on.wait(60.0)
         return super().write(text)
+
+
+def test_a_line_is_json_whatever_number_is_in_it() -> None:
+    record = logging.LogRecord("test", logging.INFO, "", 0, "health", (), None)
+    record.fields = {"friction_ratio": math.nan, "beyond": [math.inf, 1.0], "each": {"a": -math.inf}, "state": object}
+
+    def refused(constant: str) -> None:
+        raise AssertionError(constant)
+
+    said = json.loads(JsonLines().format(record), parse_constant=refused)
+    assert (said["friction_ratio"], said["beyond"], said["each"]) == (None, [None, 1.0], {"a": None})
 
 
 @pytest.mark.usefixtures("root_logging")
