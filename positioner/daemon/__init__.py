@@ -15,7 +15,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     refinement_process            fits in a process of its own
     recorder, logs                recordings and log lines, written beside the cycle
     recording_compression         closed recordings compressed, in a process of its own
-    memory                        what is known of a valve, kept over restarts
+    memory, kept_alone            what is known of a valve, kept over restarts; that one daemon keeps it
     cycle_statistics, health      how punctual it is; how the valve is (NAMUR NE 107)
     history                       what has happened, written beside the cycle
 """

@@ -35,6 +35,7 @@ from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.history import HistoryKeeper, ValveHistory
 from positioner.daemon.history.decision_events import Happened
 from positioner.daemon.history.health_hours import HealthLook
+from positioner.daemon.kept_alone import keep_alone
 from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.local_switch import locks_out
 from positioner.daemon.logs import log_event, logging_valve, start_logging
@@ -159,6 +160,7 @@ def _assembled(
     refinement: RefinementProcess,
     history: HistoryKeeper,
 ) -> ServedValve:
+    keep_alone(file, source.parent, on_exit)
     settings = Settings.of(file, extended)
     link_settings = LinkSettings.of(file, settings.limits.restart_tolerance_pa)
     device = file.device.read_only() if file.cycle.shadow else file.device

@@ -7,7 +7,6 @@ flood of one kind pushes out its own kind; the newest `ALWAYS_KEPT` rows of each
 What is another program's, or of another version of this schema, is refused; what is damaged is set aside.
 """
 
-import fcntl
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from config.errors import InputError
+from config.lock_file import locked
 from positioner.history.entries import TABLES, Entry, Event, Setting
 
 FILE_NAME = "history.sqlite"
@@ -62,7 +62,7 @@ class HistoryFile:
         self._limit_bytes = limit_mb * 1_000_000
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(folder / f"{FILE_NAME}.lock")
+            self._lock = locked(folder / f"{FILE_NAME}.lock", "another daemon keeps its history there")
         except OSError as error:
             raise InputError(str(folder), f"the history cannot be kept there: {error.strerror}") from None
         try:
@@ -283,19 +283,3 @@ def clock_of(entry: type[Any]) -> str | None:
     """Return the column by which a row ages; None of a table that does not grow."""
     names = {field.name for field in fields(entry)}
     return next((name for name in ("time_s", "end_s", "hour_s") if name in names), None)
-
-
-def _locked(path: Path) -> int:
-    """Return the descriptor of a lock that one daemon has at a time; it ends with the process.
-
-    Raises:
-        InputError: another daemon has it.
-        OSError: the file cannot be made.
-    """
-    lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(lock)
-        raise InputError(str(path.parent), "another daemon keeps its history there") from None
-    return lock

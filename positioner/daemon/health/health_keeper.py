@@ -25,6 +25,11 @@ CHECK_EVERY_S = 1.0
 WRITE_EVERY_CHECKS = 60
 
 
+def health_path(folder: Path, valve: str) -> Path:
+    """Return the file of a valve."""
+    return folder / f"{quote(valve, safe=' ')}.health.json"
+
+
 @dataclass(frozen=True, slots=True)
 class StoredHealth:
     """A valve's file, and what was in it at the start; `problem` says why that could not be read."""
@@ -40,7 +45,7 @@ class StoredHealth:
         Raises:
             InputError: the file cannot be read or written.
         """
-        path = folder / f"{quote(valve, safe=' ')}.health.json"
+        path = health_path(folder, valve)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             record, problem = read_record(path, valve)

@@ -26,6 +26,11 @@ CHECK_EVERY_S = 1.0
 WRITE_EVERY_CHECKS = 60
 
 
+def memory_path(folder: Path, valve: str) -> Path:
+    """Return the file of a valve."""
+    return folder / f"{quote(valve, safe=' ')}.memory.json"
+
+
 @dataclass(frozen=True, slots=True)
 class StoredMemory:
     """A valve's file, the conditions of now, and what was in it at the start."""
@@ -41,7 +46,7 @@ class StoredMemory:
         Raises:
             InputError: the folder cannot be made, the file not be read.
         """
-        path = folder / f"{quote(valve, safe=' ')}.memory.json"
+        path = memory_path(folder, valve)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             return cls(path, conditions, read_memory(path, valve, conditions))

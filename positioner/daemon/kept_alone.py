@@ -1,0 +1,32 @@
+"""What is kept of a valve over restarts is one daemon's: each of two would undo what the other wrote, unseen."""
+
+import os
+from contextlib import ExitStack
+from pathlib import Path
+
+from config.daemon_file import DaemonFile
+from config.errors import InputError
+from config.lock_file import locked
+from positioner.daemon.health.health_keeper import health_path
+from positioner.daemon.memory.memory_keeper import memory_path
+
+
+def keep_alone(file: DaemonFile, beside: Path, on_exit: ExitStack) -> None:
+    """Have the files of a valve's health and of what is known of it for this daemon alone, until the exit.
+
+    Args:
+        file: of the valve.
+        beside: what its folders are seen from.
+        on_exit: gives them free.
+
+    Raises:
+        InputError: another daemon has them, or a folder cannot be made.
+    """
+    kept = ((file.health.folder, health_path), (file.memory.folder, memory_path))
+    for path in (path_of(beside / folder, file.valve.name) for folder, path_of in kept if folder is not None):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            lock = locked(path.with_name(f"{path.name}.lock"), f"another daemon keeps {path.name} there")
+        except OSError as error:
+            raise InputError(str(path), f"cannot be kept there: {error.strerror}") from None
+        on_exit.callback(os.close, lock)
