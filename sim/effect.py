@@ -89,6 +89,8 @@ UPKEEP: Mapping[str, tuple[str, ...]] = {
 CUTS: Mapping[str, tuple[str, ...]] = {"straight": ("u", "h", *EVERYWHERE)}
 """What cuts a step, and the arguments it may name."""
 AT_STEM = ("force", "friction", "motion")
+MOST_MEMORY = 100_000
+"""State variables of one effect."""
 FINE_STEP_S = 2.5e-4
 """For a memory of which nothing is known."""
 log = logging.getLogger(__name__)
@@ -382,6 +384,7 @@ def _declared(path: Path, source: str) -> Effect:
         for argument in arguments:
             if argument not in allowed[name]:
                 raise InputError(str(path), f"{name}: unknown argument {argument}; allowed: {', '.join(allowed[name])}")
+    _check_memory(effect)
     _check_places(effect)
     _check_step(effect)
     _check_words(effect)
@@ -456,6 +459,13 @@ def _check_places(effect: Effect) -> None:
         raise InputError(str(effect.path), "start and advance belong with MEMORY = 1 or more: all three or none")
     if "straight" in effect.functions and "pressure" not in places:
         raise InputError(str(effect.path), f"straight belongs in the pressure path, got {', '.join(places)}")
+
+
+def _check_memory(effect: Effect) -> None:
+    if type(effect.memory) is not int or not 0 <= effect.memory <= MOST_MEMORY:
+        raise InputError(
+            str(effect.path), f"MEMORY: must be a whole number from 0 to {MOST_MEMORY}, got {effect.memory!r}"
+        )
 
 
 def _check_step(effect: Effect) -> None:

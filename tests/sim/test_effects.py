@@ -191,6 +191,9 @@ HEAD = "from typing import Annotated, NamedTuple\nfrom sim.effect import Paramet
         ("def force(speed): return speed", "force: unknown argument speed; allowed: t, x, v, p, q, z"),
         ("def sensor(y): return y\ndef force(x): return x", "sensor must be an effect's only place"),
         ("MEMORY = 1\ndef force(x): return x", "start and advance belong with MEMORY"),
+        ("MEMORY = -1\ndef force(x): return x", "MEMORY: must be a whole number from 0 to 100000, got -1"),
+        ("MEMORY = 'a'\ndef force(x): return x", "MEMORY: must be a whole number from 0 to 100000, got 'a'"),
+        ("MEMORY = 10**9\ndef force(x): return x", "MEMORY: must be a whole number from 0 to 100000, got 1000000000"),
         ("def force(x): return x\ndef straight(h): return h", "straight belongs in the pressure path, got force"),
         ("STEP_S = 0\ndef force(x): return x", "STEP_S: must be a time in seconds above 0.0, got 0"),
         (
