@@ -169,7 +169,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     by_law = NOTHING if law is None else law.inhibit_reason
     inhibit_reason = (
         excitation_inhibit
-        or (NOTHING if playing or excitation is None else excitation.waits_for(statics))
+        or (NOTHING if experiment.commands or excitation is None else excitation.waits_for(now.statics))
         or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
         or (by_law if limited_pa == asked_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
