@@ -65,6 +65,19 @@ def test_what_fails_in_an_effect_is_an_error(tmp_path: Path) -> None:
         valve.advance(150e3, 1.0)
 
 
+def test_an_effect_that_reaches_beyond_its_memory_is_an_error(tmp_path: Path) -> None:
+    """Unchecked it wrote over the memory of others, or ended the process."""
+    path = tmp_path / "own.py"
+    path.write_text(
+        "MEMORY = 1\n\n\ndef start(t, z):\n    z[0] = 0.0\n\n\ndef advance(x, z):\n    z[9] = x\n\n\n"
+        "def force(x, z):\n    return z[0]\n"
+    )
+    file = ValveFile(valve=SEED.valve, effect=(EffectTable.model_validate({"name": "own"}),))
+    valve = Valve(Composition.of(file, [read_effect(path)]))
+    with pytest.raises(InputError, match="raised an exception"):
+        valve.advance(150e3, 1.0)
+
+
 def test_an_effect_that_makes_arrays_runs_where_it_was_compiled_and_where_it_is_only_loaded(tmp_path: Path) -> None:
     breaks_loose_pa = 1.2 * SEED.valve.static_n / SEED.valve.diaphragm_area_m2
     path, composition = own(tmp_path, "return -np.array([1.0, x]).sum()")
