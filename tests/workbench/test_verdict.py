@@ -128,7 +128,8 @@ def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:
     assert (found.verdict, found.missing) == ("adequate", ())
     assert found.sentence == (
         "No effect is missing, but a parameter that was kept is off: with sensor_gain, the bare valve by another name, "
-        "the held-out error falls from 0.06 to 0.03 mm. Fit again with the mass free."
+        "the held-out error falls from 0.06 to 0.03 mm. "
+        "Put the mass_kg that plate, stem and plug weigh into the valve file, and diagnose again."
     )
 
 
@@ -139,8 +140,8 @@ def test_a_parameter_that_is_off_beside_what_is_missing_is_said(parts: Split) ->
     assert (found.verdict, found.missing) == ("missing", ("sensor_lag",))
     assert found.sentence == (
         "Missing: sensor_lag; the held-out error falls from 1 to 0.25 mm. But a parameter that was kept is off: with "
-        "sensor_gain, the bare valve by another name, the held-out error falls from 0.25 to 0.05 mm. Fit again with "
-        "the mass free."
+        "sensor_gain, the bare valve by another name, the held-out error falls from 0.25 to 0.05 mm. "
+        "Put the mass_kg that plate, stem and plug weigh into the valve file, and diagnose again."
     )
 
 

@@ -73,7 +73,8 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
     fell = reduction_sentence(best.errors, equivalent.model.errors, best.fit.kind.length)
     return (
         f"a parameter that was kept is off: with {equivalent.name}, the bare valve by another name, {fell}. "
-        f"Fit again with the mass free.{knife_edges_sentence(equivalent.model.errors, best.fit.kind.length)}"
+        "Put the mass_kg that plate, stem and plug weigh into the valve file, and diagnose again."
+        f"{knife_edges_sentence(equivalent.model.errors, best.fit.kind.length)}"
     )
 
 
