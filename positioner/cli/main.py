@@ -1,8 +1,7 @@
 """`positioner COMMAND ...`: finds the command, runs it, turns bad input into one line and an exit status.
 
-Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input; 130 and 141, as shells have it, when broken off
-by Ctrl-C and when nobody reads what is printed any more (`| head`). Where it cannot be
-printed, on a full disk, that is 2 too.
+Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input, or an output that cannot be written; 130 and
+141, as shells have it, when broken off by Ctrl-C and when nobody reads what is printed any more (`| head`).
 """
 
 import argparse

@@ -104,7 +104,9 @@ class Controller:
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
-        now = Now(self._memory, sample, requests, self._settings, self._identification, self._statics)
+        settings = self._settings
+        stem_m = sample.position_m if usable(sample, settings.limits) else None
+        now = Now(self._memory, sample, requests, settings, self._identification, self._statics, stem_m)
         self._memory, decision = step(now)
         return decision
 
@@ -118,11 +120,8 @@ class Now(NamedTuple):
     settings: Settings
     identification: Identification
     statics: StaticIdentification
-
-    @property
-    def stem_m(self) -> float | None:
-        """Measured position of the stem, m; None without a good measurement."""
-        return self.sample.position_m if usable(self.sample, self.settings.limits) else None
+    stem_m: float | None
+    """Measured position of the stem, m; None without a good measurement."""
 
 
 def step(now: Now) -> tuple[ControllerMemory, Decision]:

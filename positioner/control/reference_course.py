@@ -128,6 +128,7 @@ class ReferenceCourse:
         coming_m = COMING * self.change_m
         if self.trend * error_m < 0.0:
             return abs(error_m) <= coming_m
-        if self.trend != 0 and abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.rate_m_per_s:
-            return True
-        return self.trend != 0 and abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m
+        if self.trend == 0:
+            return False
+        costs_more = abs(error_m) ** 3 <= 1.5 * way_m**2 * away_s * self.rate_m_per_s
+        return costs_more or abs(error_m) + coming_m + abs(self.lead_m(now_s, way_m)) >= way_m

@@ -103,7 +103,8 @@ def knife_edges(
             for first, end in stretches
             if rms(other_m[first:end]) <= max(AT_MOST * floor_m, FELL * rms(error_m[first:end]))
         }
-        new, all_right = right.keys() - found, len(right) == len(stretches) or rms(other_m) <= AT_MOST * floor_m
+        new = right.keys() - found
+        all_right = len(right) == len(stretches) or rms(other_m) <= AT_MOST * floor_m
         if not (new or all_right):
             continue
         needs_leave = all_right or abs(change) > CHANGES[-1]
