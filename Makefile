@@ -9,8 +9,9 @@ READY  := $(VENV)/.ready
 venv: $(READY)
 
 $(READY): pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(PYTHON) -m venv --upgrade-deps $(VENV)
+	@# Modules are compiled when they are first imported: most of what comes with the packages never is.
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[dev]'
 	touch $(READY)
 
 demo: $(READY)          ## a sticking valve identified and controlled over Modbus, in under a minute

@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import at_work
-    from workbench.compare.comparison import as_json, compare
+    from workbench.compare.comparison import compare
 
     writable(arguments.json, "--json")
     writable(arguments.report, "--report")
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         compared = compare(recording, valve)
     print(f"{arguments.valve} against {arguments.recording}: {compared.summary()}")
     if arguments.json is not None:
-        write_json(arguments.json, as_json(compared))
+        write_json(arguments.json, compared)
     if arguments.report is not None:
         from workbench.report import Subject, report_comparison
 

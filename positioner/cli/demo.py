@@ -300,16 +300,12 @@ def _report(outcome: DemoOutcome) -> None:
 
 def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:
     return {
-        "steps": [asdict(step) for step in outcome.steps],
-        "identified": [_without_nan({**asdict(each), "deviation": each.deviation}) for each in outcome.identified],
+        "steps": outcome.steps,
+        "identified": [{**asdict(each), "deviation": each.deviation} for each in outcome.identified],
         "cycle": outcome.cycle,
         "problems": outcome.problems,
         "seconds": seconds,
     }
-
-
-def _without_nan(values: dict[str, object]) -> dict[str, object]:
-    return {name: None if value != value else value for name, value in values.items()}  # noqa: PLR0124 - NaN is not itself
 
 
 def _as_called() -> str:

@@ -55,7 +55,7 @@ def as_json(estimated: "RecordingEstimates") -> dict[str, object]:
         "breakaway_pa": _one(estimated.estimates.breakaway),
         "noise_std_m": found.noise_std_m,
         "residual_std_m": found.fit.residual_std_m if found.fit is not None else None,
-        "condition": _finite(found.condition),
+        "condition": found.condition,
         "pressure": found.pressure,
         "time_stamps_evened": found.evened,
         "motions": found.segments,
@@ -66,21 +66,15 @@ def as_json(estimated: "RecordingEstimates") -> dict[str, object]:
             "down_pa": _one(law.down),
             "offset_pa": _one(law.offset),
             "landings": law.landings,
-            "residual_m": _finite(law.residual_m),
+            "residual_m": law.residual_m,
         },
     }
 
 
 def _one(each: Any) -> dict[str, object]:
     return {
-        "value": _finite(each.value),
-        "std": _finite(each.std),
+        "value": each.value,
+        "std": each.std,
         "valid": each.valid,
         "reason": "" if each.valid else each.reason.text,
     }
-
-
-def _finite(value: float) -> float | None:
-    from math import isfinite
-
-    return value if isfinite(value) else None

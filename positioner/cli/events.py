@@ -78,11 +78,10 @@ def _found(history: "HistoryReader", arguments: argparse.Namespace, after_row: i
 
 def _as_json(entry: Any) -> str:
     import json
-    import math
-    from dataclasses import asdict
 
-    values = asdict(entry).items()
-    return json.dumps({key: None if isinstance(value, float) and math.isnan(value) else value for key, value in values})
+    from config.json_value import json_value
+
+    return json.dumps(json_value(entry))
 
 
 def _in_words(entry: Any) -> str:

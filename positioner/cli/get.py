@@ -18,8 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the values."""
     import json
-    import math
 
+    from config.json_value import json_value
     from config.registers import BY_NAME, register_named
 
     names = arguments.names or list(BY_NAME)
@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     with connected(arguments) as dcs:
         values = dcs.get_all(*names)
     if arguments.json:
-        print(json.dumps({name: value if math.isfinite(value) else None for name, value in values.items()}))
+        print(json.dumps(json_value(values)))
     elif len(values) == 1:
         print(f"{values[names[0]]:.9g}")
     else:

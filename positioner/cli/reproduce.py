@@ -216,10 +216,10 @@ def _jsonable(
     wrong: list["Erratum"], refusal: str, found: list["SeedFindings"], cells: list["Cell"], seconds: float
 ) -> dict[str, object]:
     return {
-        "errata": [asdict(each) for each in wrong],
+        "errata": wrong,
         "printed_static_friction_refused": refusal,
         "cases": [_case(each) for each in found],
-        "noise_table": [asdict(each) for each in cells],
+        "noise_table": cells,
         "seconds": seconds,
     }
 
@@ -228,10 +228,6 @@ def _case(each: "SeedFindings") -> dict[str, object]:
     return {
         **asdict(each),
         "solved": [{**asdict(one), "error": one.error} for one in each.solved],
-        "identified": [_without_nan({**asdict(one), "error": one.value / one.true - 1}) for one in each.identified],
+        "identified": [{**asdict(one), "error": one.value / one.true - 1} for one in each.identified],
         "claims": [{**asdict(claim), "holds": claim.holds} for claim in each.claims],
     }
-
-
-def _without_nan(values: dict[str, object]) -> dict[str, object]:
-    return {name: None if value != value else value for name, value in values.items()}  # noqa: PLR0124 - NaN is not itself

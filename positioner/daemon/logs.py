@@ -8,14 +8,15 @@ import json
 import logging
 import queue
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from logging.handlers import QueueHandler, QueueListener
-from math import isfinite
 from threading import Thread
 from typing import Any
+
+from config.json_value import json_value
 
 MOST_WAITING = 5_000
 """Records; of a standard error that nobody reads for longer, the rest is lost."""
@@ -57,18 +58,7 @@ class JsonLines(logging.Formatter):
         }
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
-        return json.dumps({name: _in_json(value) for name, value in line.items()}, default=str, allow_nan=False)
-
-
-def _in_json(value: object) -> object:
-    """Return a field as JSON has it, which knows no NaN: of what is no number there is nothing to say."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(name): _in_json(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_in_json(each) for each in value]
-    return value
+        return json.dumps(json_value(line), default=str, allow_nan=False)
 
 
 class _Unformatted(QueueHandler):

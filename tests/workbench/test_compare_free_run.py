@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
+from config.json_value import json_value
 from config.recording import Recording
 from config.valve_file import EffectTable
 from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, record_of, with_effect
 from workbench import compare
-from workbench.compare.comparison import as_json
 from workbench.data.record import ready
 from workbench.model.free_run import FINE, ROUGH, FreeRun
 
@@ -126,7 +126,7 @@ def test_a_stem_that_never_moves_is_no_proof() -> None:
 
 def test_everything_can_be_written_as_json() -> None:
     valve = drawn_valve(np.random.default_rng(0))
-    written = json.loads(json.dumps(as_json(compare(record_of(valve, 0), valve)), allow_nan=False))
+    written = json.loads(json.dumps(json_value(compare(record_of(valve, 0), valve)), allow_nan=False))
     assert len(written["residual_m"]) == 3000
     assert set(written["slips"]) == {"matched", "missed_s", "invented_s"}
     assert len(written["autocorrelation"]["value"]) == 26

@@ -7,7 +7,7 @@ from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, model_of
 from tests.workbench.valves import drawn_valve, record_of
 from workbench.blind.input_signal import excitation
 from workbench.select.diagnosis import diagnose
-from workbench.select.kept_mass import kept_mass, leaves_something
+from workbench.select.kept_mass import leaves_something
 
 LIGHT_KG = 1.4
 
@@ -25,9 +25,12 @@ def test_a_mass_that_hides_what_the_recording_shows_is_named() -> None:
     valve = drawn.model_copy(update={"valve": drawn.valve.model_copy(update=agile)})
     recording = record_of(valve, 5, command_pa=excitation(valve.valve, np.random.default_rng(5), 1000))
     heavy = valve.model_copy(update={"valve": valve.valve.model_copy(update={"mass_kg": 8.0})})
-    found = kept_mass(diagnose(recording, heavy, effects=("backlash",)))
+    diagnosis = diagnose(recording, heavy, effects=("backlash",))
+    found = diagnosis.kept_mass
     assert found is not None
+    assert not diagnosis.nothing_off
+    assert diagnosis.sentence.endswith(f" But {found.sentence}.")
     assert abs(found.fitted_kg - LIGHT_KG) < 0.3 * LIGHT_KG
     assert found.fitted_rmse_m < 0.5 * found.kept_rmse_m
     assert "the mass is kept at 8 kg; were it 1." in found.sentence
-    assert kept_mass(diagnose(recording, valve, effects=("backlash",))) is None
+    assert diagnose(recording, valve, effects=("backlash",)).kept_mass is None

@@ -6,8 +6,8 @@ floor is unknown nothing is called adequate.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -285,22 +285,6 @@ def _phase_table(found: Sequence[Phase], length: Scale) -> Table:
         if each.count
     ]
     return Table(("phase", "samples", f"rms {length.unit}", f"mean {length.unit}", "share"), rows)
-
-
-def as_json(value: Any) -> Any:
-    """Return a result as what JSON can say: arrays as lists, what is not a number as null.
-
-    A field whose key in JSON is another than its name says so in its metadata.
-    """
-    if is_dataclass(value) and not isinstance(value, type):
-        return {each.metadata.get("json", each.name): as_json(getattr(value, each.name)) for each in fields(value)}
-    if isinstance(value, np.ndarray):
-        return [as_json(each) for each in value.tolist()]
-    if isinstance(value, tuple | list):
-        return [as_json(each) for each in value]
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return value
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,10 +29,11 @@ from workbench.select.equivalence import undetectable, unseen_without_spring
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
 from workbench.select.judged_landings import judged_landings
+from workbench.select.kept_mass import KeptMass, kept_mass
 from workbench.select.moved_parameters import Moved, moved_parameters
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
-from workbench.select.verdict import EXPLAINED, Verdict, verdict
+from workbench.select.verdict import EXPLAINED, Verdict, by_another_name, verdict
 from workbench.select.verdict_sentence import verdict_line, verdict_sentence
 
 if TYPE_CHECKING:
@@ -56,11 +57,19 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Of a recording of set point and travel: what holds the stem."""
     moved: tuple[Moved, ...] = ()
     """Parameters of the file's own effects that the recording wants elsewhere."""
+    kept_mass: KeptMass | None = None
+    """Another mass than the file's, beside which less is left."""
 
     @property
     def kind(self) -> Kind:
         """Whose it is: its names and units."""
         return self.best.fit.kind
+
+    @property
+    def nothing_off(self) -> bool:
+        """Whether the valve file holds as it is: no effect is missing, and nothing in it is off."""
+        off = self.moved or self.kept_mass or by_another_name(self.steps)
+        return self.verdict == "adequate" and not off
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -210,8 +219,9 @@ def diagnose(
             landed = judged_landings(best.fit, parts)
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
             chosen = search.experiment(steps) if found == "one_of" else None
+            mass = kept_mass(best, parts, seed=seed, workers=threads, progress=tell)
         except (BrokenOff, KeyboardInterrupt):
-            steps, found, chosen = search.so_far(base), "unfinished", None
+            steps, found, chosen, mass = search.so_far(base), "unfinished", None, None
             base, best = steps[0].before, _last(steps)
     own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
     moved = moved_parameters(valve, best.fit, library | own) if found in EXPLAINED else ()
@@ -224,10 +234,12 @@ def diagnose(
         experiment=chosen,
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts)
-        + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved),
+        + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
+        + (f" But {mass.sentence}." if mass else ""),
         unseen=unseen,
         positioner=held,
         moved=moved,
+        kept_mass=mass,
     )
 
 

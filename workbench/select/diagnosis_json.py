@@ -4,7 +4,6 @@
 more than a factor of 2 in it, so it never exceeds 0.5.
 """
 
-from math import isfinite
 from typing import Any
 
 from workbench.fit.fit_result import Fit
@@ -32,12 +31,19 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
                 "name": each.name,
                 "before": each.before,
                 "value": each.fitted.value,
-                "lower": _finite(each.fitted.lower),
-                "upper": _finite(each.fitted.upper),
+                "lower": each.fitted.lower,
+                "upper": each.fitted.upper,
                 "like": list(each.like),
             }
             for each in diagnosis.moved
         ],
+        "kept_mass": diagnosis.kept_mass
+        and {
+            "kept_kg": diagnosis.kept_mass.kept_kg,
+            "fitted_kg": diagnosis.kept_mass.fitted_kg,
+            "kept_test_rmse_m": diagnosis.kept_mass.kept_rmse_m,
+            "fitted_test_rmse_m": diagnosis.kept_mass.fitted_rmse_m,
+        },
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,
@@ -72,17 +78,11 @@ def _errors(model: EvaluatedModel) -> dict[str, float]:
 
 
 def parameters_json(fit: Fit) -> dict[str, dict[str, float | bool | None]]:
-    """Return what was fitted; a bound that the recording leaves open is null."""
+    """Return what was fitted; a bound that the recording leaves open is not finite: null, once it is written."""
     return {
-        name: {key: _finite(getattr(each, key)) for key in ("value", "std", "lower", "upper")}
-        | {"physical": each.physical}
+        name: {key: getattr(each, key) for key in ("value", "std", "lower", "upper", "physical")}
         for name, each in fit.parameters.items()
     }
-
-
-def _finite(value: float) -> float | None:
-    """JSON has no infinity."""
-    return value if isfinite(value) else None
 
 
 def _candidate(candidate: EffectCandidate) -> dict[str, Any]:

@@ -175,7 +175,7 @@ class Discrimination(Result):
             "named": list(self.named),
             "rivals": [list(each) for each in self.rivals],
             "lost": list(self.lost),
-            "odds": self.odds if self.odds < inf else None,
+            "odds": self.odds,
             "moves": self.moves,
             "problem": self.problem,
             "rounds": [

@@ -10,9 +10,9 @@ from functools import partial
 
 from config.drive import Scale
 from config.results.result import Brief
+from workbench.data.held_out import Split
 from workbench.fit.fitting import fit
 from workbench.select.block_errors import NOISE_KNOWN_TO
-from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
 from workbench.select.effect_search import Progress, evaluated
@@ -44,20 +44,18 @@ class KeptMass(Brief):
         )
 
 
-def kept_mass(
-    diagnosis: Diagnosis, *, seed: int = 0, workers: int | None = None, progress: Progress | None = None
-) -> KeptMass | None:
+def kept_mass(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress) -> KeptMass | None:
     """Return which mass leaves less than the valve file's; None where none does, or nothing is left of the record.
 
     Nor is it asked where samples lie farther apart than slides last: there no mass shows.
 
     Args:
-        diagnosis: what was found with the mass as it is.
+        best: what was found with the mass as it is.
+        parts: of the record, fitted and held out.
         seed: of the fits' draws.
-        workers: threads, by default one a core.
+        workers: threads.
         progress: called with what is under way, and the fraction done.
     """
-    best, recording = diagnosis.best, diagnosis.split.train.recording
     before = best.fit
     if not leaves_something(best) or before.by.slow or MASS in before.parameters:
         return None
@@ -68,16 +66,16 @@ def kept_mass(
         valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
         begin = before.valve.model_copy(update={"valve": valve})
         found = fit(
-            recording,
+            parts.train.recording,
             begin,
             free=free,
             seed=seed,
             workers=workers,
             from_pressure=before.from_pressure,
             profile=False,
-            progress=partial(_tell, progress, number) if progress else None,
+            progress=partial(_tell, progress, number),
         )
-        models.append(evaluated(found, diagnosis.split))
+        models.append(evaluated(found, parts))
     model = min(models, key=lambda each: each.fit.cost)
     if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.at_floor):
         return None

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from config.errors import InputError
+from config.json_value import json_value
 
 OPTIONS: Mapping[str, str] = {"out": "-o", "json": "--json", "report": "--report", "picture": "--picture"}
 """By which files are written, by their names among a command's arguments."""
@@ -70,13 +71,13 @@ def writable(path: Path | None, option: str) -> None:
         raise _unwritable(option, path, OSError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
-def write_json(path: Path, values: Mapping[str, object], indent: int | None = None) -> None:
-    """Write an object without NaN, on one line unless it is indented.
+def write_json(path: Path, values: object, indent: int | None = None) -> None:
+    """Write a result, on one line unless it is indented; null for what is no finite number.
 
     Raises:
         InputError: it cannot be written.
     """
-    write_text(path, json.dumps(values, indent=indent, allow_nan=False) + "\n", "--json")
+    write_text(path, json.dumps(json_value(values), indent=indent, allow_nan=False) + "\n", "--json")
 
 
 def write_text(path: Path, text: str, option: str) -> None:
