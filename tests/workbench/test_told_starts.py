@@ -4,6 +4,8 @@ A random staircase, of which most slips are wide: an asymmetry that is off by a 
 one does while static friction is off.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -57,6 +59,17 @@ def small_moves(true: ValveFile, seed: int, count: int = 500) -> Recording:
     return answered(true, 50e3 + 25e3 * np.sin(np.cumsum(steps_pa) / 25e3), generator)
 
 
+def slow_ramps(true: ValveFile, seed: int, count: int = 500) -> Recording:
+    """Stick-slip to and fro: no landing under a command that stays, and slips by the hundred that hang together."""
+    generator = np.random.default_rng(seed)
+    ways = np.where(np.arange(count // 20) % 2, 1.0, -1.0)
+    rates_pa = np.repeat(generator.uniform(500.0, 3000.0, ways.size) * ways, 20)
+    command_pa = np.full(count, 42e3)
+    for k in range(1, count):
+        command_pa[k] = np.clip(command_pa[k - 1] + rates_pa[k], 8e3, 80e3)
+    return answered(true, command_pa, generator)
+
+
 def answered(true: ValveFile, command_pa: Column, generator: np.random.Generator) -> Recording:
     count = command_pa.size
     composition = Composition.from_file(true)
@@ -74,11 +87,18 @@ def test_the_true_effects_search_reaches_the_floor(seed: int) -> None:
     assert found.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(ASYMMETRY, abs=0.02)
 
 
-def test_what_lands_alike_is_told_by_where_the_stem_breaks_loose() -> None:
+@pytest.mark.parametrize(
+    ("record", "seed", "was"),
+    [(small_moves, 51, "0.075 mm"), pytest.param(slow_ramps, 5, "0.31 mm", marks=pytest.mark.long)],
+)
+def test_what_lands_alike_is_told_by_where_the_stem_breaks_loose(
+    record: Callable[[ValveFile, int], Recording], seed: int, was: str
+) -> None:
     """The preload of the file makes up for any asymmetry at rest: a valley of as good landings, which is gone along."""
     known = ValveFile(valve=KNOWN.valve, effect=(PRELOAD,))
     true = ValveFile(valve=TRULY, effect=(PRELOAD, LOPSIDED))
-    found = fit(small_moves(true, 51), known, effects=("asymmetric_friction",), profile=False)
-    assert found.rms_m < 1.15 * NOISE_M, "0.075 mm where searches begin at the declared strengths alone"
-    assert found.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(ASYMMETRY, abs=0.02)
-    assert found.parameters["preload.force_n"].value == pytest.approx(PRELOAD.parameters["force_n"], abs=5.0)
+    found = fit(record(true, seed), known, effects=("asymmetric_friction",), profile=False)
+    assert found.rms_m < 1.15 * NOISE_M, f"{was} by fewer landings, or where the valley is not gone along"
+    # Break-aways differ by 20 N for all of the asymmetry, and the command goes in steps of more.
+    assert found.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(ASYMMETRY, abs=0.035)
+    assert found.parameters["preload.force_n"].value == pytest.approx(PRELOAD.parameters["force_n"], abs=10.0)

@@ -84,6 +84,8 @@ def test_a_plateau_knows_where_its_slide_came_from() -> None:
         (0, 4, 0), (4, 7, 1), (7, 10, -1), (11, 16, -1)
     ]  # fmt: skip
     assert not plateaus(np.linspace(0.0, 1.0, 300), 1e-3), "it creeps"
+    cut = np.array([0.0, 1e-3, 0.0, -3e-3, 3e-3, 0.0, 1e-3, 0.0])
+    assert [each[:2] for each in plateaus(cut, 1e-3)] == [(0, 8)], "two samples of noise make no slide"
 
 
 def test_a_landing_under_a_moving_pressure_is_not_settled() -> None:

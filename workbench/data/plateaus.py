@@ -1,8 +1,8 @@
 """Where the stem rests in a record of few samples a move: plateaus of three samples and more.
 
 Neighbours belong together while they differ by less than 5 sigma; a stretch of at least three is a plateau, unless its
-halves differ, as those of a stem that creeps do. How the stem came to it says the last sample before that was
-elsewhere, in motion or on the plateau before.
+halves differ, as those of a stem that creeps do. What noise alone cuts in two is one. How the stem came to it says the
+last sample before that was elsewhere, in motion or on the plateau before.
 """
 
 from typing import NamedTuple
@@ -38,10 +38,17 @@ def plateaus(position_m: Column, noise_m: float, offset: int = 0) -> tuple[Plate
     still = np.abs(np.diff(x)) <= within_m
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
     found: list[Plateau] = []
+    begins = 0
     for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         end = last + 1
         if end - first < FEWEST or _creeps(x[first:end], noise_m):
             continue
+        if found and found[-1].end == offset + rows[first - 1] + 1 and not _creeps(x[begins:end], noise_m):
+            # Noise has cut one rest in two.
+            whole = found.pop()
+            found.append(whole._replace(end=offset + int(rows[end - 1]) + 1, position_m=float(np.mean(x[begins:end]))))
+            continue
+        begins = first
         middle_m = float(np.mean(x[first:end]))
         direction = 0
         if first:

@@ -16,6 +16,7 @@ measurement.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,8 @@ ABOUT = np.geomspace(4e-3, 0.4, 7)
 """Distances, of a log-parameter, in which what the landings do not hold is scanned about the grid,"""
 ALTERNATIONS = 2
 """so many times in turn."""
+VALLEY = 0.25
+"""Step, of a log-parameter, along solutions that land alike."""
 PLAY = "backlash.width_m"
 NARROWEST, WIDEST, PLAYS = 6e-3, 0.9, 5
 """Of the dead band 2 F_c / k_s, beyond which a play leaves no friction; widths in each of three bands."""
@@ -237,7 +240,7 @@ def told_starts(
     ]
     if broken_loose:
         least_z = error.least(broken_loose, MIDDLE)
-        broken_loose += [_along(error, run, least_z, each) for each in _not_told(best, added)]
+        broken_loose += [_along(error, run, least_z, each, best) for each in _not_told(best, added)]
     return [Place(z, "landings") for z in _apart(error, broken_loose, count)]
 
 
@@ -251,24 +254,33 @@ def _not_told(as_good: Sequence[Vector], added: Sequence[Parameter]) -> list[Par
     return [each for each in added if float(np.ptp([each.coordinate(theta) for theta in as_good])) > ABOUT[-1]]
 
 
-def _along(error: SimulationError, run: FreeRun, z: Vector, open_parameter: Parameter) -> Vector:
+def _along(
+    error: SimulationError, run: FreeRun, z: Vector, open_parameter: Parameter, as_good: Sequence[Vector]
+) -> Vector:
     """Return z with what the landings leave open moved to where the simulation comes closest, the landings kept.
 
-    A preload and an asymmetry that make up for each other land alike, and break loose elsewhere.
+    A preload and an asymmetry that make up for each other land alike, and break loose elsewhere: the valley between the
+    solutions that land as well is gone along from end to end, then about the best place found.
     """
     i = error.parameters.index(open_parameter)
     kept = tuple(each for each in error.parameters if each.index not in (STATIC, open_parameter.index))
 
-    def landed(distance: float) -> Vector:
-        there = z.copy()
-        there[i] = np.clip(z[i] + distance, error.lower[i], error.upper[i])
+    def landed(near: Vector, coordinate: float) -> Vector:
+        there = near.copy()
+        there[i] = np.clip(coordinate, error.lower[i], error.upper[i])
         theta = error.theta(there)
         landing = SimulationError(run, error.composition, kept, theta)
         return error.coordinates(landing.theta(descended(landing, landing.coordinates(theta), MIDDLING)))
 
+    def least(valley: Iterable[Vector]) -> Vector:
+        return error.least([z, *(_breaking_loose(error, each) for each in valley)], MIDDLE)
+
+    ends = sorted(open_parameter.coordinate(theta) for theta in as_good)
+    ahead, back = np.arange(z[i], ends[-1] + VALLEY, VALLEY), np.arange(z[i], ends[0] - VALLEY, -VALLEY)
+    z = least(there for way in (ahead, back) for there in accumulate(way[1:], landed, initial=z))
     for _ in range(ALTERNATIONS):
         before = z
-        z = _breaking_loose(error, error.least([z, *(landed(each) for each in (*ABOUT, *-ABOUT))], MIDDLE))
+        z = least(landed(before, before[i] + distance) for distance in (*ABOUT, *-ABOUT))
         if np.array_equal(z, before):
             break
     return z

@@ -102,7 +102,7 @@ def slow_segments(
     step_s, gain = _longest_s(record, composition), _gain_of(composition)
     told, judged = np.full(len(record), told_nothing(composition)), np.ones(len(record), np.bool_)
     if by.motion is Motion.LANDINGS:
-        told, judged = _told(record, by.valve or composition.valve)
+        told, judged = _told(record, by.valve or composition.valve, by.held and by.sure)
     found = []
     for (first, end), lead in zip(record.segments, leads, strict=True):
         keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
@@ -156,10 +156,10 @@ def _longest_s(record: Record, composition: Composition) -> float:
     return record.period_s / CASCADE if remembering > 1 else inf
 
 
-def _told(record: Record, valve: ValveParameters) -> tuple[Column, Mask]:
+def _told(record: Record, valve: ValveParameters, held: bool) -> tuple[Column, Mask]:
     """Return the direction in which the stem went in the sample before each row, and which rows are judged, (n,)."""
     told, judged = np.zeros(len(record)), np.zeros(len(record), np.bool_)
     for plateau, settled in landings(record, valve):
         told[plateau.first] = plateau.direction
-        judged[plateau.first : min(plateau.end, plateau.first + JUDGED)] = settled
+        judged[plateau.first : min(plateau.end, plateau.first + JUDGED)] = held or settled
     return told, judged

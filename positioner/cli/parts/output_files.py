@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from config.errors import InputError
-from config.json_value import json_value
 
 OPTIONS: Mapping[str, str] = {"out": "-o", "json": "--json", "report": "--report", "picture": "--picture"}
 """By which files are written, by their names among a command's arguments."""
@@ -77,6 +76,8 @@ def write_json(path: Path, values: object, indent: int | None = None) -> None:
     Raises:
         InputError: it cannot be written.
     """
+    from config.json_value import json_value
+
     write_text(path, json.dumps(json_value(values), indent=indent, allow_nan=False) + "\n", "--json")
 
 
