@@ -118,7 +118,7 @@ def test_the_proposal_reads_it(name: str, tmp_path: Path) -> None:
 
 
 @each_file
-@pytest.mark.parametrize("kept", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("kept", [0.5, *(pytest.param(each, marks=pytest.mark.long) for each in (0.1, 0.9))])
 def test_a_torn_file_is_one_line_or_what_is_left_of_it(name: str, kept: float, tmp_path: Path) -> None:
     write, words = FILES[name]
     write(tmp_path / name)

@@ -87,6 +87,7 @@ def test_from_start_through_identification_to_good() -> None:
     assert panel.get("friction_ratio") == 1.0
 
 
+@pytest.mark.long
 def test_noise_at_rest_wears_nothing_for_a_minute() -> None:
     panel = Panel(LAW)
     panel.set("mode", Mode.AUTOMATIC)
