@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 HELP = "diagnose, then play experiments on the valve until the rivals are told apart (moves it: state S3)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
 
+EXPERIMENT = "experiment-{}.csv"
 BROKEN_OFF = "nothing is named; what was played is in"
 WINDOW_MARGIN = 0.03
 """Of the stroke: a design keeps so far inside the travel window, as it knows the stem by its models only."""
@@ -86,6 +87,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     write_json(arguments.out / "verdict.json", told.as_json(), indent=1)
     print(told.summary())
+    if told.outcome == "budget_spent":
+        print(f"to play on: the same command with {arguments.out}/{EXPERIMENT.format('*')} among --rec")
     return 0 if told.outcome in ("resolved", "one_class") else 1
 
 
@@ -124,13 +127,17 @@ def _tell(each: "Round") -> None:
 
 
 def _kept(player: "Player", folder: Path) -> "Player":
-    """Return it so that each recording is written before anything is made of it, whatever becomes of the rest."""
-    numbers = count(1)
+    """Return it so that each recording is written before anything is made of it, whatever becomes of the rest.
+
+    Beside those of an earlier run, which no valve plays again.
+    """
+    files = (folder / EXPERIMENT.format(number) for number in count(1))
+    free = (file for file in files if not file.exists())
 
     def play(chosen: "DesignedExperiment") -> "Played":
         played = player(chosen)
         if played.recording is not None:
-            played.recording.write(folder / f"experiment-{next(numbers)}.csv")
+            played.recording.write(next(free))
         return played
 
     return play

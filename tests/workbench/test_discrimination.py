@@ -310,6 +310,10 @@ def test_broken_off_it_says_that_nothing_is_named_and_keeps_what_was_played(
     kept = Recording.read(told / "experiment-1.csv")
     assert kept.time_s[-1] == pytest.approx(COURSE.duration_s, abs=3.0)
     assert not (told / "verdict.json").exists()
+    first = (told / "experiment-1.csv").read_bytes()
+    assert main(words) == 130
+    assert (told / "experiment-1.csv").read_bytes() == first, "no valve plays it again"
+    assert (told / "experiment-2.csv").exists()
 
 
 def test_a_time_limit_that_leaves_no_room_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
