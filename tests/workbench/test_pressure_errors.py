@@ -25,14 +25,23 @@ SPAN, ZERO_PA, NOISE_PA = 1.02, 900.0, 200.0
 """Of the pressure transmitter."""
 
 
-def recorded(valve: ValveFile, *, measured: bool = True) -> Recording:
+def with_play(command_pa: Column, width_pa: float) -> Column:
+    """Return what an I/P makes of a command that it follows only out of a dead band, Pa, (n,)."""
+    followed_pa = np.empty_like(command_pa)
+    now_pa = command_pa[0]
+    for k, each in enumerate(command_pa):
+        now_pa = followed_pa[k] = np.clip(now_pa, each - 0.5 * width_pa, each + 0.5 * width_pa)
+    return followed_pa
+
+
+def recorded(valve: ValveFile, *, measured: bool = True, hysteresis_pa: float = 0.0) -> Recording:
     generator = np.random.default_rng(3)
     composition = Composition.from_file(valve)
     begin_m = float(COMMAND_PA[0]) * BARE.valve.diaphragm_area_m2 / BARE.valve.spring_n_per_m
     answer = respond(
         composition,
         composition.theta,
-        COMMAND_PA[:-1],
+        with_play(COMMAND_PA, hysteresis_pa)[:-1],
         PERIOD_S,
         position_m=begin_m,
         pressure_pa=float(COMMAND_PA[0]),
@@ -88,3 +97,23 @@ def test_a_pressure_that_is_as_far_off_by_chance_tells_nothing() -> None:
     assert step.added.name == "end_stop"
     assert {each.name for each in step.indistinguishable} == {"supply_limit", "end_stop"}
     assert step.contradicted == ()
+
+
+def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
+    """A hysteresis of the I/P is friction by another name, if not for the measured pressure."""
+    found = diagnose(recorded(BARE, hysteresis_pa=8e3), BARE, effects=("supply_limit",), workers=1)
+    truly_n = BARE.valve.coulomb_n
+    assert found.best.fit.parameters["coulomb_n"].value > 1.1 * truly_n
+    assert found.by_pressure is not None
+    after_n = {name: after for name, _, after in found.by_pressure.others}["coulomb_n"]
+    assert after_n == pytest.approx(truly_n, rel=0.05), "of a transmitter that shows 2 % too much, and noise"
+    assert "But the measured pressure is not the model's" in found.sentence
+    assert "coulomb_n" in found.sentence
+    assert not found.nothing_off
+
+
+def test_a_pressure_that_is_the_models_but_for_the_noise_is_not_spoken_of() -> None:
+    assert NOISE_PA * BARE.valve.diaphragm_area_m2 > 0.01 * BARE.valve.coulomb_n
+    found = diagnose(recorded(BARE), BARE, effects=("supply_limit",), workers=1)
+    assert found.by_pressure is None
+    assert found.nothing_off

@@ -13,6 +13,7 @@ Its files:
     equivalence                                   what no recording tells apart
     moved_parameters                              what the file's own effects are by the recording
     kept_mass                                     what another mass than the valve file's would leave
+    measured_pressure                             what the stem is from the measured pressure on
     positioner_or_packing                         what holds a stem behind its positioner
     tangent_preview                               the quick first ranking
     experiment, experiment_design                 the input that tells rivals apart: off a menu, or designed

@@ -30,6 +30,7 @@ from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
 from workbench.select.judged_landings import judged_landings
 from workbench.select.kept_mass import KeptMass, kept_mass
+from workbench.select.measured_pressure import ByMeasuredPressure, by_measured_pressure
 from workbench.select.moved_parameters import Moved, moved_parameters
 from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
@@ -59,6 +60,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Parameters of the file's own effects that the recording wants elsewhere."""
     kept_mass: KeptMass | None = None
     """Another mass than the file's, beside which less is left."""
+    by_pressure: ByMeasuredPressure | None = None
+    """What the best model is from the measured pressure on, where its own is another."""
 
     @property
     def kind(self) -> Kind:
@@ -68,7 +71,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     @property
     def nothing_off(self) -> bool:
         """Whether the valve file holds as it is: no effect is missing, and nothing in it is off."""
-        off = self.moved or self.kept_mass or by_another_name(self.steps)
+        off = self.moved or self.kept_mass or self.by_pressure or by_another_name(self.steps)
         return self.verdict == "adequate" and not off
 
     @property
@@ -220,8 +223,9 @@ def diagnose(
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
             chosen = search.experiment(steps) if found == "one_of" else None
             mass = kept_mass(best, parts, seed=seed, workers=threads, progress=tell)
+            pressed = by_measured_pressure(best, parts, seed=seed, workers=threads, progress=tell)
         except (BrokenOff, KeyboardInterrupt):
-            steps, found, chosen, mass = search.so_far(base), "unfinished", None, None
+            steps, found, chosen, mass, pressed = search.so_far(base), "unfinished", None, None, None
             base, best = steps[0].before, _last(steps)
     own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
     moved = moved_parameters(valve, best.fit, library | own) if found in EXPLAINED else ()
@@ -235,11 +239,13 @@ def diagnose(
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts)
         + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
-        + (f" But {mass.sentence}." if mass else ""),
+        + (f" But {mass.sentence}." if mass else "")
+        + (f" But {pressed.sentence(best.fit.kind)}." if pressed else ""),
         unseen=unseen,
         positioner=held,
         moved=moved,
         kept_mass=mass,
+        by_pressure=pressed,
     )
 
 

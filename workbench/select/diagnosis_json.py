@@ -44,6 +44,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
             "kept_test_rmse_m": diagnosis.kept_mass.kept_rmse_m,
             "fitted_test_rmse_m": diagnosis.kept_mass.fitted_rmse_m,
         },
+        "by_pressure": diagnosis.by_pressure
+        and {"off_pa": diagnosis.by_pressure.off_pa, **_model(diagnosis.by_pressure.model)},
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,

@@ -18,6 +18,8 @@ from workbench.data.held_out import Part, Split
 from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import block_logs, block_s, indistinguishable
 
+NEXT = 5
+"""Samples over which what is no noise of the transmitter goes on."""
 NEGLIGIBLE = 1e-3
 """Of the standard deviation of the measured pressure: what an error below it is does not matter."""
 
@@ -29,6 +31,8 @@ class PressureErrors(Brief):
     rms_pa: float
     logs: Column
     """l_b of the fitted and the held-out blocks, (blocks,)."""
+    structured_pa: float = 0.0
+    """Of it what goes on from sample to sample, rms: it is no noise."""
 
     def speaks_against(self, other: "PressureErrors") -> bool:
         """Whether another's pressure is off by more than this one's, and not by chance."""
@@ -46,7 +50,14 @@ def pressure_errors(fit: Fit, split: Split) -> PressureErrors | None:
         block_logs(part.record.time_s, error_pa, scale_pa, block_s(part))
         for part, error_pa in zip(parts, errors_pa, strict=True)
     ]
-    return PressureErrors(float(np.sqrt(np.nanmean(np.concatenate(errors_pa) ** 2))), np.concatenate(logs))
+    rms_pa, structured_pa = np.sqrt(np.mean([_powers(each) for each in errors_pa], axis=0)).tolist()
+    return PressureErrors(rms_pa, np.concatenate(logs), structured_pa)
+
+
+def _powers(error_pa: Column) -> tuple[float, float]:
+    """Return the mean square of an error, Pa^2, (n,), and how much of it goes on over the next samples."""
+    goes_on = [float(np.nanmean(error_pa[k:] * error_pa[:-k])) for k in range(1, NEXT + 1)]
+    return float(np.nanmean(error_pa**2)), max(float(np.mean(goes_on)), 0.0)
 
 
 def _measured_pa(part: Part) -> Column:

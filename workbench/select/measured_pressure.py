@@ -1,0 +1,82 @@
+"""What the stem is by the measured pressure, where the model's pressure is another.
+
+A hysteresis of the I/P, a supply that sags or a noise of its own stands in for friction and spring: the position fits,
+and the packing is called what it is not. Where the actuator's pressure was measured, that shows: the best model is
+fitted once more from the measured pressure on, without the pressure path, and what is another then is said.
+
+    A e_rms > 3 % of F_c      e as `pressure_errors` has it, without the transmitter's noise
+"""
+
+from dataclasses import dataclass
+
+from config.drive import Kind
+from config.results.result import Brief
+from workbench.data.held_out import Split
+from workbench.fit.fitting import fit
+from workbench.select.effect_candidates import EvaluatedModel
+from workbench.select.effect_search import Progress, evaluated
+
+MATTERS = 0.03
+"""Of the friction."""
+ANOTHER = 0.02
+"""Relative difference from which a parameter is another."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ByMeasuredPressure(Brief):
+    """A model whose pressure is off the measured one, and what it is from that one on."""
+
+    off_pa: float
+    of_friction: float
+    """What that is on the diaphragm, of F_c."""
+    model: EvaluatedModel
+    """From the measured pressure on."""
+    others: tuple[tuple[str, float, float], ...]
+    """Parameters that are others: name, from the command on, from the measured pressure on."""
+
+    def sentence(self, kind: Kind) -> str:
+        """Say so."""
+        read, word = kind.command.read, kind.command.word
+        others = "".join(f", {name} {after:.4g}, not {before:.4g}" for name, before, after in self.others)
+        error = kind.length.said(self.model.errors.test_rmse_m)
+        return kind.text(
+            f"the measured {word} is not the model's: they differ by {read.said(self.off_pa)} rms, "
+            f"{self.of_friction:.0%} of the friction; from the measured one on the held-out error is {error}{others}"
+        )
+
+
+def by_measured_pressure(
+    best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress
+) -> ByMeasuredPressure | None:
+    """Return what the best model is from the measured pressure on; None where its own pressure is that one.
+
+    Nor is it asked behind a positioner, whose set point is no pressure (`positioner_or_packing`).
+
+    Args:
+        best: what was found from the command on.
+        parts: of the record, fitted and held out.
+        seed: of the fit's draws.
+        workers: threads.
+        progress: called with what is under way, and the fraction done.
+    """
+    if best.pressure is None or parts.train.record.by_setpoint:
+        return None
+    valve, off_pa = best.fit.valve.valve, best.pressure.structured_pa
+    of_friction = valve.diaphragm_area_m2 * off_pa / valve.coulomb_n if valve.coulomb_n else 0.0
+    if of_friction <= MATTERS:
+        return None
+    found = fit(
+        parts.train.recording,
+        best.fit.valve,
+        seed=seed,
+        workers=workers,
+        from_pressure=True,
+        profile=False,
+        progress=lambda done: progress("fitting from the measured pressure", done),
+    )
+    others = tuple(
+        (name, before.value, after.value)
+        for name, after in found.parameters.items()
+        if (before := best.fit.parameters.get(name)) and abs(after.value - before.value) > ANOTHER * abs(before.value)
+    )
+    return ByMeasuredPressure(off_pa, of_friction, evaluated(found, parts), others)
