@@ -158,6 +158,11 @@ class CanopenDevice(CanBus, Device):
         return told_s if self.master_node is None else min(told_s, self.master_timeout_s)
 
     @property
+    def acts_alone_by(self) -> ActionName | None:
+        """The action that it is told, if it can be told one."""
+        return self.communication_action if self.map.communication_action else None
+
+    @property
     def master_timeout_s(self) -> float:
         """Silence of this master after which the node acts by itself, if it watches it."""
         return self.heartbeats_missed * self.master_heartbeat_s

@@ -64,6 +64,11 @@ class Device(Schema):
         return math.inf
 
     @property
+    def acts_alone_by(self) -> ActionName | None:
+        """What it is told to do then; None where it cannot be told."""
+        return None
+
+    @property
     def command_step_pa(self) -> float:
         """The least difference of two commands that the device is told; 0 where it is told any."""
         return 0.0
@@ -103,6 +108,11 @@ class ModbusDevice(Device):
     def acts_alone_after_s(self) -> float:
         """The time-out that it is told, if it can be told one."""
         return self.communication_timeout_s or math.inf if self.map.communication_timeout_s else math.inf
+
+    @property
+    def acts_alone_by(self) -> ActionName | None:
+        """The action that it is told, if it can be told one."""
+        return self.communication_action if self.map.communication_action else None
 
     @property
     def command_step_pa(self) -> float:

@@ -2,7 +2,8 @@
 
 `open` asks by SDO who the node is, what it holds and how it is configured (communication time-out, heartbeat, SYNC, PDO
 mapping), which changes nothing. What is not as wanted it sets in PRE-OPERATIONAL; where the node refuses, all is put
-back. Then it makes the node ACTIVE and starts it by NMT (CiA 301, 7.3.2). One cycle is then
+back. Then it makes the node ACTIVE and starts it by NMT (CiA 301, 7.3.2). A node that does not obey its set point is
+given what it does in its place before, for ACTIVE it would go to what was commanded last. One cycle is then
 
     RPDO (command, control word), SYNC  ->  TPDOs (position, pressure, counter, time, status, status word)
 
@@ -30,6 +31,7 @@ from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.readings import capabilities_of, reading_of
 from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, Setting, device_sheet
 from drivers.canopen.watcher import NodeWatcher
+from fieldbus.canopen.objects import HOLDING, STATE_BITS, inactive_because
 
 START, ENTER_PRE_OPERATIONAL = 1, 128
 OPERATIONAL = bytes((5,))
@@ -72,7 +74,7 @@ class CanopenDriver:
         return replace(capabilities, sample_counter=capabilities.sample_counter or self._pdos.come_by_themselves)
 
     def open(self) -> float:
-        """Configure and start the node; return the command it holds, in Pa. Moves nothing.
+        """Configure and start the node; return the command in force in it, in Pa. Moves nothing.
 
         Raises:
             DriverError: not there, not the one of the data sheet, or it refused; the bus is left.
@@ -82,12 +84,13 @@ class CanopenDriver:
             own_ids = tuple(first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
             self._bus.open(own_ids)
             self._sdo.open()
-            held_pa = self._sdo.held_command_pa(self._config.map.command_pa)
+            set_point_pa = self._sdo.held_command_pa(self._config.map.command_pa)
+            held_pa = self._in_force_pa(set_point_pa)
             wanted = self._configuration.wanted()
             self._say_alive()
             self._bus.hear((*own_ids, *self._pdos.tpdo_ids))
             self._sdo.require_alone()
-            self._set(wanted)
+            self._set(wanted, None if held_pa == set_point_pa else held_pa)
             self._manage(START)
         except BaseException:
             self.close()
@@ -151,8 +154,30 @@ class CanopenDriver:
     def _manage(self, command: int) -> None:
         self._bus.send(NMT, bytes((command, self._config.node)))
 
-    def _set(self, wanted: Sequence[Setting]) -> None:
-        """Set it and make the node ACTIVE, or put back what was set and raise as `SdoTransfers.download`."""
+    def _in_force_pa(self, set_point_pa: float) -> float:
+        """Return the command that holds the valve where it is: the set point, or what the node does in its place.
+
+        One that is not ACTIVE may hold, have vented or have filled: its pressure shows which, or where it shows none
+        its state says whether it holds.
+        """
+        objects = self._config.map
+        if objects.status_word is None:
+            return set_point_pa
+        status_word = int(self._sdo.get(objects.status_word))
+        if inactive_because(status_word) is None:
+            return set_point_pa
+        shown_pa = math.nan if objects.pressure_pa is None else self._sdo.get(objects.pressure_pa)
+        if not math.isfinite(shown_pa):
+            return set_point_pa if status_word & STATE_BITS in HOLDING else 0.0
+        if self._config.acts_alone_by == "fill" and shown_pa > set_point_pa:
+            return shown_pa
+        return min((set_point_pa, 0.0), key=lambda each: abs(each - shown_pa))
+
+    def _set(self, wanted: Sequence[Setting], command_pa: float | None) -> None:
+        """Set it and make the node ACTIVE, or put back what was set and raise as `SdoTransfers.download`.
+
+        With a command, Pa, that one is its set point before.
+        """
         was_operational = bool(wanted) and self._sdo.hears_operational()
         self._sdo.begin()
         try:
@@ -160,6 +185,8 @@ class CanopenDriver:
                 self._manage(ENTER_PRE_OPERATIONAL)
             for each in wanted:
                 self._sdo.download(*each)
+            if command_pa is not None:
+                self._sdo.set(self._config.map.command_pa, command_pa)
             self._activation.activate(self._sdo)
             self._sdo.require_alone()
         except BaseException:

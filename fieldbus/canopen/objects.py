@@ -39,6 +39,8 @@ class NodeState(IntEnum):
     ACTIVE = 0b1111
 
 
+HOLDING = (NodeState.HOLD, NodeState.FAULT_HOLD)
+"""States in which a node goes on with what it did, whatever its set point."""
 STATE_BITS = 0b1111
 NO_FAULT = 0b1000
 LOCAL = 1 << 4

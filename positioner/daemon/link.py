@@ -5,8 +5,9 @@ of NO_NUMBER; a device whose sample counter (or clock) stands still, one of REPE
 
 A device that was without commands for too long (its replies were lost, or this daemon stood still) may have acted by
 itself or been restarted. It is looked at before it is commanded: what it holds, and its status, which the next
-command would clear. Supervision judges both. Now and then it is asked what it holds in between: if that is not what
-it was told, another master writes it, and the cycle commands nothing.
+command would clear. Supervision judges both. Many a device that vents or fills by itself keeps its set point and obeys
+it again with the next command; what it holds is then what it does, not its set point. Now and then it is asked what it
+holds in between: if that is not what it was told, another master writes it, and the cycle commands nothing.
 
 The pressure of a sample is that which has acted since the sample before (`positioner.estimation`). A device that
 samples on request, after the write, shows the next one already: its pressures are taken a sample late. Of a device that
@@ -20,6 +21,7 @@ from dataclasses import dataclass, replace
 
 from config.codes import Quality
 from config.daemon_file import DaemonFile
+from config.quantities import ActionName, DeviceStatus
 from drivers.boundary import Driver, DriverError, NoNumber, NoReply, Reading, ReadsBack, Refused
 from positioner.control.sample import Sample
 from positioner.daemon.backoff import Backoff, Sayings
@@ -52,6 +54,11 @@ class LinkSettings:
     """Whether it is only read."""
     in_lockstep: bool = True
     """Whether it has obeyed a command for a period when it answers."""
+    vented_pa: float = 0.0
+    filled_pa: float = math.inf
+    """What is commanded in place of what it does when it vents or fills by itself."""
+    acts_alone_by: ActionName | None = None
+    """What it was told to do by itself; None where it cannot be told."""
 
     @classmethod
     def of(cls, file: DaemonFile, tolerance_pa: float) -> "LinkSettings":
@@ -59,7 +66,17 @@ class LinkSettings:
         lockstep = file.cycle.pace == "device"
         after = file.device.sampling == "after" and not lockstep
         read_back_s = 0.0 if file.cycle.shadow else file.safety.read_back_s
-        return cls(file.longest_unattended_s, read_back_s, tolerance_pa, after, file.cycle.shadow, lockstep)
+        return cls(
+            file.longest_unattended_s,
+            read_back_s,
+            tolerance_pa,
+            after,
+            file.cycle.shadow,
+            lockstep,
+            file.pressure.minimum_pa,
+            file.pressure.maximum_pa,
+            file.device.acts_alone_by,
+        )
 
 
 @dataclass(slots=True)
@@ -102,7 +119,7 @@ class Link:
         self._sample = Sample(0.0, 0.0, math.nan, math.nan, Quality.LOST)
 
     def open(self) -> tuple[float, Reading]:
-        """Connect for the first time; return the command the device holds, in Pa, and a first reading.
+        """Connect for the first time; return the command in force in the device, in Pa, and a first reading.
 
         A reply that is lost is asked for again: one alone ends no daemon that runs, and so none that begins.
 
@@ -121,7 +138,7 @@ class Link:
         held_pa = self._driver.open()
         reading = self._driver.read()
         self._connected = True
-        return held_pa, reading
+        return self._in_force_pa(held_pa, reading), reading
 
     @property
     def longest_unattended_s(self) -> float:
@@ -217,8 +234,9 @@ class Link:
     def _found_again(self) -> Sample:
         """Connect anew, and look at what the device holds and says without commanding it."""
         self._driver.close()
-        held_pa = self._driver.open()
+        set_point_pa = self._driver.open()
         reading = self._driver.read()
+        held_pa = self._in_force_pa(set_point_pa, reading)
         before, self._reading = self._reading, None
         self._told_pa = self._pressure_pa = None
         sample = replace(self._fresh(reading, held_pa), held_pa=held_pa, unattended_s=self._unattended_s)
@@ -227,6 +245,20 @@ class Link:
         self._say(logging.WARNING, "device is back", held_pa=held_pa, status=reading.status)
         repeated = before is not None and _same_sample(before, reading)
         return replace(sample, quality=Quality.REPEATED) if repeated else sample
+
+    def _in_force_pa(self, set_point_pa: float, reading: Reading) -> float:
+        """Return the command that holds the device where it is: its set point, or what it does by itself in its place.
+
+        Which of them it is shows its pressure; where it shows none, what it was told to do says it.
+        """
+        if not reading.status & DeviceStatus.COMMUNICATION_LOST:
+            return set_point_pa
+        vented_pa, filled_pa = self._settings.vented_pa, self._settings.filled_pa
+        shown_pa = reading.pressure_pa
+        if shown_pa is None:
+            by_itself_pa = {"vent": vented_pa, "fill": filled_pa}
+            return by_itself_pa.get(self._settings.acts_alone_by or "hold", set_point_pa)
+        return min((set_point_pa, vented_pa, filled_pa), key=lambda each: abs(each - shown_pa))
 
     def _lose(self, error: DriverError) -> None:
         self.counts.lost_replies += 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.codes import Quality
-from config.quantities import DeviceStatus
+from config.quantities import ActionName, DeviceStatus
 from drivers.boundary import Capabilities, DriverError, NoConnection, NoNumber, NoReply, Reading, Refused
 from positioner.daemon import link as room
 from positioner.daemon.link import Link, LinkSettings
@@ -115,6 +115,40 @@ def test_after_a_loss_it_connects_anew_and_looks_before_it_commands() -> None:
     assert driver.sent_pa == [5e4, 5e4, 5e4]
     assert [sample.held_pa for sample in samples] == [None, None, 0.0, None]
     assert samples[2].status == DeviceStatus.COMMUNICATION_LOST
+
+
+BY_ITSELF = LinkSettings(vented_pa=20e3, filled_pa=140e3)
+
+
+@pytest.mark.parametrize(
+    ("shown_pa", "told", "in_force_pa"),
+    [
+        (1e3, "vent", 20e3),
+        (1e3, "hold", 20e3),
+        (59e3, "vent", 60e3),
+        (250e3, "fill", 140e3),
+        (None, "vent", 20e3),
+        (None, "fill", 140e3),
+        (None, "hold", 60e3),
+        (None, None, 60e3),
+    ],
+)
+def test_a_device_that_has_vented_or_filled_by_itself_and_kept_its_set_point_is_held_as_it_is(
+    shown_pa: float | None, told: ActionName | None, in_force_pa: float
+) -> None:
+    """Else it would obey its set point again with the first command: a valve that moves at start or reconnection."""
+    driver = Scripted(NoConnection("gone"), held_pa=60e3)
+    driver.shown = replace(reading(1), pressure_pa=shown_pa, status=DeviceStatus.COMMUNICATION_LOST)
+    link = Link(driver, DevicePace(), replace(BY_ITSELF, acts_alone_by=told))
+    assert link.open()[0] == in_force_pa
+    link.exchange(60e3)
+    assert link.exchange(60e3).held_pa == in_force_pa
+
+
+def test_a_device_that_obeys_is_held_at_its_set_point_whatever_pressure_it_shows() -> None:
+    driver = Scripted(held_pa=60e3)
+    driver.shown = replace(reading(1), pressure_pa=1e3)
+    assert Link(driver, DevicePace(), BY_ITSELF).open()[0] == 60e3
 
 
 def test_the_same_sample_after_a_reconnection_is_repeated_and_the_next_is_new_whatever_its_counter() -> None:

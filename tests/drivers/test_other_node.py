@@ -14,11 +14,12 @@ import canopen
 import pytest
 from canopen.sdo.exceptions import SdoAbortedError
 
-from config.canopen_device import SHIPPED_EDS, STATUS_WORD, CanopenDevice
+from config.canopen_device import SHIPPED_EDS, SIMULATED_OBJECTS, STATUS_WORD, CanopenDevice
 from drivers.boundary import BadReply, DriverError, ForeseesRefusal, NoReply, Reading, Refused
 from drivers.canopen.driver import CanopenDriver, canopen_driver
 from fieldbus.canopen.eds import read_eds
 from fieldbus.canopen.loopback import free_channel
+from fieldbus.canopen.objects import NodeState
 
 pytestmark = pytest.mark.real_time
 
@@ -186,6 +187,41 @@ def test_a_node_that_is_as_wanted_is_told_nothing_but_to_be_active(other: OtherN
     told = [(identity, data) for identity, data in other.frames if identity == 0 or data[0] & 0xE0 == 0x20]
     assert {data[1:3] for identity, data in told if identity} == {b"\x40\x60"}, "the control word"
     assert [data for identity, data in told if not identity] == [bytes((1, NODE))], "never stopped"
+
+
+SET_POINT, PRESSURE_IS = 0x2005, 0x2001
+
+
+@pytest.mark.parametrize(
+    ("status_word", "shown_pa", "told", "held_pa"),
+    [
+        (NodeState.FAULT_DISABLED, 40.0, "vent", 0.0),
+        (NodeState.DISABLED, 16.9e3, "vent", HELD_PA),
+        (NodeState.FAULT_HOLD, 16.9e3, "hold", HELD_PA),
+        (NodeState.FAULT_HOLD, 250e3, "fill", 250e3),
+        (NodeState.ACTIVE, 40.0, "vent", HELD_PA),
+        (NodeState.FAULT_DISABLED, None, "vent", 0.0),
+        (NodeState.FAULT_HOLD, None, "hold", HELD_PA),
+    ],
+)
+def test_a_node_that_vented_or_filled_and_kept_its_set_point_is_given_what_it_does_before_it_is_made_active(
+    other: OtherNode, status_word: int, shown_pa: float | None, told: str, held_pa: float
+) -> None:
+    """Else it would go to its set point with ACTIVE: a valve that moves at start or reconnection."""
+    other.node.sdo[STATUS_WORD].raw = status_word
+    other.node.sdo[PRESSURE_IS].raw = shown_pa or 0.0
+    objects = SIMULATED_OBJECTS.model_dump(exclude_none=True)
+    if shown_pa is None:
+        del objects["pressure_pa"]
+    told_words: list[tuple[int, float]] = []
+    other.node.add_write_callback(
+        lambda index, **_: told_words.append((index, other.node.sdo[SET_POINT].raw)) if index == 0x6040 else None
+    )
+    driver = driver_of(other, map=objects, communication_action=told)
+    assert driver.open() == pytest.approx(held_pa)
+    driver.close()
+    assert told_words, "it was made ACTIVE"
+    assert {set_point_pa for _, set_point_pa in told_words} == {held_pa}
 
 
 def test_a_node_without_heartbeat_lives_by_its_pdos(other: OtherNode, monkeypatch: pytest.MonkeyPatch) -> None:
