@@ -104,7 +104,9 @@ def supervise(
     given_pa = (*memory.unanswered_pa, command_pa) if short else (command_pa,)
 
     cause = _cause(sample, given_pa, bad_in_a_row, now_s - good_s, limits) or monitored
-    silent = 0 < limits.heartbeat_timeout_s < now_s - heartbeat_s and memory.mode is not HOLD
+    # Who chooses a mode meanwhile gets it for no cycle: one would be a command, and the fault would hold that.
+    commanding = memory.mode is not HOLD or (requests.mode_writes != memory.mode_writes and requests.mode is not HOLD)
+    silent = 0 < limits.heartbeat_timeout_s < now_s - heartbeat_s and commanding
     if silent and not cause:
         cause = Fault.DCS_SILENT
     acknowledged = requests.acknowledgements != memory.acknowledgements

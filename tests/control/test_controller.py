@@ -317,6 +317,23 @@ def test_a_silent_dcs_has_an_action_of_its_own() -> None:
     assert decisions[-1].command_pa == pytest.approx(60e3)
 
 
+@pytest.mark.parametrize(
+    "asked", [{"mode": Mode.MANUAL, "manual_pa": 60e3}, {"mode": Mode.AUTOMATIC, "reference_m": 0.08}]
+)
+def test_who_chooses_a_mode_while_the_heartbeat_is_silent_moves_nothing(asked: dict[str, object]) -> None:
+    """One cycle of the mode before the fault would be a command, and the fault would hold that."""
+    bench = Bench(safety={"heartbeat_timeout_s": 0.5})
+    for _ in range(60):
+        bench.step()
+    bench.ask(**asked)
+    decisions = [bench.step() for _ in range(5)]
+    assert {(each.mode, each.fault, each.command_pa) for each in decisions} == {(Mode.HOLD, Fault.DCS_SILENT, HELD_PA)}
+    bench.ask(heartbeats=1, acknowledgements=1)
+    bench.step()
+    bench.ask(**asked)
+    assert bench.step().mode is asked["mode"]
+
+
 def test_a_beating_heart_keeps_it_going() -> None:
     bench = Bench(safety={"heartbeat_timeout_s": 0.05})
     bench.ask(mode=Mode.AUTOMATIC)
