@@ -120,6 +120,10 @@ class InhibitReason(Code):
     EXCITATION_UNMEASURED = 22, "excitation waits for a good measurement"
     STAIRCASE_UNANSWERED = 23, "the staircase of slides: the stem does not answer: its sensor is frozen, or it is stuck"
     NOT_AT_REST = 24, "a slide waits, for the stem does not come to rest: it creeps, or is moved by something else"
+    EXCITATION_FROM_BEFORE = (
+        25,
+        "excitation: eta_1 = 0 is from before a fault or a choice of automatic: write 1, then 0",
+    )
 
 
 class Restored(Code):

@@ -30,8 +30,12 @@ REFUSALS = (
     InhibitReason.AMPLITUDE_ZERO,
     InhibitReason.STAIRCASE_IN_VAIN,
     InhibitReason.STAIRCASE_UNANSWERED,
+    InhibitReason.EXCITATION_FROM_BEFORE,
 )
 """Why an excitation does not begin or has ended; the other reasons concern the law."""
+
+
+SWITCHED_OFF = {"eta_1": 1, "eta_2": 1, "eta_3": 1}
 
 
 class DcsError(CommandFailed):
@@ -138,11 +142,14 @@ class Dcs:
         """
         self.set_all(excitation)
         applied_before = self.get("identifications")
+        if self.get("eta_1") == 0 and self.get("state") != State.S3_IDENTIFY:
+            self.set_all(SWITCHED_OFF)  # somebody left it so, and it would not count as asked for
+            self._wait_for_a_cycle()
         try:
             self.set_all({"eta_1": 0, "eta_2": 0, "eta_3": 0})
             problem = self._wait_for_estimates(timeout_s, show)
         finally:
-            self.set_all({"eta_1": 1, "eta_2": 1, "eta_3": 1})
+            self.set_all(SWITCHED_OFF)
         self._wait_for_a_cycle()
         if self.get("identifications") != applied_before:
             return None

@@ -251,7 +251,7 @@ def _excited(
     if excitation is not None and memory.excitation is None and not excitation.ended:
         statics.restart()
     outcome = _outcome(now)
-    if excitation is None or now.stem_m is None:
+    if excitation is None or excitation.ended or now.stem_m is None:
         return excitation, inhibit_reason, outcome
     excitation = climbed(excitation, outcome, statics, settings)
     return excitation, excitation.inhibit_reason, outcome
@@ -267,7 +267,8 @@ def _confirmed(
     """Return the memory, what is applied, and what has become of what was restored, after what a slide said of them."""
     memory = now.memory
     playing = experiment.commands
-    restoration = _restoration(now, found, outcome if excitation is None and not playing else None)
+    exciting = excitation is not None and not excitation.ended
+    restoration = _restoration(now, found, None if exciting or playing else outcome)
     if restoration.trust is Restored.DROPPED and memory.restoration.provisional:
         return *_nothing_known(now, found), restoration
     if outcome is not None and outcome.landing and not playing:

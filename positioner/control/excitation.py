@@ -2,6 +2,8 @@
 
 S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or that is not permitted any more
 (`permissives`), or a staircase that came to nothing, has ended: S3 is left, and only eta_1 = 1 makes room for another.
+So it is with one that a fault or another mode has ended, and with one that was asked for meanwhile: who chooses
+automatic again wants the law back, and eta_1 = 0 from before does not excite the valve.
 After a staircase whose steps the stem did not answer the law has to wait for that, too: where the stem is nobody knows,
 so the command before S3 is held until somebody asks for something else.
 """
@@ -40,6 +42,11 @@ class ActiveExcitation:
     def unanswered(self) -> bool:
         """Whether it has ended because the stem did not answer."""
         return self.inhibit_reason is InhibitReason.STAIRCASE_UNANSWERED
+
+    @property
+    def broken_off(self) -> bool:
+        """Whether a fault or another mode has ended it, or was there when it was asked for."""
+        return self.inhibit_reason is InhibitReason.EXCITATION_FROM_BEFORE
 
     @property
     def by_slides(self) -> bool:
@@ -83,7 +90,8 @@ def excitation_after(
         ratios: ... by these; about what is held where there are none.
     """
     if mode is not AUTOMATIC or requests.eta[0] != 0:
-        return None, NOTHING
+        asked = requests.eta[0] == 0
+        return (_from_before(excitation or ActiveExcitation(Staircase(held_pa), now_s)) if asked else None), NOTHING
     lacking = _lacking(requests, position_m, settings.excitation)
     if excitation is not None:
         if not excitation.ended:
@@ -103,6 +111,13 @@ def excitation_after(
     if inhibit_reason is not NOTHING:
         return None, inhibit_reason
     return ActiveExcitation(sine, now_s), inhibit_reason
+
+
+def _from_before(excitation: ActiveExcitation) -> ActiveExcitation:
+    """Return an excitation that another mode, or a fault, has ended; one that had ended has its reason."""
+    if excitation.ended:
+        return excitation
+    return replace(excitation, inhibit_reason=InhibitReason.EXCITATION_FROM_BEFORE)
 
 
 def _lacking(requests: Requests, position_m: float | None, limits: ExcitationLimits) -> InhibitReason:

@@ -42,7 +42,7 @@ def identify(
     wanted = (parameters or friction) and (under_way or ordinary)
     staircase = None if memory.excitation is None else memory.excitation.signal
     if memory.identifying and isinstance(staircase, Staircase) and not (wanted and under_way):
-        broken_off = requests.eta[0] == 0 and (excitation is None or excitation.unanswered)
+        broken_off = excitation is not None and (excitation.broken_off or excitation.unanswered)
         return False, _concluded(memory.applied, staircase, statics, broken_off=broken_off)
     if not wanted:
         found = memory.identifying and not by_slides

@@ -129,7 +129,9 @@ def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) ->
         plant.ask(eta=IDENTIFY if 100 <= index < 1050 else QUIET)
         plant.cycle.once()
         seen.append((plant.cycle.snapshot.sample, plant.cycle.requests))
-    controller = Controller(Settings.of(DAEMON), 0.0)
+    # A gap that is a fault would end the identification.
+    patient = DAEMON.safety.model_copy(update={"lost_after_cycles": 50})
+    controller = Controller(Settings.of(DAEMON.model_copy(update={"safety": patient})), 0.0)
     decisions = [controller.step(spoil(index, sample), requests) for index, (sample, requests) in enumerate(seen)]
     ratios = decisions[-1].applied.ratios
     assert ratios is not None

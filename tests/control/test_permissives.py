@@ -105,11 +105,13 @@ def test_what_is_missing_refuses_a_test_and_it_does_not_come_later_by_itself(nam
     refused = bench.step()
     assert refused.state is not State.S3_IDENTIFY
     assert says(refused, kind, row)
+    law = State.S1_UP
     if row is AUTOMATIC:
-        return
+        bench.ask(mode=Mode.AUTOMATIC)
+        law = State.S0_START
     consents(bench)
     bench.position_m = 0.03
-    assert {bench.step().state for _ in range(20)} == {State.S1_UP}
+    assert {bench.step().state for _ in range(20)} == {law}
     bench.ask(eta=QUIET)
     bench.step()
     ask(bench, kind)
@@ -150,6 +152,38 @@ def test_a_fault_ends_a_test_in_its_own_action(kind: str) -> None:
     assert says(decision, kind, NO_FAULT)
     ask(bench, kind)
     assert bench.step().state is State.S0_START
+
+
+@pytest.mark.parametrize("asked", ["before", "meanwhile"])
+@pytest.mark.parametrize("by", [Fault.DEVICE, Mode.HOLD, Mode.MANUAL])
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_chooses_automatic_again_gets_the_law_and_no_test_of_before(
+    kind: str, by: Fault | Mode, asked: str
+) -> None:
+    bench = permitted(kind)
+    if asked == "before":
+        bench, _ = under_way(kind)
+    if by is Fault.DEVICE:
+        bench.step(status=DeviceStatus.SENSOR_FAULT)
+    else:
+        bench.ask(mode=by)
+    bench.step()
+    if asked == "meanwhile":
+        ask(bench, kind)
+        bench.step()
+    bench.acknowledge()
+    bench.step()
+    bench.ask(mode=Mode.AUTOMATIC)
+    decisions = [bench.step() for _ in range(20)]
+    assert {each.state for each in decisions} == {State.S0_START}
+    if kind != "experiment":
+        assert {each.inhibit_reason for each in decisions} == {InhibitReason.EXCITATION_FROM_BEFORE}
+        bench.ask(reference_m=0.06)
+        assert bench.step().state is State.S1_UP, "the law goes on"
+        bench.ask(eta=QUIET)
+        bench.step()
+    ask(bench, kind)
+    assert [bench.step().state for _ in range(2)][-1] is State.S3_IDENTIFY, "asked for anew"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -2,11 +2,12 @@
 
 import logging
 import math
+from collections.abc import Sequence
 
 import pytest
 from pymodbus.constants import ExcCodes
 
-from config.codes import Fault, Quality
+from config.codes import Fault, InhibitReason, Mode, Quality
 from config.daemon_file import DaemonFile
 from config.registers import BY_NAME, FLOAT_TEST, LONG_TEST, SIZE, WORD_TEST
 from config.slave_file import SlaveFile
@@ -14,6 +15,7 @@ from config.valve_file import shipped_valve
 from drivers.boundary import Capabilities, NoConnection, Reading
 from fieldbus.modbus.register_answers import RegisterError
 from fieldbus.modbus.server import RegisterServer
+from positioner import dcs
 from positioner.control.requests import Requests
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.supervisory_registers import SupervisoryRegisters
@@ -245,3 +247,32 @@ def test_the_age_is_worked_out_when_it_is_read_and_what_is_old_is_not_good(
         monkeypatch.setattr(panel.cycle._pace, "since_s", lambda _now_s, stands_s=stands_s: stands_s)
         assert panel.get("sample_age") == pytest.approx(stands_s)
         assert panel.get("quality") == quality
+
+
+class Registers:
+    """A client of the panel's registers; while it reads, the daemon cycles."""
+
+    def __init__(self, panel: Panel) -> None:
+        self._panel = panel
+
+    def read_holding_registers(self, address: int, count: int) -> list[int]:
+        self._panel.run(30)
+        return list(self._panel.registers.read("holding", address, count))
+
+    def write_registers(self, address: int, words: Sequence[int]) -> None:
+        self._panel.registers.write(address, words, "test")
+
+
+def test_a_dcs_identifies_though_somebody_left_the_switches_on(panel: Panel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("positioner.dcs.time.sleep", lambda _: None)
+    panel.set("eta_1", 0)
+    panel.run()
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run()
+    assert (panel.get("state"), panel.get("why")) == (0, InhibitReason.EXCITATION_FROM_BEFORE)
+    client = dcs.Dcs("127.0.0.1", 1)
+    monkeypatch.setattr(client, "_client", Registers(panel))
+    monkeypatch.setattr(client, "_decided_since", lambda _: True)
+    seen: list[float] = []
+    client.identify({"alpha": 60e3, "beta": 13e3}, 5.0, seen.append)
+    assert seen[-1] == 1.0, "it was excited to the end"
