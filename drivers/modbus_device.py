@@ -21,10 +21,13 @@ from pymodbus.pdu.register_message import (
 
 from config.device import ModbusDevice
 from config.modbus_map import Place, Run, without_holes
-from drivers.boundary import BadReply, Capabilities, NoNumber, Reading, Refused
+from drivers.boundary import BadReply, Capabilities, DriverError, NoNumber, NoReply, Reading, Refused
 from fieldbus.modbus.exception_codes import exception_text
 from fieldbus.modbus.layout import layout
 from fieldbus.modbus.pdu import encoded
+
+OF_A_GATEWAY = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
+"""Exceptions that the device did not send: it may be away, or be restarted meanwhile."""
 
 
 class ModbusDriver(ABC):
@@ -198,9 +201,10 @@ class ModbusDriver(ABC):
         """Return what follows `head` in the reply, which must begin with it and have that length."""
         return self._transact(request, head, length)[len(head) :]
 
-    def _refused(self, request: bytes, code: int) -> Refused:
-        """Return what an exception of the device means."""
-        return Refused(f"{self._about(request)}: {exception_text(code)}", code)
+    def _refused(self, request: bytes, code: int) -> DriverError:
+        """Return what an exception of the device means; by some a gateway says that the device itself was silent."""
+        said = f"{self._about(request)}: {exception_text(code)}"
+        return NoReply(said) if code in OF_A_GATEWAY else Refused(said, code)
 
     def _about(self, request: bytes) -> str:
         """Say who was asked what."""

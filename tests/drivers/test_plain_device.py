@@ -97,6 +97,26 @@ def test_a_device_of_function_6_and_a_short_counter_is_driven_and_loses_nothing(
     link.release()
 
 
+def test_a_device_that_was_silent_behind_its_gateway_is_looked_at_before_it_is_commanded(
+    device: PlainDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may have been restarted meanwhile: its gateway keeps the connection, and answers for it."""
+    link = Link(driver_for(device.described(None)), RealTimePace(0.01))
+    link.open()
+    link.exchange(50e3)
+    answers = device.slave.handle_request
+
+    def power_fails(request: bytes, _broadcast: bool = False) -> bytes:
+        device.show(COMMAND, 0)
+        monkeypatch.setattr(device.slave, "handle_request", answers)
+        return struct.pack(">BB", request[0] | 0x80, 11)
+
+    monkeypatch.setattr(device.slave, "handle_request", power_fails)
+    held_pa = [link.exchange(50e3).held_pa for _ in range(2)]
+    link.release()
+    assert (held_pa, device.command) == ([None, 0.0], 0)
+
+
 def test_a_set_point_of_coarse_digits_is_no_restart(device: PlainDevice) -> None:
     """The device may round to its own digits what it is told."""
     file = DaemonFile.model_validate({"valve": {"stroke_m": 0.03}, "device": device.described(None).model_dump()})
