@@ -52,6 +52,8 @@ class SupervisionMemory(NamedTuple):
     mode: Mode = HOLD
     fault: Fault = NO_FAULT
     bad_in_a_row: int = 0
+    lost_in_a_row: int = 0
+    """Of those, the last that were not answered; the others were, with no number or an impossible position."""
     good_s: float = -math.inf
     heartbeat_s: float = -math.inf
     mode_writes: int = 0
@@ -96,6 +98,7 @@ def supervise(
     first = memory.good_s == -math.inf
     alive = first or requests.heartbeats != memory.heartbeats
     bad_in_a_row = 0 if good or quality is Quality.REPEATED else memory.bad_in_a_row + 1
+    lost_in_a_row = memory.lost_in_a_row + 1 if quality is Quality.LOST else 0
     good_s = now_s if good or first else memory.good_s
     heartbeat_s = now_s if alive else memory.heartbeat_s
 
@@ -103,7 +106,8 @@ def supervise(
     short = memory.bad_in_a_row < limits.lost_after_cycles
     given_pa = (*memory.unanswered_pa, command_pa) if short else (command_pa,)
 
-    cause = _cause(sample, given_pa, bad_in_a_row, now_s - good_s, limits) or monitored
+    unheard = lost_in_a_row >= limits.lost_after_cycles
+    cause = _cause(sample, given_pa, bad_in_a_row, now_s - good_s, limits, unheard=unheard) or monitored
     # Who chooses a mode meanwhile gets it for no cycle: one would be a command, and the fault would hold that.
     commanding = memory.mode is not HOLD or (requests.mode_writes != memory.mode_writes and requests.mode is not HOLD)
     silent = 0 < limits.heartbeat_timeout_s < now_s - heartbeat_s and commanding
@@ -115,6 +119,7 @@ def supervise(
         _mode(memory, requests, fault, limits),
         fault,
         bad_in_a_row,
+        lost_in_a_row,
         good_s,
         heartbeat_s,
         requests.mode_writes,
@@ -125,14 +130,16 @@ def supervise(
     )
 
 
-def _cause(sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s: float, limits: Limits) -> Fault:
+def _cause(
+    sample: Sample, given_pa: tuple[float, ...], bad_in_a_row: int, age_s: float, limits: Limits, *, unheard: bool
+) -> Fault:
     if sample.unattended_s > 0 or sample.overwritten:
         return Fault.STALLED if sample.unattended_s > 0 else Fault.OTHER_MASTER
     held_pa = sample.held_pa
     if held_pa is not None and all(abs(held_pa - each) > limits.restart_tolerance_pa for each in given_pa):
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
-        return Fault.NO_REPLY if sample.quality is Quality.LOST else Fault.IMPLAUSIBLE
+        return Fault.NO_REPLY if unheard else Fault.IMPLAUSIBLE
     if sample.status & UNFIT_STATUS and sample.quality is not Quality.LOST:
         return Fault.DEVICE
     if age_s > limits.stale_after_s:  # on a slow line sooner than so many cycles

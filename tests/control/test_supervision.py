@@ -150,3 +150,11 @@ def test_a_silent_dcs_is_a_fault_only_while_something_other_than_hold_is_on() ->
 def test_each_fault_has_its_action() -> None:
     assert LIMITS.action_on(Fault.DCS_SILENT) == "hold"
     assert LIMITS.action_on(Fault.NO_REPLY) == "vent"
+
+
+def test_a_reply_that_is_lost_while_the_sensor_says_nonsense_is_no_silence_of_the_device() -> None:
+    """Each has an action of its own, and one reply lost is no fault."""
+    nonsense = [good(PERIOD_S * n, position_m=9.0) for n in range(1, 5)]
+    lost = [replace(good(PERIOD_S * n), quality=Quality.LOST) for n in range(5, 8)]
+    found = faults(watched([good(0.0), *nonsense, *lost], AUTOMATIC))
+    assert found[3:] == [*[Fault.IMPLAUSIBLE] * 4, Fault.NO_REPLY], "three in a row are one"
