@@ -37,8 +37,8 @@ class Backoff:
             self._next_s = now_s + min(FIRST_S * 2.0 ** (beyond - 1), LONGEST_S)
 
     def succeeded(self) -> None:
-        """Note a success."""
-        self._failures = max(0.0, self._failures - 1.0 / MAKE_UP)
+        """Note a success: who answers is not away, however long it was."""
+        self._failures = max(0.0, min(self._failures, AT_ONCE) - 1.0 / MAKE_UP)
 
 
 class Sayings:

@@ -281,6 +281,27 @@ def test_a_line_that_loses_one_reply_in_thirty_loses_no_more_by_it(monkeypatch: 
     assert longest <= 3, "as many as happen to be lost one after another"
 
 
+def test_a_device_that_is_back_has_its_next_lost_reply_asked_for_again_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However long it was away: one lost reply is no fault."""
+    clock = Stopwatch(monkeypatch)
+    driver = Scripted(*(NoReply("away") for _ in range(200)))
+    driver.shown = NoReply("away")
+    link = Link(driver, DevicePace())
+    link._connected = True
+    for _ in range(5_000):
+        link.exchange(5e4)
+        clock.now_s += 1e-3
+    clock.now_s += 1.0
+    driver.shown, driver.answers = reading(2), [reading(3), NoReply("lost"), reading(4)]
+    qualities = []
+    for _ in range(4):
+        qualities.append(link.exchange(5e4).quality)
+        clock.now_s += 10e-3
+    assert qualities == [Quality.GOOD, Quality.GOOD, Quality.LOST, Quality.GOOD], "found again at once"
+
+
 @pytest.mark.parametrize(
     ("error", "quality"), [(Refused("exception 6", 6), Quality.LOST), (NoNumber("nan"), Quality.NO_NUMBER)]
 )
