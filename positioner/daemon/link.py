@@ -184,9 +184,17 @@ class Link:
         """
         self._begun_s, self._returned_s = awake_s(), math.inf
 
-    def leave(self, command_pa: float) -> None:
-        """Give the device its last command, in Pa, and say so when it cannot be reached; none if it is only read."""
+    def leave(self, command_pa: float, *, holds: bool = False) -> None:
+        """Give the device its last command, in Pa, and say so when it cannot be reached; none if it is only read.
+
+        Where that is to hold, one that is lost, or was left alone for too long, keeps what it has: nobody knows whether
+        it was restarted, or has acted by itself.
+        """
         if self._settings.shadow:
+            return
+        alone = not self._connected or awake_s() - self._commanded_s > self._longest_unattended_s
+        if holds and alone:
+            log_event(log, logging.WARNING, "device is lost, and left with what it has", command_pa=command_pa)
             return
         try:
             if not self._connected:

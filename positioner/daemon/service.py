@@ -95,7 +95,8 @@ class ServedValve:
         """Give the device the command of the safe action."""
         with logging_valve(self.name):
             try:
-                self.link.leave(self.settings.safe_pa(self.file.safety.action, self.controller.left_pa))
+                action = self.file.safety.action
+                self.link.leave(self.settings.safe_pa(action, self.controller.left_pa), holds=action == "hold")
             except Exception:  # a driver that is not ours must not keep the other valves from theirs
                 log.exception("the valve could not be left as configured")
 

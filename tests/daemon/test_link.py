@@ -163,6 +163,18 @@ def test_the_same_sample_after_a_reconnection_is_repeated_and_the_next_is_new_wh
     assert link.counts.lost_samples == 0
 
 
+@pytest.mark.parametrize(("holds", "sent_pa"), [(True, [5e4]), (False, [5e4, 0.0])])
+def test_a_device_that_is_lost_at_the_end_is_not_commanded_to_hold_what_it_may_not_have(
+    holds: bool, sent_pa: list[float]
+) -> None:
+    """It may have been restarted: the old command would move it, and nobody would see it."""
+    driver = Scripted(NoReply("away"), held_pa=0.0)
+    link = opened(driver)
+    link.exchange(5e4)
+    link.leave(5e4 if holds else 0.0, holds=holds)
+    assert driver.sent_pa == sent_pa
+
+
 class Stopwatch:
     """The gateway's clock, moved by hand."""
 
