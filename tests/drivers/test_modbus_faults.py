@@ -215,13 +215,16 @@ def test_a_number_that_is_none_is_no_measurement_but_the_connection_holds(
     assert driver.exchange(PUSH_PA).sample_counter == 3
 
 
-@pytest.mark.parametrize("code", [2, 3, 4, 6, 11, 99])
-def test_an_exception_is_a_refusal_and_the_connection_holds(
-    driver: ModbusTcpDriver, scripted: ScriptedDevice, code: int
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [(2, Refused), (3, Refused), (4, Refused), (6, Refused), (10, NoReply), (11, NoReply), (99, Refused)],
+)
+def test_an_exception_is_a_refusal_or_of_a_gateway_a_lost_reply_and_the_connection_holds(
+    driver: ModbusTcpDriver, scripted: ScriptedDevice, code: int, kind: type[DriverError]
 ) -> None:
     scripted.fault = lambda transaction, request, _: frame(transaction, bytes((request[0] | 0x80, code)))
     for act in (lambda: driver.exchange(PUSH_PA), lambda: driver.write(PUSH_PA), driver.read):
-        assert f"exception {code}, " in refused_as(Refused, act)
+        assert f"exception {code}, " in refused_as(kind, act)
     scripted.fault = honest
     before = scripted.device.sample_counter
     assert driver.exchange(PUSH_PA).sample_counter == before + 1
