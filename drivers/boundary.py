@@ -117,6 +117,20 @@ class ReadsBack(Protocol):
 
 
 @runtime_checkable
+class KeepsSettings(Protocol):
+    """What a driver is, too, that can read back what `open` told the device beside the command."""
+
+    @property
+    def has_settings(self) -> bool:
+        """Whether `open` told it something that can be read back."""
+        ...
+
+    def settings_kept(self) -> bool:
+        """Return whether the device still has it: one that was restarted has not. Raises `DriverError`."""
+        ...
+
+
+@runtime_checkable
 class ForeseesRefusal(Protocol):
     """What a watching driver is, too, that knows what driving would be refused."""
 

@@ -44,6 +44,10 @@ class ModbusDriver(ABC):
         self._reads = [_Read(each) for each in config.map.runs]
         self._command = _Setting("command_pa", config.map.command_pa)
         self._exchange_head = _exchange_head(self._reads[0], config.map.command_pa)
+        places = (config.map.communication_action, config.map.communication_timeout_s)
+        self._settings = [_Read({"setting": place}) for place in places if place is not None]
+        self._told: list[bytes] | None = None
+        """What the registers of the settings said once they were told; None: they are not known, or cannot be read."""
         self._one_register_at_a_time = False
         """Whether the device knows function 6 and not 16; known by its first refusal."""
         # Function 23 reads holding registers only.
@@ -89,6 +93,7 @@ class ModbusDriver(ABC):
             self._connect()
             held_pa = self.held_pa()
             self._configure()
+            self._told = self._settings_shown()
         except BaseException:
             self.close()
             raise
@@ -130,6 +135,24 @@ class ModbusDriver(ABC):
         if not math.isfinite(held_pa):
             raise BadReply(f"{self._about(request)}: the command it holds is {held_pa}")
         return held_pa
+
+    @property
+    def has_settings(self) -> bool:
+        """Whether time-out and action were told, and can be read."""
+        return bool(self._told)
+
+    def settings_kept(self) -> bool:
+        """Return whether time-out and action are what they were once they were told; moves nothing.
+
+        A device that refuses to say is not known to have lost them.
+        """
+        return self._settings_shown() in (None, self._told)
+
+    def _settings_shown(self) -> list[bytes] | None:
+        try:
+            return [self._ask(each.request, each.head, each.length) for each in self._settings]
+        except Refused:
+            return None
 
     def _read_all(self) -> Reading:
         values: dict[str, float] = {}

@@ -354,8 +354,10 @@ def _outcome(now: Now) -> SlideOutcome | None:
 
 
 def _obeyed(now: Now) -> bool:
-    """Whether the device holds the last command, where it was looked at anew."""
+    """Whether the device holds the last command, where it was looked at anew, and has done so all the while."""
     held_pa = now.sample.held_pa
+    if now.sample.restarted:
+        return False
     return held_pa is None or abs(held_pa - now.memory.command_pa) <= now.settings.limits.restart_tolerance_pa
 
 

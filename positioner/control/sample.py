@@ -22,6 +22,8 @@ class Sample:
     """The command the device held, when it was looked at anew and not commanded in this cycle."""
     overwritten: bool = False
     """Whether it then held what this daemon had not given it, though nothing had been lost: somebody else wrote it."""
+    restarted: bool = False
+    """Whether it had lost what it was told beside the command: it was restarted, whatever it holds."""
     emergency: int = 0
     """The device's own code of what is wrong with it (CANopen: of its last EMCY); 0: nothing."""
     unattended_s: float = 0.0

@@ -136,7 +136,8 @@ def _cause(
     if sample.unattended_s > 0 or sample.overwritten:
         return Fault.STALLED if sample.unattended_s > 0 else Fault.OTHER_MASTER
     held_pa = sample.held_pa
-    if held_pa is not None and all(abs(held_pa - each) > limits.restart_tolerance_pa for each in given_pa):
+    another = held_pa is not None and all(abs(held_pa - each) > limits.restart_tolerance_pa for each in given_pa)
+    if another or sample.restarted:
         return Fault.RESTARTED
     if bad_in_a_row >= limits.lost_after_cycles:
         return Fault.NO_REPLY if unheard else Fault.IMPLAUSIBLE

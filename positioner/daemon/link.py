@@ -7,7 +7,8 @@ A device that was without commands for too long (its replies were lost, or this 
 itself or been restarted. It is looked at before it is commanded: what it holds, and its status, which the next
 command would clear. Supervision judges both. Many a device that vents or fills by itself keeps its set point and obeys
 it again with the next command; what it holds is then what it does, not its set point. Now and then it is asked what it
-holds in between: if that is not what it was told, another master writes it, and the cycle commands nothing.
+holds in between: if that is not what it was told, another master writes it, and the cycle commands nothing. More seldom
+it is asked whether it still has its time-out and action: one that has not was restarted between two commands, unseen.
 
 The pressure of a sample is that which has acted since the sample before (`positioner.estimation`). A device that
 samples on request, after the write, shows the next one already: its pressures are taken a sample late. Of a device that
@@ -22,7 +23,7 @@ from dataclasses import dataclass, replace
 from config.codes import Quality
 from config.daemon_file import DaemonFile
 from config.quantities import ActionName, DeviceStatus
-from drivers.boundary import Driver, DriverError, NoNumber, NoReply, Reading, ReadsBack, Refused
+from drivers.boundary import Driver, DriverError, KeepsSettings, NoNumber, NoReply, Reading, ReadsBack, Refused
 from positioner.control.sample import Sample
 from positioner.daemon.backoff import Backoff, Sayings
 from positioner.daemon.logs import log_event
@@ -34,6 +35,8 @@ LONG_COUNTER = 1 << 16
 """A counter of fewer numbers may well pass half of them from one reading to the next."""
 MOST_REFUSALS = 2
 """Exceptions in a row on a connection that stays; after more the device is looked at anew."""
+SETTINGS_EVERY = 5
+"""Of the times that the device is asked what it holds, the one in which its settings are asked for in its place."""
 TRIES_AT_START = 3
 """Replies lost in a row at the start, that end it."""
 
@@ -103,6 +106,9 @@ class Link:
         self._settings = settings or LinkSettings()
         self._longest_unattended_s = self._settings.longest_unattended_s
         self._read_back_s = -math.inf
+        self._read_backs = 0
+        self._restarted = False
+        """Whether the device was found to have lost its settings, and not yet looked at."""
         self._told_pa: float | None = None
         """The last command, if the device has answered it."""
         self._pressure_pa: float | None = None
@@ -150,7 +156,8 @@ class Link:
         now_s = awake_s()
         self._notice_a_stall(now_s, command_pa)
         try:
-            if self._connected and (held_pa := self._overwritten_pa()) is not None:
+            held_pa = self._overwritten_pa() if self._connected else None
+            if held_pa is not None:
                 self._commanded_s = now_s
                 sample = self._fresh(self._driver.read(), held_pa)
                 self._sample = replace(sample, held_pa=held_pa, overwritten=True)
@@ -232,12 +239,23 @@ class Link:
         if every_s == 0 or told_pa is None or now_s - self._read_back_s < every_s or not isinstance(driver, ReadsBack):
             return None
         self._read_back_s = now_s
+        self._read_backs += 1
+        if self._read_backs % SETTINGS_EVERY == 0 and isinstance(driver, KeepsSettings) and driver.has_settings:
+            self._require_settings(driver)
+            return None
         held_pa = driver.held_pa()
         if abs(held_pa - told_pa) <= self._settings.read_back_tolerance_pa:
             return None
         self._told_pa = None
         self._say(logging.ERROR, "another master wrote the set point", held_pa=held_pa, told_pa=told_pa)
         return held_pa
+
+    def _require_settings(self, driver: KeepsSettings) -> None:
+        """Have a device looked at that has lost its settings."""
+        if driver.settings_kept():
+            return
+        self._say(logging.ERROR, "the device has lost its time-out or action: it was restarted")
+        self._connected, self._restarted = False, True
 
     def _found_again(self) -> Sample:
         """Connect anew, and look at what the device holds and says without commanding it."""
@@ -247,8 +265,13 @@ class Link:
         held_pa = self._in_force_pa(set_point_pa, reading)
         before, self._reading = self._reading, None
         self._told_pa = self._pressure_pa = None
-        sample = replace(self._fresh(reading, held_pa), held_pa=held_pa, unattended_s=self._unattended_s)
-        self._connected, self._refusals, self._unattended_s = True, 0, 0.0
+        sample = replace(
+            self._fresh(reading, held_pa),
+            held_pa=held_pa,
+            unattended_s=self._unattended_s,
+            restarted=self._restarted,
+        )
+        self._connected, self._refusals, self._unattended_s, self._restarted = True, 0, 0.0, False
         self._commanded_s = awake_s()
         self._say(logging.WARNING, "device is back", held_pa=held_pa, status=reading.status)
         repeated = before is not None and _same_sample(before, reading)
@@ -286,7 +309,13 @@ class Link:
     def _lost(self) -> Sample:
         now_s = self._pace.now_s(None)
         return replace(
-            self._sample, now_s=now_s, quality=Quality.LOST, held_pa=None, overwritten=False, unattended_s=0.0
+            self._sample,
+            now_s=now_s,
+            quality=Quality.LOST,
+            held_pa=None,
+            overwritten=False,
+            unattended_s=0.0,
+            restarted=False,
         )
 
     def _say(self, level: int, event: str, kind: str = "", **fields: object) -> None:

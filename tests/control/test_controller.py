@@ -307,6 +307,14 @@ def test_a_restarted_device_keeps_the_pressure_it_came_back_with() -> None:
     assert bench.step().command_pa == 5e3
 
 
+def test_a_device_that_was_restarted_unseen_is_one_though_it_has_its_command_again() -> None:
+    bench = automatic()
+    bench.ask(reference_m=0.05)
+    command_pa = bench.step().command_pa
+    decision = bench.step(held_pa=command_pa, restarted=True)
+    assert (decision.fault, decision.mode, decision.command_pa) == (Fault.RESTARTED, Mode.HOLD, command_pa)
+
+
 def test_a_silent_dcs_has_an_action_of_its_own() -> None:
     bench = Bench(safety={"action": "vent", "heartbeat_timeout_s": 0.5, "heartbeat_action": "hold"})
     bench.step()

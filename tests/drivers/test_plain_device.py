@@ -17,7 +17,7 @@ from config.quantities import DeviceStatus
 from drivers import driver_for
 from positioner.cli.parts.sampling import when_shown
 from positioner.control.settings import Settings
-from positioner.daemon.link import Link, LinkSettings
+from positioner.daemon.link import SETTINGS_EVERY, Link, LinkSettings
 from positioner.daemon.pacing import RealTimePace
 from tests.other_device import await_listening, free_port
 
@@ -194,6 +194,31 @@ def test_a_second_master_that_writes_the_set_point_is_seen_by_reading_it_back(de
     device.show(COUNTER, 4)
     assert not link.exchange(70e3).overwritten, "what it holds is what it is told from now on"
     link.release()
+
+
+def test_a_device_that_was_restarted_between_two_commands_is_known_by_its_settings(device: PlainDevice) -> None:
+    """It has its command again by then; its time-out nobody would give it back."""
+    timeout, action = 20, 21
+    described = device.described(None)
+    places = {
+        "communication_timeout_s": Place(address=timeout, type="uint16", scale=0.1),
+        "communication_action": Place(address=action, type="uint16"),
+    }
+    told = {"map": described.map.model_copy(update=places), "communication_timeout_s": 2.0}
+    settings = LinkSettings(read_back_s=1e-9)
+    link = Link(driver_for(described.model_copy(update=told)), RealTimePace(0.01), settings)
+    link.open()
+    samples = []
+    for counter in range(3 * SETTINGS_EVERY):
+        device.show(COUNTER, counter)
+        samples.append(link.exchange(50e3))
+        if counter == SETTINGS_EVERY:  # both were asked for once, and nothing was found
+            device.show(timeout, 0)
+    link.release()
+    (found,) = (each for each in samples if each.restarted)
+    assert found.held_pa == 50e3, "it was looked at, and not commanded"
+    assert {each.quality for each in samples} == {Quality.GOOD}
+    assert device.slave.get_values("registers", timeout, 1) == (20,), "it was told again"
 
 
 @pytest.mark.parametrize("sampling", ["before", "after"])
