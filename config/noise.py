@@ -8,7 +8,7 @@ stays below c_k^2, its 99.5 % quantile; motion scatters by more, by anything. He
     S(2 σ) <= 1.2 S(σ)                                no scatters of another origin go on where the noise's end
     sum (x_i+1 - x_i)^2 / 2 n = S^2                   white, within 20 %: what goes on moving is not,
     sum (x_i+1 - 2 x_i + x_i-1)^2 / 6 n = S^2         nor is what wanders
-    corr(x, u) < 0.3                                  in the windows, for a drive u that it may follow
+    corr(x, u) < 0.3, of few 0.5                      in the windows, for a drive u that it may follow
     less than a fifth of them below c_10 σ            the 10 % quantile: no quieter noise is mixed with this one
 
 The last tells a stem at rest from one that goes evenly through a rounding that lies before the noise: q/√12 in motion
@@ -30,12 +30,23 @@ lacks what the rounding of a stem at rest hides, for it rests at one place of th
 
     s^2 = σ_w^2 + q^2/12 - q^2/(2 π^2) sum_k exp(-(2 π k σ_w / q)^2) / k^2,      σ^2 = σ_w^2 + q^2/12
 
-σ_w white noise before rounding; σ is what a reading is off by. The running identification, which never has all samples
+σ_w white noise before rounding; σ is what a reading is off by.
+
+Where readings hardly ever change by one or two quanta, no noise of less than the least change was rounded: it would
+come to the edge of a quantum in some rest. A dead band or a historian's compression held small changes back then, or
+the sensor is that quiet; which, and what a reading is off by, the samples do not tell, and the noise is unknown.
+
+A reading that stands still for n samples while others scatter is no rest, but a transmitter or a gateway that repeats
+its last value. In N samples noise does so by a chance of N p^n, p = erf(q / (2 √2 σ_w)) amid a quantum. It is no less
+than what amid a quantum makes as many readings change, to and fro, by two quanta and more as do so: within one, a stem
+at rest near its edge flickers whatever the noise.
+
+The running identification, which never has all samples
 at once, measures by third differences d_k = x_k - 3 x_(k-1) + 3 x_(k-2) - x_(k-3), var d = 20 σ^2 (`noise_by_median`).
 """
 
 from dataclasses import dataclass
-from math import log, pi, sqrt
+from math import erf, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +84,8 @@ BEYOND = 1.25
 WHITE = 0.2
 FOLLOWS = 0.3
 """Correlation with the drive from which a stem is not at rest."""
+FOLLOWS_OF_FEW = 0.5
+"""The same where so few samples are there that noise itself may come to more."""
 LATEST = 3
 """Samples by which the stem follows its drive at most."""
 HELD_WIDTHS = (256, 128, 64, 32, 16)
@@ -88,6 +101,14 @@ ON_GRID, REACHES = 0.02, (10.5, 100.5, 1000.5, 10000.5)
 """Of a quantum, how far a step between levels may be off it; the steps that refine it, one after the other."""
 FEW_STEPS, MANY_STEPS = 5, 50
 """Steps between levels that show a quantum: a tenth of all, but no fewer nor more than these."""
+HELD_BACK, RARELY, FEWEST_CHANGES = 2.5, 0.1, 20
+"""Quanta below which no more than that share of so many changes is, where something holds small ones back."""
+FROZEN_BY_CHANCE, FEWEST_FROZEN = 1e-6, 8
+"""Chance, in all samples, of a run of like readings at rest, below which it is none; samples of a run at least."""
+NEAR, LEAST_NOISY = 4.5, 0.02
+"""Quanta by which a change may be noise's, and no move; share of such changes from which on there is noise."""
+SCATTERED, TO_AND_FRO = 0.7, 0.5
+"""Share of unrounded readings that differ from the one before, and of their changes that turn back, of noise."""
 ALL_NOISE = 12.0
 """Times the noise that positions may span where it is all there is."""
 
@@ -146,6 +167,8 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
     True
     """
     quantum = quantum_m(position_m)
+    back_m = held_back_m(position_m, quantum)
+    position_m = np.where(frozen(position_m, quantum), np.nan, position_m)
     if quantum:
         position_m = position_m + quantum * np.random.default_rng(0).uniform(-0.5, 0.5, position_m.size)
     told = [_of_width(position_m, drive_pa, width) for width in WIDTHS]
@@ -164,6 +187,8 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
     if drive_pa is None and np.nanmax(position_m) - np.nanmin(position_m) < ALL_NOISE * noise_m:
         return None  # noise, or a stem that goes elsewhere from sample to sample: the drive would tell
     whole_m = _with_rounding(noise_m, quantum) if quantum else noise_m
+    if whole_m < back_m:
+        return None
     return None if drive_pa is not None and _scatters_more(position_m, drive_pa, whole_m, quantum) else whole_m
 
 
@@ -186,6 +211,90 @@ def quantum_m(position_m: Array) -> float:
     enough = max(FEW_STEPS, min(0.1 * steps.size, MANY_STEPS))
     grids = (_grid(steps, smallest / divisor, enough) for divisor in DIVISORS)
     return next((quantum for quantum in grids if quantum), 0.0)
+
+
+def held_back_m(position_m: Array, quantum: float) -> float:
+    """Return by how much positions, (n,), m, rounded to a quantum, m, change at least; 0 if by one or two of it.
+
+    A tenth of the changes may be smaller: a historian keeps a value now and then because it is old.
+
+    >>> rng = np.random.default_rng(0)
+    >>> rests_m = np.round(np.repeat(rng.uniform(0.0, 0.1, 80), 5) / 25e-6) * 25e-6
+    >>> held_back_m(rests_m, 25e-6) > 0.0, held_back_m(rests_m + 25e-6 * rng.integers(0, 2, 400), 25e-6)
+    (True, 0.0)
+    """
+    changes = np.abs(np.diff(position_m[np.isfinite(position_m)]))
+    changes = changes[changes > 0.5 * quantum]
+    if not quantum or changes.size < FEWEST_CHANGES:
+        return 0.0
+    least_m = float(np.quantile(changes, RARELY))
+    return least_m if least_m > HELD_BACK * quantum else 0.0
+
+
+def frozen(position_m: Array, quantum: float) -> Mask:
+    """Return in which samples, (n,), a reading, m, rounded to a quantum or, 0, not, stands still as no noise lets it.
+
+    The first of a run is a reading as any other. Where that would be half of the samples and more, or at the ends of
+    the range, where a transmitter is limited, none is.
+
+    >>> rng = np.random.default_rng(0)
+    >>> position_m = 0.05 + rng.normal(0.0, 5e-5, 400)
+    >>> position_m[100:140] = position_m[100]
+    >>> int(frozen(position_m, 0.0).sum())
+    39
+    """
+    found = np.zeros(position_m.size, np.bool_)
+    count = int(np.isfinite(position_m).sum())
+    changes = np.diff(position_m)
+    alike = np.abs(changes) <= 0.5 * quantum
+    longest = _longest_by_chance(changes[np.isfinite(changes)], quantum)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], alike, [False]])))
+    ends_m = (np.nanmin(position_m), np.nanmax(position_m)) if count else ()
+    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if last + 1 - first >= longest and position_m[first] not in ends_m:
+            found[first + 1 : last + 1] = True
+    return found if np.count_nonzero(found) < 0.5 * count else np.zeros_like(found)
+
+
+def _share_alike(changes: Array, quantum: float) -> float:
+    """Return how many of the changes, (n,), m, are none, of these and those that may be noise's: small, to and fro."""
+    still = np.abs(changes) <= 0.5 * quantum
+    moved = changes[~still]
+    back = np.append(False, moved[1:] * moved[:-1] < 0.0)
+    near = back & (np.abs(moved) <= NEAR * quantum) if quantum else back
+    alike, noise = np.count_nonzero(still), np.count_nonzero(near) / TO_AND_FRO
+    return alike / (alike + noise) if alike else 0.0
+
+
+def _longest_by_chance(changes: Array, quantum: float) -> float:
+    """Return how many like readings may follow one another, by how readings change from one to the next, (n,), m.
+
+    Noise turns back at once, a move seldom.
+    """
+    moved = changes[np.abs(changes) > 0.5 * quantum]
+    back = np.abs(changes[1:][changes[1:] * changes[:-1] < 0.0])
+    if not quantum:
+        scatters = moved.size > SCATTERED * changes.size and back.size > TO_AND_FRO * moved.size
+        return FEWEST_FROZEN if scatters else np.inf
+    noise = np.count_nonzero((back > 1.5 * quantum) & (back <= NEAR * quantum))
+    if noise < LEAST_NOISY * changes.size or not noise:
+        return np.inf
+    likely = _alike(noise / changes.size)
+    return max(FEWEST_FROZEN, log(FROZEN_BY_CHANCE / changes.size) / log(likely))
+
+
+def _alike(share: float) -> float:
+    """Return p of the least noise, in quanta, that changes a reading by two and more in such a share of pairs."""
+    edges = np.arange(0.5, 60.0)
+    low, high = 0.1, 10.0
+    for _ in range(30):
+        noise = sqrt(low * high)
+        inside = np.array([erf(each / (sqrt(2.0) * noise)) for each in edges.tolist()])
+        levels = np.diff(inside) / 2.0
+        levels = np.concatenate([levels[::-1], inside[:1], levels])
+        apart = 1.0 - float(levels @ levels + 2.0 * (levels[1:] @ levels[:-1]))
+        low, high = (noise, high) if apart < share else (low, noise)
+    return float(inside[0])
 
 
 def _grid(steps: Array, quantum: float, enough: float) -> float:
@@ -286,7 +395,8 @@ def _follows(windows: _Windows, count: int, freedom: float) -> bool:
         u = u - u.mean(axis=1, keepdims=True)
         power = float(np.sum(u**2) * np.sum(left**2))
         # A controller that answers the noise makes the drive go against the position.
-        if power > 0.0 and float(np.sum(u * left)) > max(FOLLOWS, 4.0 / sqrt(freedom * count)) * sqrt(power):
+        most = max(FOLLOWS, min(FOLLOWS_OF_FEW, 4.0 / sqrt(freedom * count)))
+        if power > 0.0 and float(np.sum(u * left)) > most * sqrt(power):
             return True
     return False
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from config.noise import noise_by_median, position_noise_m, quantum_m
+from config.noise import frozen, held_back_m, noise_by_median, position_noise_m, quantum_m
 
 NOISE_M = 2e-5
 
@@ -71,7 +71,7 @@ def test_a_stem_at_rest_is_told_from_one_that_goes_elsewhere_at_every_sample_by_
     assert position_noise_m(still + 1e-7 * follows, drive) is None
 
 
-@pytest.mark.parametrize("white", [0.0, 0.2, 0.5, 2.0])
+@pytest.mark.parametrize("white", [0.05, 0.2, 0.5, 2.0])
 def test_rounding_is_part_of_the_noise(white: float) -> None:
     quantum = 1e-4
     seen = steps(25, 2000) + np.random.default_rng(5).normal(0.0, white * quantum, 2000)
@@ -159,3 +159,66 @@ def test_a_stem_that_creeps_on_behind_a_lag_shows_its_noise_all_the_same(samples
     for each in drive[1:]:
         stem.append(stem[-1] + kept * (float(each) - stem[-1]))
     assert position_noise_m(noisy(np.asarray(stem)), 1e5 * drive) == pytest.approx(NOISE_M, rel=0.1)
+
+
+def exceptions(position_m: Array, dead_band_m: float) -> Array:
+    """What a historian that keeps no smaller changes shows at every sample: its last value."""
+    kept = position_m.copy()
+    for i in range(1, kept.size):
+        kept[i] = position_m[i] if abs(position_m[i] - kept[i - 1]) > dead_band_m else kept[i - 1]
+    return kept
+
+
+@pytest.mark.parametrize("every", [5, 12, 50])
+def test_what_a_historian_held_back_is_no_rounding_and_the_noise_is_unknown(every: int) -> None:
+    quantum = 1.5 * NOISE_M
+    rounded = np.round(noisy(steps(every, 2000)) / quantum) * quantum
+    assert position_noise_m(rounded) == pytest.approx(np.hypot(NOISE_M, quantum / 12**0.5), rel=0.2)
+    held = exceptions(rounded, 10.0 * NOISE_M)
+    assert held_back_m(held, quantum) > 10.0 * NOISE_M
+    assert position_noise_m(held) is None
+
+
+def test_a_noise_greater_than_what_was_held_back_is_found_all_the_same() -> None:
+    quantum = NOISE_M / 8.0
+    rounded = np.round(noisy(steps(50, 2000)) / quantum) * quantum
+    kept = exceptions(rounded, NOISE_M / 2.0)
+    shown = kept[np.append(True, np.diff(kept) != 0.0)]
+    assert held_back_m(shown, quantum) > 0.0
+    assert position_noise_m(shown) == pytest.approx(NOISE_M, rel=0.2)
+
+
+@pytest.mark.parametrize("quantum", [0.0, NOISE_M / 4.0, NOISE_M])
+def test_a_reading_that_is_repeated_is_no_rest_without_noise(quantum: float) -> None:
+    def rounded(position_m: Array) -> Array:
+        return np.asarray(np.round(position_m / quantum) * quantum) if quantum else position_m
+
+    sound = rounded(noisy(steps(50, 2000)))
+    assert not frozen(sound, quantum).any()
+    stuck = sound.copy()
+    for first in range(255, 2000, 300):
+        stuck[first : first + 40] = stuck[first]
+    assert frozen(stuck, quantum).sum() == pytest.approx(6 * 39, abs=3)
+    assert position_noise_m(stuck) == pytest.approx(np.hypot(NOISE_M, quantum / 12**0.5), rel=0.1)
+
+
+@pytest.mark.parametrize("quantum", [0.0, 5.0 * NOISE_M])
+def test_a_stem_that_rests_within_a_quantum_or_without_noise_is_not_frozen(quantum: float) -> None:
+    resting = motion(2000)
+    resting[300:600] = resting[300]
+    shown = np.round(noisy(resting) / quantum) * quantum if quantum else resting
+    assert not frozen(shown, quantum).any()
+
+
+def test_a_transmitter_at_the_end_of_its_range_is_not_frozen() -> None:
+    limited = np.maximum(noisy(motion(2000)), 0.03)
+    assert np.count_nonzero(limited == 0.03) > 100
+    assert not frozen(limited, 0.0).any()
+
+
+def test_few_moves_that_go_with_the_drive_are_no_noise() -> None:
+    rng = np.random.default_rng(3)
+    drive_pa = 4e5 * rng.uniform(0.0, 0.1, 40)
+    moved = drive_pa / 4e5 + 0.025 * rng.standard_normal(40)
+    assert position_noise_m(moved, drive_pa) is None
+    assert position_noise_m(moved, np.full(40, 2e4)) == pytest.approx(0.038, rel=0.2)

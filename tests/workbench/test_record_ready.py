@@ -11,7 +11,7 @@ from sim.composition import Composition
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of
 from workbench.data.motion import AT_ONCE
-from workbench.data.noise_floor import noise_std_m, repeatability_m
+from workbench.data.noise_floor import UNKNOWN, noise_std_m, repeatability_m
 from workbench.data.record import ready, require_units
 
 
@@ -95,6 +95,35 @@ def test_a_missing_command_is_held_and_missing_positions_and_spikes_are_not_judg
         "position_m is not a number in sample 201: left out of the error",
         "position_m has a spike in sample 501: left out of the error",
     )
+
+
+def resting() -> Column:
+    """Rests of a second at places far apart, 2e-5 m of noise."""
+    generator = np.random.default_rng(2)
+    return np.repeat(generator.uniform(0.02, 0.08, 10), 100) + 2e-5 * generator.standard_normal(1000)
+
+
+def test_a_reading_that_is_repeated_is_told_and_not_judged() -> None:
+    position = resting()
+    position[330:370] = position[330]
+    record = ready(Recording(plain() | {"position_m": position}))
+    assert np.flatnonzero(~record.valid).tolist() == list(range(331, 370))
+    assert record.notes == (
+        "position_m stands still to the last digit in 39 samples, the first 332, where it scatters elsewhere: a value "
+        "that was repeated, left out of the error",
+    )
+    assert record.noise_m == pytest.approx(2e-5, rel=0.1)
+
+
+def test_what_holds_small_changes_back_is_told_and_the_noise_is_unknown() -> None:
+    columns = plain()
+    position = np.round(columns["position_m"] / 1e-5) * 1e-5
+    for i in range(1, position.size):
+        position[i] = position[i] if abs(position[i] - position[i - 1]) > 5e-4 else position[i - 1]
+    record = ready(Recording(columns | {"position_m": position}))
+    assert record.noise_m is None
+    assert record.notes[-2].startswith("position_m hardly ever changes by less than 0.0005 m, 50 times its rounding")
+    assert record.notes[-1] == UNKNOWN
 
 
 def test_uneven_sampling_is_told_and_is_no_gap() -> None:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from config.drive import KINDS, VALVE, KindName
 from config.errors import InputError
-from config.noise import quantum_m
+from config.noise import frozen, held_back_m, quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
@@ -120,7 +120,8 @@ def ready(recording: Recording) -> Record:
     asked = "reference_m" if recording.by_setpoint else "command_pa"
     command_pa = _held(_without_words(columns[asked], asked, recording.kind is VALVE, notes), asked, notes)
     position_m = recording.position_m
-    valid = _valid(position_m, notes)
+    quantum, unit = quantum_m(position_m), recording.kind.travel.si
+    valid = _valid(position_m, quantum, notes)
     segments = tuple(_segments(columns, notes))
     if not segments:
         raise InputError("recording", f"no stretch of at least {SHORTEST} samples without a gap or a step of the clock")
@@ -128,9 +129,8 @@ def ready(recording: Recording) -> Record:
     seen_m = np.where(valid, position_m, np.nan)
     longest = slice(*max(segments, key=lambda each: each[1] - each[0]))
     repeated_m = repeatability_m(command_pa[longest], seen_m[longest]) if _is_even(time_s[longest]) else None
-    quantum = quantum_m(position_m[valid])
     finest_m = FINEST * float(np.ptp(position_m[valid]))
-    noise_m, unit = said_noise_m(recording), recording.kind.travel.si
+    noise_m = said_noise_m(recording)
     if noise_m is None:
         noise_m = not_repeating_m(noise_std_m(seen_m[longest], command_pa[longest]), repeated_m, quantum)
     if noise_m is not None and noise_m < finest_m:
@@ -141,6 +141,12 @@ def ready(recording: Recording) -> Record:
         noise_m = finest_m
     if quantum:
         notes.append(f"position_m is rounded to {quantum:.3g} {unit}")
+    if noise_m is None and (back_m := held_back_m(position_m, quantum)):
+        notes.append(
+            f"position_m hardly ever changes by less than {back_m:.3g} {unit}, {back_m / quantum:.2g} times its "
+            "rounding: if something holds smaller changes back, a dead band or a historian's compression, say how "
+            "much, --noise-m M"
+        )
     if noise_m is None and repeated_m is None:
         notes.append(UNKNOWN)
     _tell_sampling(time_s, segments, notes)
@@ -343,7 +349,7 @@ def _held(command_pa: Column, name: str, notes: list[str]) -> Column:
     return command_pa[last]
 
 
-def _valid(position_m: Column, notes: list[str]) -> Mask:
+def _valid(position_m: Column, quantum: float, notes: list[str]) -> Mask:
     finite = np.isfinite(position_m)
     if not finite.any():
         raise InputError("recording", "position_m: no sample is a number")
@@ -352,7 +358,13 @@ def _valid(position_m: Column, notes: list[str]) -> Mask:
     spikes = _spikes(position_m)
     if spikes.any():
         notes.append(f"position_m has a spike in {_samples(spikes)}: left out of the error")
-    return finite & ~spikes
+    still = frozen(position_m, quantum)
+    if still.any():
+        notes.append(
+            f"position_m stands still to the last digit in {_samples(still)}, where it scatters elsewhere: a value "
+            "that was repeated, left out of the error"
+        )
+    return finite & ~spikes & ~still
 
 
 def _spikes(position_m: Column) -> Mask:
