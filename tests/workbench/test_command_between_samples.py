@@ -11,7 +11,7 @@ from tests.workbench.slow_records import SPAN_PA, once_a_second
 from tests.workbench.valves import NOISE_M, SEED, with_effect
 from workbench.data.held_out import split
 from workbench.data.noise_floor import with_noise
-from workbench.data.record import ready
+from workbench.data.record import Record, ready
 from workbench.model.command_between_samples import part_of_the_way
 from workbench.model.free_run import FreeRun
 from workbench.model.sampling import Motion, sampling
@@ -146,3 +146,28 @@ def test_a_valve_fitted_again_is_judged_by_the_landings_of_the_search() -> None:
     one, other = (search.base(ValveFile(valve=each)) for each in (SEED.valve, STUCK))
     assert one.errors.logs.size == other.errors.logs.size
     assert one.fit.count == other.fit.count
+
+
+def logged(offset_s: float) -> Record:
+    """Steps of the command, so long after a sample of every 20 ms, as a logger reads it and the stem."""
+    generator = np.random.default_rng(4)
+    fine_s, every, held = 0.005, 4, 400
+    late = round(offset_s / fine_s)
+    levels_pa = generator.uniform(1e4, 7e4, 16)
+    command_pa = np.concatenate([np.full(held + late, levels_pa[0]), np.repeat(levels_pa[1:], held)])
+    composition = Composition.from_file(SEED)
+    response = respond(composition, composition.theta, command_pa[:-1], fine_s, step_s=fine_s)
+    position_m = response.indicated_m + NOISE_M * generator.standard_normal(command_pa.size)
+    time_s: Column = np.linspace(0.0, fine_s * (command_pa.size - 1), command_pa.size)
+    return ready(
+        Recording({"time_s": time_s[::every], "command_pa": command_pa[::every], "position_m": position_m[::every]})
+    )
+
+
+def test_a_logger_between_whose_samples_commands_change_knows_them_to_a_sample() -> None:
+    seen = sampling(logged(0.01), SEED.valve)
+    assert seen.motion is Motion.DYNAMIC
+    assert not seen.sure
+    assert "movements had begun by the sample in which it is first recorded" in seen.sentence
+    held = sampling(logged(0.0), SEED.valve)
+    assert (held.motion, held.sure, held.sentence) == (Motion.DYNAMIC, True, "")

@@ -128,3 +128,19 @@ def test_a_stretch_is_taken_by_its_times(tmp_path: Path, capsys: Capture) -> Non
     assert (time_s[0], time_s[-1], len(time_s)) == (100.0, 299.0, 200)
     assert main(["compare", path, "--valve", "seed", "--from-s", "1e4"]) == 2
     assert "no sample lies between 10000 and inf s; time_s goes from 0 to 399" in capsys.readouterr().err
+
+
+def test_changes_between_samples_without_a_rest_are_refused_in_a_line(tmp_path: Path, capsys: Capture) -> None:
+    file = tmp_path / "restless.csv"
+    recording = restless()
+    columns = dict(recording.columns)
+    # a historian keeps when something changed: seldom three readings of one rest
+    columns["command_pa"] = SEED.valve.spring_n_per_m / SEED.valve.diaphragm_area_m2 * columns["position_m"]
+    columns["position_m"] = np.repeat(columns["position_m"][::2], 2)
+    columns["command_pa"] = np.repeat(columns["command_pa"][::2], 2)
+    write_recording(file, Recording(columns))
+    for command in ("compare", "diagnose"):
+        assert main([command, str(file), "--valve", "seed", "--noise-m", "5e-5"]) == 2
+        said = capsys.readouterr().err.splitlines()
+        assert len(said) == 1
+        assert "no slide is seen to end in a rest of three samples, by which alone it could be judged" in said[0]

@@ -241,7 +241,7 @@ def compare_record(record: Record, valve: ValveFile) -> Comparison:
         adequate=found.adequate,
         sentences=tuple(each.text for each in said),
         stretches=tuple(each.stretches for each in said),
-        notes=(*record.notes, *([free.by.sentence] if free.by.slow else [])),
+        notes=(*record.notes, *([free.by.sentence] if free.by.sentence else [])),
         fit_percent=fit_percent(record, np.where(rows, run.indicated_m, np.nan)),
         rms_m=error_m,
         robust_m=robust(record.time_s[rows], residual_m[rows]),

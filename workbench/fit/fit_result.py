@@ -116,7 +116,7 @@ class Fit(Result):
             f"error {self.kind.length.said(self.rms_m, '.4g')} rms, floor {told(self.floor_m, self.kind.length)}; "
             f"{self.agreement} {agreement}",
             parameter_table(self.parameters, self.kind),
-            *([self.by.sentence] if self.by.slow else []),
+            *([self.by.sentence] if self.by.sentence else []),
             *(f"recording: {note}" for note in shortened(self.notes)),
         ]
 

@@ -51,7 +51,7 @@ from workbench.model.initial_state import (
     initial_state,
 )
 from workbench.model.lead import Lead, lead_of
-from workbench.model.sampling import Sampling, sampling
+from workbench.model.sampling import NO_LANDING, Sampling, sampling
 from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
 
@@ -114,7 +114,7 @@ class FreeRun:
 
     Raises:
         InputError: simulated from pressure without a measured one; a load together with an effect that needs the
-            pressure itself.
+            pressure itself; landings alone are judged, and there is none.
     """
 
     def __init__(
@@ -141,6 +141,8 @@ class FreeRun:
         if self.by.slow:
             self._glide = self._composition.quasi_static.glide
             self._slow = slow_segments(record, self._composition, drive_pa, self.by, from_pressure, leads)
+            if not self.by.held and not self.judged.any():
+                raise InputError("recording", NO_LANDING)
             return
         longest_s = accuracy.steps * self._composition.step_s
         by_setpoint = self._composition.by_setpoint

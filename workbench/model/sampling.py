@@ -18,7 +18,9 @@ landings      the same, and the command changed between samples, perhaps several
 
 A movement that begins from rest is early if the recorded command goes its way by more in this sample than it did in the
 two before together: as a held command that acts from its sample on never makes it. A command that ramps evenly, as that
-of an integrating controller, never does that; there where slides end tells (`command_between_samples`).
+of an integrating controller, never does that; there where slides end tells (`command_between_samples`). Where
+slides are seen it is early in the same way, if a logger reads commands that change in between: when one changed is
+known to a sample then, which mistimes its slide by as much, and no model explains that.
 """
 
 from dataclasses import dataclass, field, replace
@@ -39,6 +41,8 @@ EARLY, FEWEST_EARLY = 0.3, 3
 """Share and number of movements that begin early, from which the command changed between samples."""
 MOST_WITH_INERTIA = 20_000
 """Samples: a longer record, seen so slowly, is simulated without."""
+EARLY_SEEN = 0.1
+"""The same share where slides are seen: in a part of a sample few stems have moved by more than the noise."""
 MOVED = 6.0
 """Noises by which a stem that left its rest has moved."""
 NEGLIGIBLE_N = 0.02
@@ -47,6 +51,15 @@ ALIKE = 0.05
 """Relative difference of the periods of records that are sampled alike."""
 SETTLED_M = 3.0
 """Noises, or that share of F_c, that a rest may shift with what the pressure still does in its first samples."""
+MORE_LANDINGS = (
+    "export the command's changes with their times, or record samples closer than slides last, or steps held until the "
+    "stem has rested for some samples"
+)
+"""What record would tell, where the command changed between samples."""
+NO_LANDING = (
+    "the command changed between samples, and no slide is seen to end in a rest of three samples, by which alone it "
+    f"could be judged: {MORE_LANDINGS}"
+)
 
 
 class Motion(StrEnum):
@@ -102,7 +115,7 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
     """Choose how a record of a valve is simulated."""
     period_s, slide_s = record.period_s, slide_time_s(valve, record.scale_m)
     if not period_s > slide_s:
-        return replace(DYNAMIC, period_s=period_s, valve=valve)
+        return _with_slides_seen(record, valve)
     why = f"samples every {period_s:.3g} s cannot see slides of {slide_s:.2g} s"
     if record.by_setpoint:
         return Sampling(Motion.QUASI_STATIC, f"simulated without inertia: {why}", True, period_s, valve)
@@ -119,6 +132,19 @@ def sampling(record: Record, valve: ValveParameters) -> Sampling:
     if not sure:
         sentence += "; the command is taken for held from each sample to the next, which the recording does not tell"
     return Sampling(Motion.QUASI_STATIC, sentence, True, period_s, valve, sure)
+
+
+def _with_slides_seen(record: Record, valve: ValveParameters) -> Sampling:
+    """Return that of a record which shows slides; whether its commands are known to better than a sample, it tells."""
+    seen = with_inertia(record, valve)
+    early, begun = (0, 0) if record.by_setpoint else _early(record, valve)
+    if early < max(FEWEST_EARLY, EARLY_SEEN * begun):
+        return seen
+    sentence = (
+        f"the command changed between samples ({early} of {begun} movements had begun by the sample in which it is "
+        "first recorded): when, is known to a sample, and it is taken for held"
+    )
+    return replace(seen, sentence=sentence, sure=False)
 
 
 def _by_landings(record: Record, valve: ValveParameters, changed: str, why: str) -> Sampling:

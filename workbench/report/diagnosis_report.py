@@ -10,6 +10,7 @@ from config.recording import Recording
 from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
 from workbench.fit.fitted_parameter import Fitted
+from workbench.model.sampling import MORE_LANDINGS
 from workbench.report import ranking
 from workbench.report.charts import EXTENDED, MODEL, QUIET, axis, layout, line
 from workbench.report.comparison_report import MEANINGS, WORDS, facts, overlaid, recording
@@ -41,7 +42,6 @@ from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import undetectable
 from workbench.select.experiment import Experiment
-from workbench.select.judged_landings import MORE_LANDINGS
 
 DIAGNOSIS_WORDS = {
     "Effect": "One piece of physics on the way from the command to the indicated position: a lag, a kind of friction, "

@@ -16,10 +16,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
-from workbench.data.held_out import Part, Split, residual_m
+from workbench.data.held_out import HELD_OUT_RECORDING, Part, Split, residual_m
 from workbench.fit.fit_result import Fit
+from workbench.model.sampling import NO_LANDING
 from workbench.select.knife_edges import KnifeEdge, error_without, knife_edges, rms
 from workbench.select.residual_structure import clipped, structure
 from workbench.select.rest_errors import RestErrors, rest_errors
@@ -97,12 +99,18 @@ class BlockErrors(Brief):
 
 
 def block_errors(fit: Fit, split: Split) -> BlockErrors:
-    """Return how far a fit is off on what it was fitted to and on what was held out."""
+    """Return how far a fit is off on what it was fitted to and on what was held out.
+
+    Raises:
+        InputError: nothing that was held out is judged: no slide is seen to land in it.
+    """
     negligible_m = NEGLIGIBLE * split.scale_m
     train, test = split.train, split.test
     fitted_m = residual_m(train, fit.indicated_m(train.record))
     held_out_m = residual_m(test, fit.indicated_m(test.record))
     rows = np.isfinite(held_out_m)
+    if not rows.any():
+        raise InputError(HELD_OUT_RECORDING, NO_LANDING)
     fitted_logs = block_logs(train.record.time_s, fitted_m, negligible_m, block_s(train))
     logs = block_logs(test.record.time_s, held_out_m, negligible_m, block_s(test))
     test_rmse_m = float(np.sqrt(np.mean(held_out_m[rows] ** 2)))

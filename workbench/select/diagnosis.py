@@ -117,7 +117,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     def blocks(self) -> list[Block]:
         """Say the verdict, what was tried in each step, and what the recordings would not show."""
         said: list[Block] = [self.verdict_line]
-        if self.best.fit.by.slow:
+        if self.best.fit.by.sentence:
             said.append(self.best.fit.by.sentence)
         noted = dict.fromkeys(note for each in (self.split.train, self.split.test) for note in each.record.notes)
         said += [f"recording: {note}" for note in shortened([note for note in noted if note != UNKNOWN])]

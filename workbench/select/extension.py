@@ -84,7 +84,7 @@ class Extension(Result):
             f"{length.said(after_m, '.4g')} rms",
             Table((f"error, {length.unit} rms", "fitted", "held out"), rows),
             parameter_table(self.extended.parameters, self.extended.kind),
-            *([self.extended.by.sentence] if self.extended.by.slow else []),
+            *([self.extended.by.sentence] if self.extended.by.sentence else []),
         ]
 
     def frame_columns(self) -> dict[str, list[object]]:

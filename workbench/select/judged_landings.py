@@ -14,17 +14,13 @@ from dataclasses import dataclass
 
 from workbench.data.held_out import Part, Split
 from workbench.fit.fit_result import Fit
-from workbench.model.sampling import Sampling, landings
+from workbench.model.sampling import MORE_LANDINGS, Sampling, landings
 
 A_PARAMETER_FITTED, A_PARAMETER_HELD_OUT = 2, 1
 """Landings that each parameter takes; more are needed."""
-MORE_LANDINGS = (
-    "export the command's changes with their times, or record samples closer than slides last, or steps held until the "
-    "stem has rested for some samples"
-)
-"""What record would tell."""
 UNTOLD = (
-    "whether the command changed between samples the recording does not tell, and what is left may be what it did there"
+    "whether, or when, the command changed between samples the recording does not tell, and what is left may be what "
+    "it did there"
 )
 
 
