@@ -14,8 +14,9 @@ With the stem at rest at x, e = r - x and s = sign(e):
 
 The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
 farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round, by r - s M with
-M = max(1.02 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. Only resting times
-depend on the period of the loop, not where the stem lands.
+M = max(1.02 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. To 1.02 m comes what
+sensor and device round: a first slide that fell so much short would leave no way back. Only resting times depend on
+the period of the loop, not where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. A
 stem that does not come to rest, off its reference, is not moved, and that is said.
@@ -298,8 +299,7 @@ def _next_slide(
     assert target_m is not None
     error_m = target_m - rest.position_m
     widened = WIDENS ** (max(0, memory.slides - FREE_SLIDES) // 2)
-    # Where the device is told whole numbers, a slide lands up to half a step beside, and no other command is better.
-    beside_m = 0.5 * settings.command_step_pa / -balance.ratios.b_over_c
+    beside_m = _beside_m(balance, settings)
     known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m) + beside_m
     band_m = max(settings.dead_band_m, known_m)
     if abs(error_m) <= band_m:
@@ -390,6 +390,11 @@ def _lead_m(
     return lead_m if within else 0.0
 
 
+def _beside_m(balance: Balance, settings: SlideSettings) -> float:
+    """Return how far beside its aim a slide may land, m, where the device is told whole numbers: by half a step."""
+    return 0.5 * settings.command_step_pa / -balance.ratios.b_over_c
+
+
 def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:
     """Return how far a slide must be sent, m: at first in a move as short as may do, then as surely does."""
     return max(margin.sure_m if memory.slides >= TRIED else margin.way_m, LEAST * settings.stroke_m)
@@ -404,7 +409,7 @@ def _excursion(
     assert observation.rest is not None
     error_m = target_m - memory.anchor.position_m
     s = 1 if error_m > 0 else -1
-    now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m
+    now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m + _beside_m(balance, settings)
     there = {each: _way_m(memory, memory.margin(each), settings) for each in (1, -1)}
     back = {
         each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) + rounded_m for each in (1, -1)
