@@ -122,7 +122,7 @@ class InhibitReason(Code):
     NOT_AT_REST = 24, "a slide waits, for the stem does not come to rest: it creeps, or is moved by something else"
     EXCITATION_FROM_BEFORE = (
         25,
-        "excitation: eta_1 = 0 is from before a fault or a choice of automatic: write 1, then 0",
+        "excitation: eta_1 = 0 is from before a fault, or before another mode: write 1, then 0",
     )
 
 

@@ -132,7 +132,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     waits = _waits(now, supervision.mode)
     reference = _reference(now, supervision.mode, consumed, waits=waits)
     experiment = _experiment(now, supervision)
-    excitation, excitation_inhibit, outcome = _excited(now, supervision.mode, reference)
+    excitation, excitation_inhibit, outcome = _excited(now, supervision, reference)
     identifying, found = identify(
         now.memory,
         excitation,
@@ -233,13 +233,13 @@ def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
 
 
 def _excited(
-    now: Now, mode: Mode, reference: Reference
+    now: Now, supervision: SupervisionMemory, reference: Reference
 ) -> tuple[ActiveExcitation | None, InhibitReason, SlideOutcome | None]:
     """Return the excitation after this sample, what inhibits it, and what the last change of the command did."""
     memory, settings, statics = now.memory, now.settings, now.statics
     excitation, inhibit_reason = excitation_after(
         memory.excitation,
-        mode,
+        supervision.mode,
         now.sample.now_s,
         now.stem_m,
         now.requests,
@@ -247,6 +247,7 @@ def _excited(
         held_pa=memory.wanted_pa,
         reference=reference,
         ratios=memory.applied.ratios,
+        faulty=supervision.fault is not NO_FAULT,
     )
     if excitation is not None and memory.excitation is None and not excitation.ended:
         statics.restart()

@@ -2,8 +2,9 @@
 
 S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or that is not permitted any more
 (`permissives`), or a staircase that came to nothing, has ended: S3 is left, and only eta_1 = 1 makes room for another.
-So it is with one that a fault or another mode has ended, and with one that was asked for meanwhile: who chooses
-automatic again wants the law back, and eta_1 = 0 from before does not excite the valve.
+So it is with one that a fault or another mode has ended, and with one that was asked for while there was a fault: who
+acknowledges and chooses automatic again wants the law back, and eta_1 = 0 from before does not excite the valve. Asked
+for in another mode without a fault it begins with automatic: a DCS may write its registers in any order.
 After a staircase whose steps the stem did not answer the law has to wait for that, too: where the stem is nobody knows,
 so the command before S3 is held until somebody asks for something else.
 """
@@ -45,7 +46,7 @@ class ActiveExcitation:
 
     @property
     def broken_off(self) -> bool:
-        """Whether a fault or another mode has ended it, or was there when it was asked for."""
+        """Whether a fault or another mode has ended it, or a fault was there when it was asked for."""
         return self.inhibit_reason is InhibitReason.EXCITATION_FROM_BEFORE
 
     @property
@@ -75,6 +76,8 @@ def excitation_after(
     held_pa: float,
     reference: Reference,
     ratios: Ratios | None,
+    *,
+    faulty: bool,
 ) -> tuple[ActiveExcitation | None, InhibitReason]:
     """Return the excitation under way, and what inhibits one that was asked for.
 
@@ -88,10 +91,11 @@ def excitation_after(
         held_pa: the last command, from which a staircase begins.
         reference: about whose balance a sine swings where nobody says alpha (seed, 4.1) ...
         ratios: ... by these; about what is held where there are none.
+        faulty: a fault is latched.
     """
     if mode is not AUTOMATIC or requests.eta[0] != 0:
-        asked = requests.eta[0] == 0
-        return (_from_before(excitation or ActiveExcitation(Staircase(held_pa), now_s)) if asked else None), NOTHING
+        from_before = requests.eta[0] == 0 and (excitation is not None or faulty)
+        return (_ended(excitation or ActiveExcitation(Staircase(held_pa), now_s)) if from_before else None), NOTHING
     lacking = _lacking(requests, position_m, settings.excitation)
     if excitation is not None:
         if not excitation.ended:
@@ -113,7 +117,7 @@ def excitation_after(
     return ActiveExcitation(sine, now_s), inhibit_reason
 
 
-def _from_before(excitation: ActiveExcitation) -> ActiveExcitation:
+def _ended(excitation: ActiveExcitation) -> ActiveExcitation:
     """Return an excitation that another mode, or a fault, has ended; one that had ended has its reason."""
     if excitation.ended:
         return excitation

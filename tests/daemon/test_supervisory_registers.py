@@ -265,10 +265,11 @@ class Registers:
 
 def test_a_dcs_identifies_though_somebody_left_the_switches_on(panel: Panel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("positioner.dcs.time.sleep", lambda _: None)
-    panel.set("eta_1", 0)
-    panel.run()
-    panel.set("mode", Mode.AUTOMATIC)
-    panel.run()
+    for name, value in {"alpha": 60e3, "beta": 13e3, "eta_1": 0}.items():
+        panel.set(name, value)
+    for mode in (Mode.AUTOMATIC, Mode.HOLD, Mode.AUTOMATIC):
+        panel.set("mode", mode)
+        panel.run()
     assert (panel.get("state"), panel.get("why")) == (0, InhibitReason.EXCITATION_FROM_BEFORE)
     client = dcs.Dcs("127.0.0.1", 1)
     monkeypatch.setattr(client, "_client", Registers(panel))
