@@ -122,7 +122,7 @@ def test_what_holds_small_changes_back_is_told_and_the_noise_is_unknown() -> Non
         position[i] = position[i] if abs(position[i] - position[i - 1]) > 5e-4 else position[i - 1]
     record = ready(Recording(columns | {"position_m": position}))
     assert record.noise_m is None
-    assert record.notes[-2].startswith("position_m hardly ever changes by less than 0.0005 m, 50 times its rounding")
+    assert record.notes[-2].startswith("position_m hardly ever changes by one or two of its roundings")
     assert record.notes[-1] == UNKNOWN
 
 

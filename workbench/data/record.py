@@ -141,11 +141,10 @@ def ready(recording: Recording) -> Record:
         noise_m = finest_m
     if quantum:
         notes.append(f"position_m is rounded to {quantum:.3g} {unit}")
-    if noise_m is None and (back_m := held_back_m(position_m, quantum)):
+    if noise_m is None and held_back_m(position_m, quantum):
         notes.append(
-            f"position_m hardly ever changes by less than {back_m:.3g} {unit}, {back_m / quantum:.2g} times its "
-            "rounding: if something holds smaller changes back, a dead band or a historian's compression, say how "
-            "much, --noise-m M"
+            "position_m hardly ever changes by one or two of its roundings: if something holds small changes back, a "
+            "dead band or a historian's compression, say how much, --noise-m M"
         )
     if noise_m is None and repeated_m is None:
         notes.append(UNKNOWN)
