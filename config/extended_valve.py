@@ -45,6 +45,9 @@ class Inverse(NamedTuple):
     """Friction changes by this share each second."""
     yielding_n_per_m: float = inf
     """The stuck stem yields with this stiffness."""
+    lowest_m: float = -inf
+    highest_m: float = inf
+    """The stem stays between these, whatever the pressure: at a stop it says nothing of the balance."""
 
     @property
     def delays(self) -> bool:
@@ -65,6 +68,8 @@ class Inverse(NamedTuple):
             quantum_m=max(self.quantum_m, other.quantum_m),
             drift_per_s=self.drift_per_s + other.drift_per_s,
             yielding_n_per_m=min(self.yielding_n_per_m, other.yielding_n_per_m),
+            lowest_m=max(self.lowest_m, other.lowest_m),
+            highest_m=min(self.highest_m, other.highest_m),
         )
 
 
@@ -95,7 +100,34 @@ class ExtendedValve:
         if not minimum_pa <= mean_pa <= maximum_pa:
             allowed = f"{minimum_pa:g} to {maximum_pa:g} Pa"
             return f"it takes {mean_pa:.0f} Pa to the middle of its travel, [pressure] allows {allowed}: another area?"
+        return self._out_of_reach(middle_m, mean_pa)
+
+    def _out_of_reach(self, middle_m: float, mean_pa: float) -> str | None:
+        """Say why the stem does not get to the middle of its travel, or is not seen there; None if it does and is."""
+        inverse, (low_m, high_m) = self.inverse, self.stops_m
+        if not inverse.least_pa <= mean_pa <= inverse.most_pa:
+            given = f"its supply gives {inverse.least_pa:g} to {inverse.most_pa:g} Pa"
+            return f"it takes {mean_pa:.0f} Pa to the middle of its travel, {given}"
+        if not low_m < middle_m < high_m:
+            return f"the middle of its travel is at {middle_m:g} m, its stops at {low_m:g} and {high_m:g} m"
+        seen_m = _value(self.indicated_m, 0.5)
+        if not 0.0 < seen_m < self.stroke_m:
+            return f"the middle of its travel, {middle_m:g} m, is indicated at {seen_m:g} m"
+        for name, hidden_m in (("play", inverse.play_m), ("quantum", inverse.quantum_m)):
+            if hidden_m > middle_m:
+                return f"what is indicated has a {name} of {hidden_m:g} m, more than half of its travel"
         return None
+
+    @property
+    def stops_m(self) -> tuple[float, float]:
+        """The ends of the travel that the stem has, m."""
+        return max(0.0, self.inverse.lowest_m), min(self.stroke_m, self.inverse.highest_m)
+
+    @property
+    def stops_indicated_m(self) -> tuple[float, float]:
+        """What is indicated of a stem there, m."""
+        low_m, high_m = (_value(self.indicated_m, each / self.stroke_m) for each in self.stops_m)
+        return low_m, high_m
 
     def landing_pa(self, stem_m: float, direction: int) -> float:
         """Return p_s(x), Pa."""

@@ -45,7 +45,7 @@ def extended_valve(file: ValveFile, source: str) -> ExtendedValve:
 
     Raises:
         InputError: an effect that is unknown or declares no inverse, a parameter unknown, missing or out of its range,
-            a table that does not rise with the position.
+            a table that does not rise with the position, a function of an own effect that fails.
     """
     valve_alone(file, source, "the daemon commands none")
     effects = [find_effect(each.name, source) for each in file.effect]
@@ -55,6 +55,22 @@ def extended_valve(file: ValveFile, source: str) -> ExtendedValve:
             raise InputError(source, problem)
     theta = parameter_vector(file, effects, source)
     inverse = _inverse(file, effects, source)
+    try:
+        return _worked_out(file, effects, theta, inverse, source)
+    except InputError:
+        raise
+    except Exception as error:  # an effect of one's own is a program, and may raise anything
+        raise InputError(source, f"a function of its effects fails: {type(error).__name__}: {error}") from None
+
+
+def _worked_out(
+    file: ValveFile, effects: Sequence[Effect], theta: Vector, inverse: Inverse, source: str
+) -> ExtendedValve:
+    """Return the tables of a valve, and what undoes its effects in time.
+
+    Raises:
+        InputError: a table that does not rise with the position.
+    """
     rest = _Rest.of(file, [each for each in effects if each.in_balance], source)
     grid = np.linspace(0.0, file.valve.stroke_m, POINTS).tolist()
     per_n = 1.0 / (float(theta[SPRING]) + inverse.yielding_n_per_m)
@@ -80,11 +96,20 @@ def extended_valve(file: ValveFile, source: str) -> ExtendedValve:
 
 
 def _inverse(file: ValveFile, effects: Sequence[Effect], source: str) -> Inverse:
-    declared = (
-        each.inverse(each.values(table.parameters, f"{source}: effect {table.name}"))
-        for each, table in zip(effects, file.effect, strict=True)
-        if each.inverse is not None
-    )
+    declared = []
+    for each, table in zip(effects, file.effect, strict=True):
+        if each.inverse is None:
+            continue
+        values = each.values(table.parameters, f"{source}: effect {table.name}")
+        try:
+            undoes = each.inverse(values)
+        except Exception as error:  # as above
+            raise InputError(
+                source, f"inverse(q) of effect {each.name} fails: {type(error).__name__}: {error}"
+            ) from None
+        if not isinstance(undoes, Inverse):
+            raise InputError(source, f"inverse(q) of effect {each.name}: an Inverse is needed, got {undoes!r}")
+        declared.append(undoes)
     return reduce(Inverse.joined, declared, Inverse())
 
 

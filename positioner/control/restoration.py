@@ -86,10 +86,11 @@ def _agrees(
     within_m = _within_m(outcome, should_m, s, knowledge, stroke_m)
     if outcome.landing:
         return abs(at_m - should_m) <= within_m
+    low_m, high_m = (0.0, stroke_m) if valve is None else valve.stops_m
     went = s * (at_m - outcome.from_m) > VISIBLE * stroke_m
-    free = STOP * stroke_m < at_m < (1 - STOP) * stroke_m
+    free = low_m + STOP * stroke_m < at_m < high_m - STOP * stroke_m
     if went and not free:  # onto a stop: it should have come to rest before
-        contradicts = within_m < should_m < stroke_m - within_m
+        contradicts = low_m + within_m < should_m < high_m - within_m
     elif went and s * (should_m - outcome.from_m) > knowledge.shortest_m(s):  # less far than a slide goes
         contradicts = abs(at_m - should_m) > within_m
     else:

@@ -119,6 +119,11 @@ class Balance:
         return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
 
     @property
+    def stops_m(self) -> tuple[float, float]:
+        """The ends of the travel, m, as far as is known."""
+        return (0.0, self.stroke_m) if self.valve is None else self.valve.stops_m
+
+    @property
     def scatter_m(self) -> float:
         """How far slides land off the balance, a standard deviation, m."""
         return scatter_m(self.ratios, self.landings, self.stroke_m) if self.valve is None else KNOWN * self.stroke_m
@@ -306,7 +311,7 @@ def _next_slide(
         return _because(memory, InhibitReason.NOTHING)
     # Another slide would miss as the ones before have: where they scatter by more than they are wanted to, so will it.
     scatter_m = balance.scatter_m if memory.slides > FREE_SLIDES else 0.0
-    if abs(error_m) <= max(band_m, scatter_m) * widened or _on_stop(memory, rest.position_m, settings):
+    if abs(error_m) <= max(band_m, scatter_m) * widened or _on_stop(memory, rest.position_m, balance):
         return _because(memory, InhibitReason.TRIM_ENDED)
     if memory.held.stuck and abs(rest.position_m - memory.held.at_m) > CREEP * settings.stroke_m:
         memory = replace(memory, held=NONE_HELD, slides=0)
@@ -326,16 +331,20 @@ def _next_slide(
     return _excursion(memory, observation, balance, settings)
 
 
-def _on_stop(memory: SlideMemory, rest_m: float, settings: SlideSettings) -> bool:
-    """Whether the last slide went onto a stop beyond a target beside it, though it was sent no farther.
+def _on_stop(memory: SlideMemory, rest_m: float, balance: Balance) -> bool:
+    """Whether the last slide went onto a stop, beyond a target beside it, though sent no farther, or short of one.
 
     Another one would, too: the stop bears the rest, so that it says nothing of the balance.
     """
-    s, target_m, beside_m = memory.direction, memory.target_m, STOP * settings.stroke_m
-    stop_m = settings.stroke_m if s > 0 else 0.0
+    s, target_m, beside_m = memory.direction, memory.target_m, STOP * balance.stroke_m
+    stop_m = balance.stops_m[s > 0]
     assert target_m is not None
-    sent = not memory.excursion and s * (memory.aim_m - target_m) <= 0.0 < s * (rest_m - target_m)
-    return sent and max(abs(stop_m - target_m), abs(stop_m - rest_m)) <= beside_m
+    if memory.excursion or abs(stop_m - rest_m) > beside_m:
+        return False
+    if s * (target_m - stop_m) > 0.0:
+        return s * (memory.aim_m - stop_m) > 0.0
+    beyond = s * (memory.aim_m - target_m) <= 0.0 < s * (rest_m - target_m)
+    return beyond and abs(stop_m - target_m) <= beside_m
 
 
 def _because(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
@@ -385,7 +394,8 @@ def _lead_m(
     lead_m = memory.course.lead_m(now_s, way_m)
     assert memory.target_m is not None
     to_m = memory.target_m + lead_m
-    ahead = 0.0 < direction * lead_m <= settings.excursion_limit_m and 0.0 <= to_m <= settings.stroke_m
+    low_m, high_m = balance.stops_m
+    ahead = 0.0 < direction * lead_m <= settings.excursion_limit_m and low_m <= to_m <= high_m
     within = ahead and settings.minimum_pa <= balance.pressure_pa(to_m, direction) <= settings.maximum_pa
     return lead_m if within else 0.0
 
@@ -423,8 +433,9 @@ def _excursion(
     if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
+    low_m, high_m = balance.stops_m
     for direction, by_m in ways:
-        if abs(by_m - target_m) > settings.excursion_limit_m or not 0.0 <= by_m <= settings.stroke_m:
+        if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         if not settings.minimum_pa <= balance.pressure_pa(by_m, direction) <= settings.maximum_pa:
             why = InhibitReason.LAW_BEYOND_LIMITS

@@ -7,6 +7,7 @@ k contact stiffness, N/m; c contact damping, N s/m. Without this effect the trav
 
 from typing import Annotated, NamedTuple
 
+from config.extended_valve import Inverse
 from sim.effect import Parameter
 
 LOOKS = "The stem halts at a position, always the same one, however far the command goes on, and leaves it late."
@@ -14,7 +15,6 @@ CONFOUNDED = {
     "supply_limit": "measured actuator pressure: the limit cuts it, a stop does not; without it, a load that moves the "
     "place where the stem halts moves only the limit's",
 }
-INVERSE = "balance"
 
 
 class Parameters(NamedTuple):
@@ -55,3 +55,8 @@ def force(x: float, v: float, q: Parameters) -> float:
     if above > 0.0:
         return -max(0.0, q.stiffness_n_per_m * above + q.damping_ns_per_m * v)
     return 0.0
+
+
+def inverse(q: Parameters) -> Inverse:
+    """Send the stem no farther."""
+    return Inverse(lowest_m=q.lower_m, highest_m=q.lower_m + q.travel_m)

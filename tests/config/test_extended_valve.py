@@ -1,5 +1,7 @@
 """An extended valve that is not the daemon's is told from it; `[law]` says one thing."""
 
+from dataclasses import replace
+
 import pytest
 
 from config.daemon_file import DaemonFile
@@ -53,6 +55,39 @@ def test_another_valve_is_refused(
     stroke_m: float, maximum_pa: float, breakaway_pa: float | None, said: str | None
 ) -> None:
     assert valve().unlike(stroke_m, 0.0, maximum_pa, breakaway_pa) == said
+
+
+@pytest.mark.parametrize(
+    ("inverse", "said"),
+    [
+        (Inverse(), None),
+        (Inverse(most_pa=5e4, lowest_m=0.02, play_m=1e-3, quantum_m=1e-3), None),
+        (Inverse(most_pa=1e3), "it takes 40000 Pa to the middle of its travel, its supply gives -inf to 1000 Pa"),
+        (Inverse(highest_m=0.04), "the middle of its travel is at 0.05 m, its stops at 0 and 0.04 m"),
+        (
+            Inverse(lowest_m=0.06, highest_m=0.0601),
+            "the middle of its travel is at 0.05 m, its stops at 0.06 and 0.0601 m",
+        ),
+        (Inverse(play_m=0.5), "what is indicated has a play of 0.5 m, more than half of its travel"),
+        (Inverse(quantum_m=1.0), "what is indicated has a quantum of 1 m, more than half of its travel"),
+    ],
+)
+def test_a_valve_that_does_not_get_to_its_middle_or_is_not_seen_there_is_refused(
+    inverse: Inverse, said: str | None
+) -> None:
+    assert valve(inverse).unlike(L, 0.0, 4e5) == said
+
+
+def test_an_indication_beside_the_travel_is_refused() -> None:
+    off = replace(valve(), indicated_m=tuple(x + 10.0 for x in GRID))
+    assert off.unlike(L, 0.0, 4e5) == "the middle of its travel, 0.05 m, is indicated at 10.05 m"
+
+
+def test_its_stops_are_those_of_the_effects_within_the_stroke() -> None:
+    assert valve().stops_m == (0.0, L)
+    bowed = replace(valve(Inverse(lowest_m=-100.0, highest_m=0.08)), indicated_m=tuple(x + 0.001 for x in GRID))
+    assert bowed.stops_m == (0.0, 0.08)
+    assert bowed.stops_indicated_m == pytest.approx((0.001, 0.081))
 
 
 @pytest.mark.parametrize(

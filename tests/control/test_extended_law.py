@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
+from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
 from positioner.control.slide_inverse import with_margins_at
@@ -38,6 +39,21 @@ def test_the_first_slide_to_a_place_lands_there() -> None:
         loop.step_to(share * STROKE_M)
         assert loop.stand(1.5) == pytest.approx(share * STROKE_M, abs=1e-4 * STROKE_M)
         assert loop.cycle.snapshot.decision.command_pa != before
+
+
+def test_a_reference_beyond_a_known_stop_ends_there_and_teaches_nothing() -> None:
+    """By what the wall was missed the law went wherever it was sent: the valve shut, and stayed so."""
+    composition, extended = switched_on("end_stop")
+    _, stop_m = extended.stops_m
+    assert stop_m == pytest.approx(0.85 * STROKE_M)
+    loop = Loop(composition, extended, COURSE.period_s, seed=0)
+    for share, lands_m in ((0.5, 0.5 * STROKE_M), (0.95, stop_m), (0.6, 0.6 * STROKE_M), (0.83, 0.83 * STROKE_M)):
+        loop.step_to(share * STROKE_M)
+        assert loop.stand(1.5) == pytest.approx(lands_m, abs=1e-3 * STROKE_M)
+        beyond = share * STROKE_M > stop_m
+        ended = InhibitReason.TRIM_ENDED if beyond else InhibitReason.NOTHING
+        assert loop.cycle.snapshot.decision.inhibit_reason is ended
+        assert loop.cycle.snapshot.decision.command_pa <= extended.landing_pa(share * STROKE_M, 1) + 1e3
 
 
 def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:

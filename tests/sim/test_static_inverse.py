@@ -81,11 +81,12 @@ def test_a_stem_breaks_loose_where_the_inverse_says(effect: Effect, s: int) -> N
 
 
 def test_lags_are_added_and_the_narrowest_limits_hold() -> None:
-    first = Inverse(lag_s=0.1, most_pa=3e5, filling_pa_per_s=1e5)
+    first = Inverse(lag_s=0.1, most_pa=3e5, filling_pa_per_s=1e5, lowest_m=0.01)
     second = Inverse(lag_s=0.2, dead_time_s=0.05, most_pa=2e5, least_pa=1e4, filling_pa_per_s=4e4)
     both = first.joined(second)
     assert both.lag_s == pytest.approx(0.3)
     assert both.dead_time_s == 0.05
+    assert (both.lowest_m, both.highest_m) == (0.01, float("inf"))
     assert (both.least_pa, both.most_pa, both.filling_pa_per_s) == (1e4, 2e5, 4e4)
 
 
@@ -132,6 +133,23 @@ def test_what_is_not_monotone_is_refused(tmp_path: Path, force: str, said: str) 
     assert f"better.toml: the pressure that lands it opening {said}" in refusal(
         own(tmp_path, 'INVERSE = "balance"', force)
     )
+
+
+@pytest.mark.parametrize(
+    ("declared", "force", "said"),
+    [
+        ('INVERSE = "balance"', "1.0 / 0.0 * x", "fails: ZeroDivisionError: float division by zero"),
+        ('INVERSE = "balance"', "none_such(x)", "fails: NameError: name 'none_such' is not defined"),
+        ("def inverse(q): return None", "0.0", "inverse(q) of effect own: an Inverse is needed, got None"),
+        (
+            "def inverse(q): return 1.0 / 0.0",
+            "0.0",
+            "inverse(q) of effect own fails: ZeroDivisionError: float division",
+        ),
+    ],
+)
+def test_an_own_effect_that_fails_is_one_line(tmp_path: Path, declared: str, force: str, said: str) -> None:
+    assert said in refusal(own(tmp_path, declared, force))
 
 
 def test_a_parameter_out_of_its_range_is_refused() -> None:

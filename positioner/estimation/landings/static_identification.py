@@ -32,7 +32,7 @@ class StaticIdentification:
 
     Args:
         stroke_m: full travel, m.
-        stops_m: positions of the stops, m; by default 0 and the stroke.
+        stops_m: positions of the stops as indicated, m; by default the valve's, or 0 and the stroke.
         each: landings remembered in a direction.
         valve: whose sensor and play are known; then all positions are of the stem, else as indicated.
 
@@ -57,7 +57,8 @@ class StaticIdentification:
         self._valve = self.valve = valve
         self.way = 0
         self._each = each
-        self.detector = LandingDetector(stroke_m, stops_m)
+        known_m = None if valve is None else valve.stops_indicated_m
+        self.detector = LandingDetector(stroke_m, stops_m or known_m)
         self._tested: tuple[Estimates, StaticLaw, Estimates] | None = None
         self.restart()
 
