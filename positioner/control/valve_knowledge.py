@@ -3,7 +3,7 @@
 Times of what was seen are negative after a restart, seconds before what was kept was taken: older than anything new.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, sqrt
 
@@ -15,6 +15,7 @@ from positioner.control.slide_margins import Margins
 from positioner.control.slide_memory import SlideMemory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.landings.extended_balance import extended_scatter_m
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 from positioner.estimation.landings.parting import FINEST
 from positioner.estimation.landings.static_identification import StaticIdentification
@@ -104,7 +105,7 @@ def known(
     pulses, slides = (law.pulses, law.slides) if isinstance(law, MoveMemory) else (law, law)
     residual_m, covariance = FINEST * stroke_m, NO_DOUBT
     if valve is not None:
-        residual_m = max(residual_m, _missed_m(statics.landings, valve))
+        residual_m = max(residual_m, extended_scatter_m(valve, statics.landings))
     elif static_law.valid:
         residual_m, covariance = static_law.residual_m, _rows(static_law.covariance.tolist())
     else:
@@ -142,12 +143,6 @@ def _with_margins(law: SlideMemory, knowledge: ValveKnowledge) -> SlideMemory:
 
 def _with_pushes(law: BreakawayMemory, knowledge: ValveKnowledge) -> BreakawayMemory:
     return law if knowledge.pushes is None else replace(law, up=knowledge.pushes[0], down=knowledge.pushes[1])
-
-
-def _missed_m(landings: Sequence[SlideOutcome], valve: ExtendedValve) -> float:
-    """Return the standard deviation, m, of where slides landed about where the valve says."""
-    off_m = [each.position_m - valve.lands_m(each.command_pa, each.direction) for each in landings]
-    return sqrt(sum(each**2 for each in off_m) / len(off_m)) if off_m else 0.0
 
 
 def _before(outcomes: tuple[SlideOutcome, ...], now_s: float) -> tuple[SlideOutcome, ...]:

@@ -262,6 +262,29 @@ def test_what_slides_have_taught_of_an_extended_valve_is_held_against_it(true_n_
     assert after.trust() is trust
 
 
+@pytest.mark.parametrize(
+    ("changed", "trust"),
+    [
+        ({}, Restored.CONFIRMED),
+        ({"spring_n_per_m": 1.2}, Restored.DROPPED),
+        ({"coulomb_n": 1.3, "static_n": 1.3}, Restored.DROPPED),
+    ],
+    ids=["the same", "spring", "friction"],
+)
+def test_a_table_whose_level_landings_follow_is_no_looser_a_test(changed: dict[str, float], trust: Restored) -> None:
+    """Its preload is 600 N off, 11 % of stroke: by so much, three times, the first landings might lie elsewhere."""
+    extended = extended_valve(changed_valve(preload_n=600.0, viscous_ns_per_m=2.0), "better.toml")
+    before = Bench(changed_valve(viscous_ns_per_m=2.0), extended=extended)
+    before.start()
+    for at in (0.6, 0.7, 0.5, 0.65, 0.45, 0.5, 0.4):
+        before.step_to(at)
+    after = Bench(changed_valve(viscous_ns_per_m=2.0, **changed), extended=extended)
+    after.start(before.kept())
+    for at in (0.65, 0.45, 0.6, 0.5):
+        after.step_to(at)
+    assert after.trust() is trust
+
+
 def test_another_extended_valve_is_another_condition() -> None:
     file = Bench(hardened(4e6))._daemon
     bare, one, other = (

@@ -6,7 +6,12 @@ from dataclasses import replace
 import pytest
 
 from config.extended_valve import ExtendedValve, Inverse
-from positioner.estimation.landings.extended_balance import contradicted, extended_landing_pa, straight_law
+from positioner.estimation.landings.extended_balance import (
+    contradicted,
+    extended_landing_pa,
+    extended_scatter_m,
+    straight_law,
+)
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_law import static_law
 
@@ -96,3 +101,11 @@ def test_the_straight_law_is_the_secant() -> None:
     assert ratios.b_over_c == pytest.approx(-(bent_pa(0.075) - bent_pa(0.025)) / 0.05, rel=1e-4)
     assert ratios.k_over_c == pytest.approx(-F_C, rel=1e-6)
     assert ratios.balance_pa(0.025, 1) == pytest.approx(bent_pa(0.025) + F_C, rel=1e-4)
+
+
+def test_what_landings_scatter_by_leaves_out_the_levels_that_are_followed() -> None:
+    level = [landing(x, s, 6e3 + s * 2e3) for x in (0.02, 0.05, 0.03, 0.07) for s in (1, -1)]
+    assert extended_scatter_m(VALVE, level) < 2e-4 * L
+    assert extended_scatter_m(VALVE, []) == 0.0
+    apart = [landing(x, s, sign * 1e3) for x, sign in ((0.02, 1), (0.05, -1), (0.03, 1), (0.07, -1)) for s in (1, -1)]
+    assert 5e-4 < extended_scatter_m(VALVE, apart) < 2e-3

@@ -22,6 +22,8 @@ from positioner.estimation.landings.static_law import StaticLaw
 
 WORSE, LEAST_OFF = 2.0, 5e-3
 """Times as far off as off a straight law, and of the stroke: landings that scatter more are another valve's."""
+FOLLOWED = 3
+"""Numbers that landings give: a level in each direction, and what is left near a place."""
 LARGEST_DRIFT = 0.1
 """Share of friction that a known drift is followed since a landing: a straight line goes on for no longer."""
 
@@ -63,15 +65,18 @@ def contradicted(valve: ExtendedValve, law: StaticLaw) -> bool:
 
     What is the same for all landings in a direction does not count: that is followed.
     """
-    if not law.valid:
-        return False
-    off_m2, free = 0.0, -3
-    for s in (1, -1):
-        off_m = [each.position_m - valve.lands_m(each.command_pa, s) for each in law.slides if each.direction == s]
-        middle_m = fmean(off_m)
-        off_m2 += sum((each - middle_m) ** 2 for each in off_m)
-        free += len(off_m)
-    return sqrt(off_m2 / max(1, free)) > max(WORSE * law.residual_m, LEAST_OFF * valve.stroke_m)
+    off_m = extended_scatter_m(valve, law.slides) if law.valid else 0.0
+    return off_m > max(WORSE * law.residual_m, LEAST_OFF * valve.stroke_m)
+
+
+def extended_scatter_m(valve: ExtendedValve, landings: Iterable[SlideOutcome]) -> float:
+    """Return how far slides land off the valve's pressures, a standard deviation, m; levels that are followed apart."""
+    off_pa: dict[int, list[float]] = {1: [], -1: []}
+    for each in landings:
+        off_pa[each.direction].append(each.command_pa - valve.landing_pa(each.position_m, each.direction))
+    left_pa2 = sum((each - fmean(alike)) ** 2 for alike in off_pa.values() for each in alike)
+    free = sum(map(len, off_pa.values())) - FOLLOWED
+    return sqrt(left_pa2 / max(1, free)) / -straight_law(valve).b_over_c
 
 
 def straight_law(valve: ExtendedValve) -> Ratios:
