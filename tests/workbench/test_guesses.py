@@ -5,8 +5,9 @@ import pytest
 
 from config.recording import Recording
 from sim.composition import Composition
-from tests.workbench.valves import NOISE_M, drawn_valve, record_of, with_effect
+from tests.workbench.valves import NOISE_M, drawn_valve, pressures, record_of, with_effect
 from workbench.data.record import ready
+from workbench.fit.fitting import fit
 from workbench.fit.guesses import FEWEST_RESTS, guessed_values, likely_quanta_m
 from workbench.fit.landings import rests
 from workbench.fit.objective import SimulationError, smoothed
@@ -14,6 +15,7 @@ from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 
 VALVE = drawn_valve(np.random.default_rng(0))
+PER_M_PA = VALVE.valve.spring_n_per_m / VALVE.valve.diaphragm_area_m2
 STOPS = {"lower_m": 0.012, "travel_m": 0.06, "stiffness_n_per_m": 1e8, "damping_ns_per_m": 1e4}
 
 
@@ -50,6 +52,22 @@ def test_stops_are_sought_where_the_positions_end() -> None:
     assert np.min(np.abs(upper - 0.072)) < 4.0 * NOISE_M
     assert np.any(upper > 0.075), "the upper stop alone out of reach"
     assert np.any(lowest < lowest.max() - 2e-3), "the lower stop alone out of reach"
+
+
+def test_a_stop_that_the_stem_nowhere_comes_to_stays_where_it_is_declared() -> None:
+    """Where the record happens to end a lower stop had been found, 95 %: 3.5 to 5.4 mm, and the law went no lower."""
+    upper_m, lowest_m = 0.06, 0.02
+    generator = np.random.default_rng(0)
+    command_pa = np.maximum(pressures(generator, 1500), 1.2 * lowest_m * PER_M_PA)
+    stops = {"lower_m": -0.3e-3, "travel_m": upper_m + 0.3e-3, "stiffness_n_per_m": 1e8, "damping_ns_per_m": 1e4}
+    recording = record_of(with_effect(VALVE, "end_stop", **stops), 0, command_pa=command_pa)
+    assert float(recording.columns["position_m"].min()) > lowest_m
+    found = fit(recording, VALVE, effects=("end_stop",)).parameters
+    lower, travel = found["end_stop.lower_m"], found["end_stop.travel_m"]
+    assert lower.value == 0.0, "the seat, as the effect declares it"
+    assert lower.lower < -0.3e-3, "nothing excludes the truth, nor that there is none"
+    assert lowest_m < lower.upper < 1.1 * float(recording.columns["position_m"].min())
+    assert lower.value + travel.value == pytest.approx(upper_m, abs=2.0 * NOISE_M)
 
 
 def test_before_rounding_the_truth_lies_inside_its_quanta_and_a_wrong_spring_outside() -> None:

@@ -13,7 +13,7 @@ from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
-from workbench.fit.guesses import FINEST
+from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
 from workbench.fit.starts import moved_starts
@@ -158,7 +158,7 @@ class BegunFit:
             profile: follow the cost for the intervals.
         """
         here = self._never_worse()
-        found = [end.z for end in here.ends]
+        found = [with_open_ends(self.error, here.ends[0].z, self.added), *(end.z for end in here.ends[1:])]
         agree = agreeing(self.error, here.ends) if self._shows(found[0]) else 1
         result = fit_at(self.error, self.composition, found, agree, profile=profile)
         self.tell(1.0)

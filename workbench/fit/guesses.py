@@ -7,13 +7,16 @@ Where rests are few, samples spread over the record stand in for them: these sho
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from config.recording import Column
+from sim.karnopp import Vector
 from workbench.data.motion import directions
 from workbench.data.record import Record
+from workbench.fit.objective import SimulationError
 from workbench.model.parameters import Parameter
 
 ENDS, INSIDE, ASIDE = (0.002, 0.998), (1.0, 4.0, 16.0), 0.1
@@ -22,6 +25,8 @@ LEAST_REST, FEWEST_RESTS = 8, 6
 MOST_SAMPLES = 500
 """Samples that stand in for rests."""
 LIKELY_QUANTA = 8
+THE_SAME = 1e-3
+"""Rise of the cost that is none."""
 FINEST, COARSEST = 2.0, 8.0
 """A quantum is sought from so many noises to the swept positions divided by so many."""
 PER_LOBE = 8.0
@@ -32,11 +37,14 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
 
     Just inside their lowest or highest, or both; and the quanta to which they look rounded. Empty if none is declared.
     """
-    kinds = {each.guess for each in added}
     suggested: list[dict[str, float]] = []
-    if kinds & {"lowest", "swept"}:
-        suggested += _ends(record.position_m[record.valid], record.scale_m)
-    if "quantum" in kinds:
+    ends = _ends(added, record)
+    if ends is not None:
+        for inside in (inside * record.scale_m for inside in INSIDE):
+            lower_m, upper_m = ends.lowest_m + inside, ends.highest_m - inside
+            stops = ((lower_m, upper_m), (lower_m, ends.above_m), (ends.below_m, upper_m))
+            suggested += [{"lowest": lower, "swept": upper - lower} for lower, upper in stops]
+    if any(each.guess == "quantum" for each in added):
         suggested += [{"quantum": each} for each in likely_quanta_m(record)]
     return [
         tuple(guess.get(each.guess, each.starts[0] if each.starts else each.least) for each in added)
@@ -44,14 +52,57 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
     ]
 
 
-def _ends(position_m: Column, noise_m: float) -> list[dict[str, float]]:
-    lowest, highest = np.quantile(position_m, ENDS).tolist()
-    aside = ASIDE * (highest - lowest)
-    return [
-        {"lowest": lowest + low, "swept": highest - high - (lowest + low)}
-        for inside in (inside * noise_m for inside in INSIDE)
-        for low, high in ((inside, inside), (inside, -aside), (-aside, inside))
-    ]
+class _Ends(NamedTuple):
+    """Of the positions, and where a stop that none comes to is declared, or farther out, m."""
+
+    lowest_m: float
+    highest_m: float
+    below_m: float
+    above_m: float
+
+
+def _ends(added: Sequence[Parameter], record: Record) -> _Ends | None:
+    """Return them; None for effects without stops."""
+    declared = {each.guess: each.starts[0] for each in added if each.guess in ("lowest", "swept")}
+    if len(declared) < len(("lowest", "swept")):
+        return None
+    lowest_m, highest_m = np.quantile(record.position_m[record.valid], ENDS).tolist()
+    aside_m = ASIDE * (highest_m - lowest_m)
+    below_m = min(declared["lowest"], lowest_m - aside_m)
+    return _Ends(lowest_m, highest_m, below_m, max(declared["lowest"] + declared["swept"], highest_m + aside_m))
+
+
+def with_open_ends(error: SimulationError, z: Vector, added: Sequence[Parameter]) -> Vector:
+    """Return z with a stop that the stem nowhere comes to where it is declared: the record says no more of it.
+
+    Args:
+        error: by whose cost that is judged: it is the same.
+        z: coordinates of a fit.
+        added: the parameters of the effects that it has beside the base.
+    """
+    ends = _ends(added, error.run.record)
+    if ends is None:
+        return z
+    lower, travel = ({each.guess: each for each in added}[guess].index for guess in ("lowest", "swept"))
+    for below, above in ((True, False), (False, True)):
+        theta = error.theta(z)
+        lower_m = ends.below_m if below else float(theta[lower])
+        upper_m = ends.above_m if above else float(theta[lower] + theta[travel])
+        theta[lower], theta[travel] = lower_m, upper_m - lower_m
+        there = error.coordinates(theta)
+        if error.cost(there) - error.cost(z) < THE_SAME:
+            z = there
+    return z
+
+
+def with_other_end_kept(error: SimulationError, z: Vector, there: Vector, i: int) -> Vector:
+    """Return where the i-th coordinate was moved to from z; of a lower stop so that the upper one stays where it is."""
+    moved, travel = error.parameters[i], next((each for each in error.parameters if each.guess == "swept"), None)
+    if moved.guess != "lowest" or travel is None:
+        return there
+    before, theta = error.theta(z), error.theta(there)
+    theta[travel.index] += before[moved.index] - theta[moved.index]
+    return error.coordinates(theta)
 
 
 def likely_quanta_m(record: Record) -> list[float]:

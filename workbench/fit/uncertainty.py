@@ -38,6 +38,7 @@ from scipy.special import stdtrit
 from sim.karnopp import Vector
 from workbench.data.motion import slips
 from workbench.fit.descent import COARSE, descended
+from workbench.fit.guesses import with_other_end_kept
 from workbench.fit.objective import FINAL, SimulationError, root_weights, softs
 
 DIFFERENCE = 1e-3
@@ -49,8 +50,10 @@ RISE_95 = 1.92
 PROBABILITY = 0.975
 FEWEST_FREE = 2.0
 """Degrees of freedom of Student's t at least."""
-FARTHEST = 1.0
-"""Of a log-parameter: an interval is not followed farther."""
+FARTHEST = 4.0
+"""Of a log-parameter: an interval is not followed farther, and open there."""
+FAR = 1.0
+"""The same: others give way by no more, and a standard deviation counts no more of an interval."""
 HALVINGS, SCATTER_HALVINGS = 5, 3
 """By which the end of an interval is found; what scatters is not worth more."""
 GIVEN_UP = 3
@@ -131,7 +134,9 @@ def uncertainty(
     undetermined = tuple(
         _combination(error, vectors[:, i]) for i in range(z.size) if along[i] > 1.0 or (condition > ILL and i == 0)
     )
-    return Uncertainty(np.maximum(std, 0.5 * (upper - lower) / 1.96), lower, upper, condition, undetermined, rise)
+    std = np.maximum(std, 0.5 * (np.minimum(upper, z + FAR) - np.maximum(lower, z - FAR)) / 1.96)
+    lower, upper = np.where(z - lower < FARTHEST, lower, -np.inf), np.where(upper - z < FARTHEST, upper, np.inf)
+    return Uncertainty(std, lower, upper, condition, undetermined, rise)
 
 
 def information(error: SimulationError, z: Vector) -> tuple[Vector, NDArray[np.float64], float]:
@@ -202,7 +207,7 @@ class _Curve:
         """Return the ends of the interval in which the profile stays below the limit, or within its scatter."""
         first = min(max(0.5 * std, 1e-6), 0.1)
         below, above = (_reach(partial(self._below, i, way), first, HALVINGS) for way in (-1.0, 1.0))
-        if self.scatters:
+        if self.scatters and max(below, above) < FARTHEST:
             both = _reach(partial(self._within_scatter, i), max(below, above), SCATTER_HALVINGS)
             below, above = max(below, both), max(above, both)
         return float(self.z[i]) - below, float(self.z[i]) + above
@@ -257,7 +262,8 @@ class _Curve:
     def _moved(self, i: int, way: float) -> tuple[Vector, Vector]:
         """Return the minimum with the i-th coordinate moved alone, and along the valley."""
         alone, there = way * np.eye(self.z.size)[i], way * self._direction(i)
-        return self._clipped(self.z + alone), self._clipped(self.z + there)
+        moved = with_other_end_kept(self.error, self.z, self._clipped(self.z + alone), i)
+        return moved, self._clipped(self.z + there)
 
     def _given_way(self, i: int, z: Vector) -> Vector:
         """Return z after one step of Gauss and Newton by the other coordinates, with the derivatives of the minimum."""
@@ -265,7 +271,7 @@ class _Curve:
         Q, R = self._reduced
         move = np.zeros(z.size)
         move[others] = np.linalg.lstsq(R[:, others], -Q.T @ (self.weights * self.error.residuals(z)), rcond=1e-10)[0]
-        return self._clipped(z + np.clip(move, -FARTHEST, FARTHEST))
+        return self._clipped(z + np.clip(move, -FAR, FAR))
 
     @cached_property
     def _reduced(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
