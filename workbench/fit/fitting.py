@@ -132,18 +132,32 @@ def _base(
 
 
 @linear_algebra_alone()
-def local_fit(recording: Recording, valve: ValveFile) -> Fit:
+def local_fit(
+    recording: Recording,
+    valve: ValveFile,
+    *,
+    free: Sequence[str] | None = None,
+    from_pressure: bool = False,
+    by: Sampling | None = None,
+) -> Fit:
     """Fit a valve by the one search that begins where the valve file is, intervals by the derivatives.
 
     It takes a fifth of the time of `fit`. As no other search can agree it is never trusted: who takes it judges by the
     error that it leaves, and asks `fit` where that is not at the floor.
+
+    Args:
+        recording: what was measured.
+        valve: where it begins.
+        free: as of `fit`.
+        from_pressure: as of `fit`.
+        by: as of `fit`.
 
     Raises:
         InputError: the recording holds too little, other units than SI, or an unknown effect.
     """
     record = _fittable(recording, valve)
     composition = Composition.from_file(valve)
-    error = _error(composition, record, None, False, sampling(record, valve.valve))
+    error = _error(composition, record, free, from_pressure, by or sampling(record, valve.valve))
     begun = BegunFit(composition, error, (), OF_ONE, 1, lambda _: None)
     here = Place(error.coordinates(composition.theta), "valve file")
     return widely(begun, [here]).carried().finished(profile=False)

@@ -222,7 +222,7 @@ def diagnose(
             landed = judged_landings(best.fit, parts)
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
             chosen = search.experiment(steps) if found == "one_of" else None
-            mass = kept_mass(best, parts, seed=seed, workers=threads, progress=tell)
+            mass = kept_mass(best, parts, tell)
             pressed = by_measured_pressure(best, parts, seed=seed, workers=threads, progress=tell)
         except (BrokenOff, KeyboardInterrupt):
             steps, found, chosen, mass, pressed = search.so_far(base), "unfinished", None, None, None

@@ -6,12 +6,11 @@ noise may hide; what it finds is said, never used: a mass is weighed.
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 from config.drive import Scale
 from config.results.result import Brief
 from workbench.data.held_out import Split
-from workbench.fit.fitting import fit
+from workbench.fit.fitting import local_fit
 from workbench.select.block_errors import NOISE_KNOWN_TO
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
@@ -19,7 +18,8 @@ from workbench.select.effect_search import Progress, evaluated
 
 MASS = "mass_kg"
 BEGINS = (1.0, 0.2)
-"""Shares of the valve file's mass at which fits begin: one that is too heavy hides that a light one does better."""
+"""Shares of the valve file's mass at which searches begin, the rest as the best model has it: one that is too heavy
+hides that a light one does better."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -44,7 +44,7 @@ class KeptMass(Brief):
         )
 
 
-def kept_mass(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress) -> KeptMass | None:
+def kept_mass(best: EvaluatedModel, parts: Split, progress: Progress) -> KeptMass | None:
     """Return which mass leaves less than the valve file's; None where none does, or nothing is left of the record.
 
     Nor is it asked where samples lie farther apart than slides last: there no mass shows.
@@ -52,8 +52,6 @@ def kept_mass(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, pr
     Args:
         best: what was found with the mass as it is.
         parts: of the record, fitted and held out.
-        seed: of the fits' draws.
-        workers: threads.
         progress: called with what is under way, and the fraction done.
     """
     before = best.fit
@@ -63,18 +61,10 @@ def kept_mass(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, pr
     free = [*before.parameters, MASS]
     models: list[EvaluatedModel] = []
     for number, share in enumerate(BEGINS):
+        progress("fitting the mass, too", number / len(BEGINS))
         valve = before.valve.valve.model_copy(update={MASS: share * kept_kg})
         begin = before.valve.model_copy(update={"valve": valve})
-        found = fit(
-            parts.train.recording,
-            begin,
-            free=free,
-            seed=seed,
-            workers=workers,
-            from_pressure=before.from_pressure,
-            profile=False,
-            progress=partial(_tell, progress, number),
-        )
+        found = local_fit(parts.train.recording, begin, free=free, from_pressure=before.from_pressure, by=before.by)
         models.append(evaluated(found, parts))
     model = min(models, key=lambda each: each.fit.cost)
     if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.at_floor):
@@ -87,7 +77,3 @@ def leaves_something(best: EvaluatedModel) -> bool:
     """Whether a model leaves more than the noise may be off by, be all explained or not."""
     known = best.floor_m is not None and best.errors.floors_left(best.floor_m) <= NOISE_KNOWN_TO
     return not (best.explained and known)
-
-
-def _tell(progress: Progress, number: int, done: float) -> None:
-    progress("fitting the mass, too", (number + done) / len(BEGINS))
