@@ -186,6 +186,7 @@ def test_what_a_whole_budget_would_tell_is_played_to_its_end(fits: dict[str, Fit
     assert (found.outcome, found.moves) == ("budget_spent", 4)
 
 
+@pytest.mark.long
 def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], recording: Recording) -> None:
     """They promise a mean, about which luck scatters."""
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
@@ -194,6 +195,7 @@ def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], reco
     assert [len(each) for each in design.left_out] == [0, 0, 0, 0, 1], "a third time is the first one left out"
 
 
+@pytest.mark.long
 def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], recording: Recording) -> None:
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
 

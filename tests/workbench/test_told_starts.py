@@ -79,7 +79,7 @@ def answered(true: ValveFile, command_pa: Column, generator: np.random.Generator
     return Recording({"time_s": np.arange(float(count)), "command_pa": command_pa, "position_m": position_m})
 
 
-@pytest.mark.parametrize("seed", [23, 51, 53])
+@pytest.mark.parametrize("seed", [53, *(pytest.param(each, marks=pytest.mark.long) for each in (23, 51))])
 def test_the_true_effects_search_reaches_the_floor(seed: int) -> None:
     found = fit(staircase(seed), KNOWN, effects=("asymmetric_friction",), profile=False)
     assert found.by.slow
