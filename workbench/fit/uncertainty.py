@@ -50,7 +50,7 @@ RISE_95 = 1.92
 PROBABILITY = 0.975
 FEWEST_FREE = 2.0
 """Degrees of freedom of Student's t at least."""
-FARTHEST = 4.0
+FARTHEST = 8.0
 """Of a log-parameter: an interval is not followed farther, and open there."""
 FAR = 1.0
 """The same: others give way by no more, and a standard deviation counts no more of an interval."""
