@@ -170,6 +170,7 @@ def test_little_promised_is_played_while_moves_are_left(fits: dict[str, Fit], re
     assert (found.outcome, found.moves) == ("budget_spent", 4)
 
 
+@pytest.mark.long
 def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit], recording: Recording) -> None:
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
     design = Design(2.0)
@@ -179,6 +180,7 @@ def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit
     assert asked == {0, 1}, "the first one is left out of what is chosen next"
 
 
+@pytest.mark.long
 def test_what_a_whole_budget_would_tell_is_played_to_its_end(fits: dict[str, Fit], recording: Recording) -> None:
     """That the last moves alone promise nothing does not say that the valve cannot tell."""
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}

@@ -87,10 +87,8 @@ def test_the_true_effects_search_reaches_the_floor(seed: int) -> None:
     assert found.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(ASYMMETRY, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("record", "seed", "was"),
-    [(small_moves, 51, "0.075 mm"), pytest.param(slow_ramps, 5, "0.31 mm", marks=pytest.mark.long)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("record", "seed", "was"), [(small_moves, 51, "0.075 mm"), (slow_ramps, 5, "0.31 mm")])
 def test_what_lands_alike_is_told_by_where_the_stem_breaks_loose(
     record: Callable[[ValveFile, int], Recording], seed: int, was: str
 ) -> None:
