@@ -36,6 +36,7 @@ REFUSALS = (
 
 
 SWITCHED_OFF = {"eta_1": 1, "eta_2": 1, "eta_3": 1}
+"""Identification, as the DCS leaves it."""
 
 
 class DcsError(CommandFailed):

@@ -131,13 +131,12 @@ def _kept(player: "Player", folder: Path) -> "Player":
 
     Beside those of an earlier run, which no valve plays again.
     """
-    files = (folder / EXPERIMENT.format(number) for number in count(1))
-    free = (file for file in files if not file.exists())
 
     def play(chosen: "DesignedExperiment") -> "Played":
         played = player(chosen)
         if played.recording is not None:
-            played.recording.write(next(free))
+            files = (folder / EXPERIMENT.format(number) for number in count(1))
+            played.recording.write(next(file for file in files if not file.exists()))
         return played
 
     return play

@@ -45,8 +45,8 @@ def plateaus(position_m: Column, noise_m: float, offset: int = 0) -> tuple[Plate
             continue
         if found and found[-1].end == offset + rows[first - 1] + 1 and not _creeps(x[begins:end], noise_m):
             # Noise has cut one rest in two.
-            whole = found.pop()
-            found.append(whole._replace(end=offset + int(rows[end - 1]) + 1, position_m=float(np.mean(x[begins:end]))))
+            over, mean_m = offset + int(rows[end - 1]) + 1, float(np.mean(x[begins:end]))
+            found[-1] = found[-1]._replace(end=over, position_m=mean_m)
             continue
         begins = first
         middle_m = float(np.mean(x[first:end]))

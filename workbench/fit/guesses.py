@@ -64,7 +64,7 @@ class _Ends(NamedTuple):
 def _ends(added: Sequence[Parameter], record: Record) -> _Ends | None:
     """Return them; None for effects without stops."""
     declared = {each.guess: each.starts[0] for each in added if each.guess in ("lowest", "swept")}
-    if len(declared) < len(("lowest", "swept")):
+    if declared.keys() != {"lowest", "swept"}:
         return None
     lowest_m, highest_m = np.quantile(record.position_m[record.valid], ENDS).tolist()
     aside_m = ASIDE * (highest_m - lowest_m)

@@ -8,6 +8,7 @@ does not. Where the actuator's pressure was measured, it tells them apart. The t
 of its own is a lag of the pressure.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,14 +51,15 @@ def pressure_errors(fit: Fit, split: Split) -> PressureErrors | None:
         block_logs(part.record.time_s, error_pa, scale_pa, block_s(part))
         for part, error_pa in zip(parts, errors_pa, strict=True)
     ]
-    rms_pa, structured_pa = np.sqrt(np.mean([_powers(each) for each in errors_pa], axis=0)).tolist()
-    return PressureErrors(rms_pa, np.concatenate(logs), structured_pa)
+    rms_pa = float(np.sqrt(np.nanmean(np.concatenate(errors_pa) ** 2)))
+    return PressureErrors(rms_pa, np.concatenate(logs), _structured_pa(errors_pa))
 
 
-def _powers(error_pa: Column) -> tuple[float, float]:
-    """Return the mean square of an error, Pa^2, (n,), and how much of it goes on over the next samples."""
-    goes_on = [float(np.nanmean(error_pa[k:] * error_pa[:-k])) for k in range(1, NEXT + 1)]
-    return float(np.nanmean(error_pa**2)), max(float(np.mean(goes_on)), 0.0)
+def _structured_pa(errors_pa: Sequence[Column]) -> float:
+    """Return of errors, Pa, each (n,), what goes on over the next samples, rms; none where no two neighbours count."""
+    products = np.concatenate([each[k:] * each[:-k] for each in errors_pa for k in range(1, NEXT + 1)])
+    known = products[np.isfinite(products)]
+    return float(np.sqrt(max(known.mean(), 0.0))) if known.size else 0.0
 
 
 def _measured_pa(part: Part) -> Column:
