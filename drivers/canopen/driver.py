@@ -9,8 +9,8 @@ given what it does in its place before, for ACTIVE it would go to what was comma
 
 What else came since the last cycle (heartbeats, emergencies) is taken in by the next. Whatever cannot be trusted ends
 the connection; the reason begins with a `NodeEvent`. What does not end it is logged under that name. The readings of a
-node that is no actuator carry NOT_READY; so does the first of one that booted or was stopped by another master: that
-is more than a lost sample.
+node that is no actuator carry NOT_READY; so does the first of one that booted or was stopped by another master, as its
+heartbeat says, be it when it is opened again: that is more than a lost sample.
 """
 
 import math
@@ -31,7 +31,7 @@ from drivers.canopen.pdo import PdoExchange
 from drivers.canopen.readings import capabilities_of, reading_of
 from drivers.canopen.sdo import ILLEGAL_VALUE, SdoTransfers, Setting, device_sheet
 from drivers.canopen.watcher import NodeWatcher
-from fieldbus.canopen.objects import HOLDING, STATE_BITS, inactive_because
+from fieldbus.canopen.objects import HOLDING, LOCAL, STATE_BITS, NodeState, inactive_because
 
 START, ENTER_PRE_OPERATIONAL = 1, 128
 OPERATIONAL = bytes((5,))
@@ -66,6 +66,7 @@ class CanopenDriver:
         self._configuration = NodeConfiguration(config, sheet, self._bus, self._watcher, self._sdo, self._pdos)
         self._activation = Activation(config.map, self._bus)
         self._said_alive_s = -math.inf
+        self._has_driven = False
 
     @property
     def capabilities(self) -> Capabilities:
@@ -84,18 +85,23 @@ class CanopenDriver:
             own_ids = tuple(first + self._config.node for first in (EMERGENCY, SDO_ANSWER, HEARTBEAT))
             self._bus.open(own_ids)
             self._sdo.open()
+            if self._has_driven:
+                self._watcher.was_interrupted |= self._sdo.hears_stopped()
             set_point_pa = self._sdo.held_command_pa(self._config.map.command_pa)
-            held_pa = self._in_force_pa(set_point_pa)
+            status_word = self._status_word()
+            held_pa = self._in_force_pa(set_point_pa, status_word)
             wanted = self._configuration.wanted()
             self._say_alive()
             self._bus.hear((*own_ids, *self._pdos.tpdo_ids))
             self._sdo.require_alone()
-            self._set(wanted, None if held_pa == set_point_pa else held_pa)
+            as_found = held_pa == set_point_pa or status_word & LOCAL  # a set point is not taken then
+            self._set(wanted, None if as_found else held_pa)
             self._manage(START)
         except BaseException:
             self.close()
             raise
         self._watcher.begin()
+        self._has_driven = True
         return held_pa
 
     def read(self) -> Reading:
@@ -154,23 +160,25 @@ class CanopenDriver:
     def _manage(self, command: int) -> None:
         self._bus.send(NMT, bytes((command, self._config.node)))
 
-    def _in_force_pa(self, set_point_pa: float) -> float:
+    def _status_word(self) -> int:
+        """Return the status word; that of an ACTIVE node where it has none."""
+        entry = self._config.map.status_word
+        return NodeState.ACTIVE if entry is None else int(self._sdo.get(entry))
+
+    def _in_force_pa(self, set_point_pa: float, status_word: int) -> float:
         """Return the command that holds the valve where it is: the set point, or what the node does in its place.
 
         One that is not ACTIVE may hold, have vented or have filled: its pressure shows which, or where it shows none
-        its state says whether it holds.
+        its state says whether it holds. One that is operated locally does what it shows.
         """
-        objects = self._config.map
-        if objects.status_word is None:
-            return set_point_pa
-        status_word = int(self._sdo.get(objects.status_word))
         if inactive_because(status_word) is None:
             return set_point_pa
-        shown_pa = math.nan if objects.pressure_pa is None else self._sdo.get(objects.pressure_pa)
+        shown = self._config.map.pressure_pa
+        shown_pa = math.nan if shown is None else self._sdo.get(shown)
         if not math.isfinite(shown_pa):
             return set_point_pa if status_word & STATE_BITS in HOLDING else 0.0
-        if self._config.acts_alone_by == "fill" and shown_pa > set_point_pa:
-            return shown_pa
+        if status_word & LOCAL or (self._config.acts_alone_by == "fill" and shown_pa > set_point_pa):
+            return max(shown_pa, 0.0)
         return min((set_point_pa, 0.0), key=lambda each: abs(each - shown_pa))
 
     def _set(self, wanted: Sequence[Setting], command_pa: float | None) -> None:

@@ -208,6 +208,10 @@ class SdoTransfers:
             self._receive(rest_s)
         return self._watcher.state == OPERATIONAL
 
+    def hears_stopped(self) -> bool:
+        """Return whether the node's heartbeat says that it is not OPERATIONAL; raises as `hears_operational`."""
+        return not self.hears_operational() and self._watcher.state is not None
+
     def _encoded(self, index: int, subindex: int, value: float) -> bytes:
         variable = self._sheet.get_variable(index, subindex)
         if variable is None:

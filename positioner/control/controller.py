@@ -7,7 +7,8 @@ the running integrals of the identification. It reads no clock.
 from dataclasses import replace
 from typing import NamedTuple
 
-from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode, Refusal, Restored, State
+from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode, Quality, Refusal, Restored, State
+from config.quantities import DeviceStatus
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
@@ -427,11 +428,15 @@ def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool)
 def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
     """Return what to hold: the last command, for a push what follows it; over S3 the one before it.
 
-    After a fault what a device came back with.
+    After a fault what a device came back with, and what one shows that does not obey: it may be operated locally, and
+    shall stay where it is when it is given back.
     """
     memory, sample = now.memory, now.sample
-    if sample.held_pa is not None and supervision.fault:
-        return sample.held_pa
+    if supervision.fault:
+        if sample.held_pa is not None:
+            return sample.held_pa
+        if sample.quality is Quality.GOOD and sample.status & DeviceStatus.NOT_READY:
+            return sample.pressure_pa
     if state is S3 or memory.state is S3:
         return memory.held_pa
     return held_by_law_pa(memory.law, memory.wanted_pa)

@@ -278,18 +278,21 @@ class Link:
         return replace(sample, quality=Quality.REPEATED) if repeated else sample
 
     def _in_force_pa(self, set_point_pa: float, reading: Reading) -> float:
-        """Return the command that holds the device where it is: its set point, or what it does by itself in its place.
+        """Return the command that holds the device where it is: its set point, or what it does in its place.
 
-        Which of them it is shows its pressure; where it shows none, what it was told to do says it.
+        Where it acts by itself, its pressure shows which of them; where it shows none, what it was told to do says it.
+        One that is not ready, for it is operated locally, does what it shows.
         """
-        if not reading.status & DeviceStatus.COMMUNICATION_LOST:
-            return set_point_pa
+        acts_alone = bool(reading.status & DeviceStatus.COMMUNICATION_LOST)
+        is_unready = bool(reading.status & DeviceStatus.NOT_READY)
         vented_pa, filled_pa = self._settings.vented_pa, self._settings.filled_pa
         shown_pa = reading.pressure_pa
         if shown_pa is None:
-            by_itself_pa = {"vent": vented_pa, "fill": filled_pa}
+            by_itself_pa = {"vent": vented_pa, "fill": filled_pa} if acts_alone else {}
             return by_itself_pa.get(self._settings.acts_alone_by or "hold", set_point_pa)
-        return min((set_point_pa, vented_pa, filled_pa), key=lambda each: abs(each - shown_pa))
+        if acts_alone:
+            return min((set_point_pa, vented_pa, filled_pa), key=lambda each: abs(each - shown_pa))
+        return min(max(shown_pa, vented_pa), filled_pa) if is_unready else set_point_pa
 
     def _lose(self, error: DriverError) -> None:
         self.counts.lost_replies += 1

@@ -307,6 +307,31 @@ def test_a_restarted_device_keeps_the_pressure_it_came_back_with() -> None:
     assert bench.step().command_pa == 5e3
 
 
+@pytest.mark.parametrize(
+    ("status", "action", "command_pa"),
+    [
+        (DeviceStatus.NOT_READY, "hold", 33e3),
+        (DeviceStatus.NOT_READY, "vent", 0.0),
+        (DeviceStatus.SENSOR_FAULT, "hold", 60e3),
+    ],
+)
+def test_a_device_that_does_not_obey_stays_where_it_is_when_it_does_again(
+    status: DeviceStatus, action: str, command_pa: float
+) -> None:
+    """Operated locally it goes where its operator wants it; with the command of before it would leave that at once."""
+    bench = automatic(safety={"action": action})
+    bench.ask(reference_m=0.05)
+    assert bench.step().command_pa == pytest.approx(60e3)
+    for shown_pa in (60e3, 45e3, 33e3):
+        decision = bench.step(status=status, pressure_pa=shown_pa)
+    assert decision.fault is Fault.DEVICE
+    assert decision.command_pa == pytest.approx(command_pa)
+    bench.step(status=status, pressure_pa=90e3, quality=Quality.REPEATED)
+    assert bench.step(pressure_pa=31e3).command_pa == pytest.approx(command_pa), "it obeys again, and is held"
+    bench.acknowledge()
+    assert bench.step().command_pa == pytest.approx(command_pa)
+
+
 def test_a_device_that_was_restarted_unseen_is_one_though_it_has_its_command_again() -> None:
     bench = automatic()
     bench.ask(reference_m=0.05)

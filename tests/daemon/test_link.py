@@ -145,6 +145,14 @@ def test_a_device_that_has_vented_or_filled_by_itself_and_kept_its_set_point_is_
     assert link.exchange(60e3).held_pa == in_force_pa
 
 
+@pytest.mark.parametrize(("shown_pa", "in_force_pa"), [(85e3, 85e3), (1e3, 20e3), (250e3, 140e3), (None, 60e3)])
+def test_a_device_that_is_operated_locally_is_held_where_it_is(shown_pa: float | None, in_force_pa: float) -> None:
+    """Its set point is of before: given back, it would go there."""
+    driver = Scripted(held_pa=60e3)
+    driver.shown = replace(reading(1), pressure_pa=shown_pa, status=DeviceStatus.NOT_READY)
+    assert Link(driver, DevicePace(), BY_ITSELF).open()[0] == in_force_pa
+
+
 def test_a_device_that_obeys_is_held_at_its_set_point_whatever_pressure_it_shows() -> None:
     driver = Scripted(held_pa=60e3)
     driver.shown = replace(reading(1), pressure_pa=1e3)

@@ -387,6 +387,32 @@ def test_a_node_that_another_master_resets_or_stops(
     recovers(driver, node)
 
 
+def test_a_node_that_was_stopped_is_one_though_its_tpdo_was_missed_before_its_heartbeat_said_so(
+    driver: CanopenDriver, node: Scripted, third: can.BusABC
+) -> None:
+    third.send(frame(0, bytes((128, NODE))))
+    in_time(lambda: node.node.state == 127)
+    driver._pdos._reply_timeout_s = 0.05
+    fails(NoReply, NodeEvent.SYNC_LOST, lambda: driver.exchange(PUSH_PA))
+    driver._pdos._reply_timeout_s = PATIENT_S
+    beat = (HEARTBEAT, bytes((127,)))
+    node.fault = lambda identity, data: [(identity, data), beat] if identity == ANSWER else [(identity, data)]
+    driver.open()
+    node.fault = honest
+    statuses = [driver.read().status for _ in range(2)]
+    assert statuses == [DeviceStatus.NOT_READY, 0], "another master wanted it so: that is a fault, not a lost sample"
+
+
+def test_a_tpdo_that_is_lost_is_no_stop_of_the_node(driver: CanopenDriver, node: Scripted) -> None:
+    node.fault = without(TPDO_1)
+    driver._pdos._reply_timeout_s = 0.05
+    fails(NoReply, NodeEvent.SYNC_LOST, lambda: driver.exchange(PUSH_PA))
+    driver._pdos._reply_timeout_s = PATIENT_S
+    node.fault = honest
+    driver.open()
+    assert driver.read().status == 0
+
+
 def test_a_heartbeat_from_before_the_start_is_not_taken_for_a_stop(driver: CanopenDriver, node: Scripted) -> None:
     node.node.send_message(HEARTBEAT, bytes((127,)))
     assert driver.exchange(PUSH_PA).sample_counter == 2
@@ -411,6 +437,25 @@ def test_a_node_operated_locally_is_no_actuator_and_says_why(
         (each.message, each.__dict__["fields"].get("why")) for each in caplog.records if each.name == "drivers.canopen"
     ]
     assert told == [(NodeEvent.NOT_ACTIVE, "it is operated locally"), (NodeEvent.ACTIVE, None)]
+
+
+def test_a_node_operated_locally_that_is_found_so_is_left_where_it_is(
+    driver: CanopenDriver, node: Scripted, third: can.BusABC
+) -> None:
+    """Its set point is of before, and it would go there when it is given back."""
+    driver.close()
+    third.send(frame(0x600 + NODE, b"\x2f\x42\x60\x00\x02\0\0\0"))
+    in_time(lambda: node.node.machine.mode == 2)
+    local_pa = PUSH_PA / 2
+    assert SIMULATED_OBJECTS.pressure_pa is not None
+    node.node._reads[SIMULATED_OBJECTS.pressure_pa.index] = lambda: local_pa
+    assert driver.open() == local_pa
+    assert driver.exchange(local_pa).status == DeviceStatus.NOT_READY
+    third.send(frame(0x600 + NODE, b"\x2f\x42\x60\x00\x01\0\0\0"))
+    in_time(lambda: node.node.machine.mode == 1)
+    driver.exchange(local_pa)
+    assert driver.exchange(local_pa).status == 0
+    assert node.device.command_pa == local_pa
 
 
 def test_silence_makes_the_node_act_and_its_fault_is_reset_when_the_master_is_back(
