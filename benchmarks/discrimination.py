@@ -33,8 +33,7 @@ from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
 from workbench.data.record import ready
-from workbench.fit.fitting import fit
-from workbench.select.discrimination import (
+from workbench.discriminate.discrimination import (
     BUDGET,
     FEW_MOVES,
     Designer,
@@ -44,10 +43,11 @@ from workbench.select.discrimination import (
     by_run_or_slips,
     discriminate,
 )
+from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms, courses
+from workbench.discriminate.rival_race import RivalRace
+from workbench.fit.fitting import fit
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment
-from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms, courses
-from workbench.select.rival_race import RivalRace
 
 PERIOD_S = 0.01
 RATE_PA_PER_S = 400e3

@@ -20,12 +20,12 @@ from config.recording import Recording
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from workbench.data.held_out import split
 from workbench.data.imposed_motion import read_imposed
+from workbench.diagnose.diagnosis import diagnose
+from workbench.diagnose.positioner_or_packing import positioner_or_packing
 from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.select.block_errors import block_errors
-from workbench.select.diagnosis import diagnose
 from workbench.select.effect_candidates import EvaluatedModel
-from workbench.select.positioner_or_packing import positioner_or_packing
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 RUNS = ("J_2", "J_3", "J_5", "J_7", "J_9")

@@ -45,13 +45,13 @@ if TYPE_CHECKING:
     from workbench.blind.hiding import Hidden, hide
     from workbench.compare.comparison import Comparison, compare
     from workbench.data.imposed_motion import read_imposed
+    from workbench.diagnose.diagnosis import Diagnosis, diagnose
+    from workbench.diagnose.extension import Extension, extend
     from workbench.discover.discovery import Discovery, discover
     from workbench.fit.fit_result import Fit
     from workbench.fit.fitting import fit
     from workbench.fleet.fleet import Fleet, fleet
     from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
-    from workbench.select.diagnosis import Diagnosis, diagnose
-    from workbench.select.extension import Extension, extend
 
 __version__ = "0.1.0"
 
@@ -84,8 +84,8 @@ _ROOMS = {
     "workbench.fit.fitting": ("Fit", "fit"),
     "workbench.fleet.fleet": ("Fleet", "fleet"),
     "workbench.forces.force_diagnosis": ("ForceDiagnosis", "diagnose_forces"),
-    "workbench.select.diagnosis": ("Diagnosis", "diagnose"),
-    "workbench.select.extension": ("Extension", "extend"),
+    "workbench.diagnose.diagnosis": ("Diagnosis", "diagnose"),
+    "workbench.diagnose.extension": ("Extension", "extend"),
 }
 """The library's names, by where they live today."""
 _LIVES_IN = {name: room for room, names in _ROOMS.items() for name in names}

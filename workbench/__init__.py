@@ -9,26 +9,28 @@
 
 Its rooms, each on those before it:
 
-    data       a recording made ready
-    model      the model run through it
-    compare    where it fails
-    fit        the parameters that explain it
-    select     which effect is missing, and how it is added
-    discover   the form of an effect that the library lacks
-    forces     the same where a rig imposes the position, and there is nothing to simulate
-    blind      recordings with an effect that nobody knows
-    report     all of it for a browser
-    fleet      many valves at once
+    data           a recording made ready
+    model          the model run through it
+    compare        where it fails
+    fit            the parameters that explain it
+    select         which effect is missing: the library refitted, the rule by which one is added
+    discover       the form of an effect that the library lacks
+    diagnose       what is said of it, and the valve with it
+    forces         the same where a rig imposes the position, and there is nothing to simulate
+    discriminate   rivals told apart by experiments
+    blind          recordings with an effect that nobody knows
+    report         all of it for a browser
+    fleet          many valves at once
 """
 
 from config.recording import Recording
 from workbench.compare.comparison import Comparison, compare
 from workbench.data.imposed_motion import read_imposed
+from workbench.diagnose.diagnosis import Diagnosis, diagnose
+from workbench.diagnose.extension import Extension, extend
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
-from workbench.select.diagnosis import Diagnosis, diagnose
-from workbench.select.extension import Extension, extend
 
 __all__ = [
     "Comparison",

@@ -9,8 +9,8 @@ from positioner.cli.parts.output_files import make_folder, write_json
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
-    from workbench.select.discrimination import Played, Player, Round
-    from workbench.select.experiment_design import Bounds, DesignedExperiment
+    from workbench.discriminate.discrimination import Played, Player, Round
+    from workbench.discriminate.experiment_design import Bounds, DesignedExperiment
 
 HELP = "diagnose, then play experiments on the valve until the rivals are told apart (moves it: state S3)"
 EXAMPLE = "positioner discriminate site.toml --rec rec.csv --valve better.toml --out told"
@@ -51,8 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import Progress
     from sim.effect import find_effect, tried_effects
-    from workbench.select.diagnosis import diagnose
-    from workbench.select.discrimination import discriminate, rivals_of
+    from workbench.diagnose.diagnosis import diagnose
+    from workbench.discriminate.discrimination import discriminate, rivals_of
 
     file = load_daemon(arguments.config, arguments.name)
     bounds = _bounds(file, arguments.config)
@@ -100,7 +100,7 @@ def _bounds(file: "DaemonFile", config: Path) -> "Bounds":
     """
     from config.errors import InputError
     from positioner.control.settings import Settings
-    from workbench.select.experiment_design import Bounds
+    from workbench.discriminate.experiment_design import Bounds
 
     limits = Settings.of(file).experiment
     approach_s = (limits.maximum_pa - limits.minimum_pa) / limits.rate_pa_per_s

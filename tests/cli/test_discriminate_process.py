@@ -17,7 +17,7 @@ from positioner.cli.parts.experiment_player import is_of, player_on
 from positioner.dcs import Dcs
 from tests.children import running
 from tests.cli.test_daemon_process import daemon_file, slave_file, until
-from workbench.select.experiment_design import Course, DesignedExperiment, Leg
+from workbench.discriminate.experiment_design import Course, DesignedExperiment, Leg
 
 pytestmark = pytest.mark.real_time
 

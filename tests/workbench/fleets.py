@@ -15,8 +15,8 @@ from config.writing import valve_toml, write_valve
 from sim.composition import Composition
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import Trial
+from workbench.diagnose.diagnosis import Diagnosis, diagnose
 from workbench.fleet.examination import examine
-from workbench.select.diagnosis import Diagnosis, diagnose
 
 HEAD = "valve,file,recording,when\n"
 ROWS, PERIOD_S = 1000, 0.02
@@ -85,7 +85,7 @@ def examined_here(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("workbench.fleet.drill_down.diagnose", once)
     patch.setattr("workbench.fleet.fleet.work", straight)
     patch.setattr("workbench.fleet.fleet.cluster", lambda *_: Straight())
-    patch.setattr("workbench.select.diagnosis.tried_effects", lambda: FEW)
+    patch.setattr("workbench.diagnose.diagnosis.tried_effects", lambda: FEW)
 
 
 def serve_cluster(said: Connection) -> None:

@@ -17,11 +17,11 @@ from config.valve_file import load_valve
 from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
+from workbench.diagnose.diagnosis import Diagnosis, diagnose
+from workbench.diagnose.extension import extend, extension_of
+from workbench.diagnose.extension_journal import Journal, write_extended
 from workbench.fit.fitting import fit
-from workbench.select.diagnosis import Diagnosis, diagnose
 from workbench.select.experiment import MENU, experiment
-from workbench.select.extension import extend, extension_of
-from workbench.select.extension_journal import Journal, write_extended
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAGGING = with_effect(BARE, "ip_lag", time_constant_s=0.05)

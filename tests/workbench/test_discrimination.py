@@ -18,12 +18,12 @@ from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
+from workbench.discriminate.discrimination import Discrimination, Played, Player, Round, discriminate
+from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg, Terms
+from workbench.discriminate.rival_race import RivalRace, Weighed, _independent_share, log_odds
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.select.discrimination import Discrimination, Played, Player, Round, discriminate
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg, Terms
-from workbench.select.rival_race import RivalRace, Weighed, _independent_share, log_odds
 
 LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
 BARE = drawn_valve(np.random.default_rng(11))
@@ -269,7 +269,7 @@ def words(fits: dict[str, Fit], recording: Recording, tmp_path: Path, monkeypatc
     rivals = [SimpleNamespace(name=name, model=SimpleNamespace(fit=each)) for name, each in fits.items()]
     steps = [SimpleNamespace(indistinguishable=rivals)]
     diagnosis = SimpleNamespace(verdict="one_of", sentence="one of two", steps=steps)
-    monkeypatch.setattr("workbench.select.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("workbench.diagnose.diagnosis.diagnose", lambda *_, **__: diagnosis)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.player_on", lambda *_: answering)
     config, rec = tmp_path / "site.toml", tmp_path / "rec.csv"
@@ -285,7 +285,7 @@ def words(fits: dict[str, Fit], recording: Recording, tmp_path: Path, monkeypatc
 def test_the_command_tells_a_lag_from_a_dead_time(
     words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("workbench.select.experiment_design.TRIED", 4)
+    monkeypatch.setattr("workbench.discriminate.experiment_design.TRIED", 4)
     out = tmp_path / "told"
     assert main(words) == 0
     said = capsys.readouterr().out
@@ -306,7 +306,7 @@ def test_broken_off_it_says_that_nothing_is_named_and_keeps_what_was_played(
         player(DesignedExperiment(COURSE, 1.0))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("workbench.select.discrimination.discriminate", broken_off)
+    monkeypatch.setattr("workbench.discriminate.discrimination.discriminate", broken_off)
     assert main(words) == 130
     told = tmp_path / "told"
     said = capsys.readouterr().err
@@ -340,7 +340,7 @@ def test_an_effect_that_begins_to_act_only_then_gives_no_odds(fits: dict[str, Fi
 def test_the_best_is_not_named_if_it_does_not_explain_the_experiments(
     fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("workbench.select.rival_race.RARELY_OFF", 0.5)
+    monkeypatch.setattr("workbench.discriminate.rival_race.RARELY_OFF", 0.5)
     monkeypatch.setattr(RivalRace, "searched_anew", lambda race: race)
     found = discriminate(fits, [recording], answering, BOUNDS, LIBRARY, design=Design(2.0))
     assert (found.outcome, found.named) == ("unexplained", ())

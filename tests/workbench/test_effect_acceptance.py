@@ -12,6 +12,7 @@ from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.hand_made import FLOOR_M, model_of
 from workbench.data.held_out import joined, residual_m, split
 from workbench.data.record import ready
+from workbench.diagnose.verdict_sentence import reduction_sentence
 from workbench.select.block_errors import (
     BlockErrors,
     block_logs,
@@ -23,7 +24,6 @@ from workbench.select.effect_acceptance import Gain
 from workbench.select.effect_acceptance import gain as gain_of
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.residual_structure import STRUCTURED, structure
-from workbench.select.verdict_sentence import reduction_sentence
 
 LIBRARY = {name: shipped_effect(name, "test") for name in shipped_effects()}
 NOISE_M = 5e-5

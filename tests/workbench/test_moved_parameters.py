@@ -6,8 +6,8 @@ from config.drive import KINDS
 from config.valve_file import EffectTable, ValveFile
 from tests.workbench.hand_made import LIBRARY, fit_of
 from tests.workbench.valves import SEED
+from workbench.diagnose.moved_parameters import Moved, moved_parameters
 from workbench.fit.fitted_parameter import Fitted
-from workbench.select.moved_parameters import Moved, moved_parameters
 
 
 def moved(before_n: float, lower_n: float, upper_n: float) -> tuple[Moved, ...]:

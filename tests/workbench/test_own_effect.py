@@ -14,8 +14,8 @@ from config.writing import valve_toml, write_valve
 from positioner.cli.main import main
 from sim.effect import FOLDERS_ALLOWED, find_effect
 from tests.workbench.valves import drawn_valve, record_of, with_effect
+from workbench.diagnose.extension_journal import Journal
 from workbench.fit.fitting import fit
-from workbench.select.extension_journal import Journal
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
 BARE = drawn_valve(np.random.default_rng(11))

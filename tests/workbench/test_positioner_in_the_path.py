@@ -16,12 +16,12 @@ from tests.workbench.valves import with_effect
 from workbench import compare, fit
 from workbench.data.held_out import split
 from workbench.data.record import ready
+from workbench.diagnose.positioner_or_packing import PositionerOrPacking, cause, positioner_or_packing
 from workbench.model.free_run import Accuracy, FreeRun
 from workbench.model.sampling import DYNAMIC
 from workbench.report import Subject, report_comparison
 from workbench.select.effect_acceptance import Gain
 from workbench.select.effect_search import evaluated
-from workbench.select.positioner_or_packing import PositionerOrPacking, cause, positioner_or_packing
 
 KNOWN = valve_file(200.0, gain_pa_per_ms=0.4 * PA_PER_M, dead_band_m=0.001, venting_pa_per_s=2e4)
 

@@ -17,8 +17,8 @@ from sim.effect import shipped_effect
 from workbench import compare, diagnose, fit
 from workbench.compare.friction_balance import forces
 from workbench.data.record import ready
+from workbench.diagnose.diagnosis import Diagnosis
 from workbench.model.free_run import FreeRun
-from workbench.select.diagnosis import Diagnosis
 
 QUANTUM_RAD = 2.0 * np.pi / 1e4
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"

@@ -14,12 +14,12 @@ from tests.workbench.valves import PERIOD_S, drawn_valve, pressures, with_effect
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
+from workbench.discriminate.experiment_design import Bounds, Terms
+from workbench.discriminate.rival_race import Weighed, evidence, log_odds, slip_odds
+from workbench.discriminate.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_m, slips
+from workbench.discriminate.slip_promise import promised_by_slips
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import local_fit
-from workbench.select.experiment_design import Bounds, Terms
-from workbench.select.rival_race import Weighed, evidence, log_odds, slip_odds
-from workbench.select.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_m, slips
-from workbench.select.slip_promise import promised_by_slips
 
 BARE = drawn_valve(np.random.default_rng(11))
 PRELOADED = with_effect(BARE, "preload", force_n=60.0)

@@ -8,14 +8,14 @@ import pytest
 from config.recording import Column, Recording
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, model_of
 from workbench.data.held_out import Split, split
+from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnose.diagnosis_json import as_json
+from workbench.diagnose.judged_landings import JudgedLandings
+from workbench.diagnose.verdict import verdict
+from workbench.diagnose.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
 from workbench.model.sampling import Motion, Sampling
-from workbench.select.diagnosis import Diagnosis
-from workbench.select.diagnosis_json import as_json
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
-from workbench.select.judged_landings import JudgedLandings
 from workbench.select.rest_errors import RestErrors
-from workbench.select.verdict import verdict
-from workbench.select.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
 
 POOR = model_of(cost=20.0 * AT_FLOOR, error_m=20.0 * FLOOR_M)
 EXPLAINED = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M)

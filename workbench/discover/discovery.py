@@ -29,10 +29,10 @@ from workbench.discover.found_form import FoundForm
 from workbench.discover.grammar import FORMS
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.model.sampling import sampling
+from workbench.select.block_errors import knife_edges_sentence
 from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress
-from workbench.select.verdict_sentence import knife_edges_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

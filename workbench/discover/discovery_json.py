@@ -4,7 +4,7 @@ from typing import Any
 
 from workbench.discover.discovery import Discovery
 from workbench.discover.found_form import FoundForm
-from workbench.select.diagnosis_json import parameters_json
+from workbench.fit.fitted_parameter import parameters_json
 
 
 def as_json(found: Discovery) -> dict[str, Any]:
@@ -50,5 +50,5 @@ def _form(each: FoundForm) -> dict[str, Any]:
         "to": each.span[1],
         "train_rmse_m": errors.train_rmse_m,
         "test_rmse_m": errors.test_rmse_m,
-        "parameters": parameters_json(each.model.fit),
+        "parameters": parameters_json(each.model.fit.parameters),
     }

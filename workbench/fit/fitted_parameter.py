@@ -35,6 +35,14 @@ class Fitted:
         return "at the end of its range" if self.at_bound else ""
 
 
+def parameters_json(parameters: Mapping[str, Fitted]) -> dict[str, dict[str, float | bool | None]]:
+    """Return what was fitted; a bound that the recording leaves open is not finite: null, once it is written."""
+    return {
+        name: {key: getattr(each, key) for key in ("value", "std", "lower", "upper", "physical")}
+        for name, each in parameters.items()
+    }
+
+
 def parameter_table(parameters: Mapping[str, Fitted], kind: Kind, title: str = "") -> Table:
     """Return the parameters with their intervals; units are in the names."""
     rows = [

@@ -10,13 +10,13 @@ from pathlib import Path
 from config.errors import InputError
 from config.recording import Recording
 from config.writing import write_valve
+from workbench.diagnose.diagnosis import diagnose
 from workbench.fleet.examination import CHANGED, UNTOLD
 from workbench.fleet.fleet import Fleet
 from workbench.fleet.store import request_key
 from workbench.fleet.valve_course import ValveCourse
 from workbench.report.diagnosis_report import report_diagnosis
 from workbench.report.page import Subject, require_plotly
-from workbench.select.diagnosis import diagnose
 
 KEY_LENGTH = 24
 """Characters of a key that name a report."""

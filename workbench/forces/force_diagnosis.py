@@ -19,13 +19,13 @@ from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import Effect, shipped_effect
 from workbench.data.imposed_motion import Rows, rows_of
+from workbench.diagnose.verdict import Verdict
+from workbench.diagnose.verdict_sentence import rivals_sentence, verdict_line
 from workbench.forces.force_balance import Balance, ForceFit, ForceModel, floor_of
 from workbench.select.block_errors import indistinguishable, relative_error_reduction
 from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, candidate_table, draw_race
 from workbench.select.effect_acceptance import LEAST_BIC, Gain, no_better
 from workbench.select.forward_selection import MOST_ADDED, Candidate, ForwardSelection, ForwardStep, without_missing
-from workbench.select.verdict import Verdict
-from workbench.select.verdict_sentence import rivals_sentence, verdict_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

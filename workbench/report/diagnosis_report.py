@@ -9,6 +9,7 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
+from workbench.diagnose.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import MORE_LANDINGS
 from workbench.report import ranking
@@ -37,7 +38,6 @@ from workbench.report.plot_series import drawn, rounded
 from workbench.report.ranking import RankedEffect
 from workbench.report.signature_loop import signature
 from workbench.report.units import Reading, Shown, of_stroke, times
-from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import LEAST_BIC
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import undetectable

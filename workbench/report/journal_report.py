@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from config.drive import Kind
+from workbench.diagnose.extension_journal import ExtensionStep, Journal
 from workbench.report import ranking
 from workbench.report.page import (
     Html,
@@ -20,7 +21,6 @@ from workbench.report.page import (
     write,
 )
 from workbench.report.units import Reading, Shown, times
-from workbench.select.extension_journal import ExtensionStep, Journal
 
 WORDS = {
     "As given": "The valve file as it was before the step, nothing fitted.",

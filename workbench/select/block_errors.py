@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from config.drive import Scale
 from config.errors import InputError
 from config.recording import Column
 from config.results.result import Brief
@@ -184,3 +185,11 @@ def independent_share(error_m: Column) -> float:
     rho = float(np.mean(e[1:][pairs] * e[:-1][pairs])) / power if power > 0.0 else 0.0
     rho = min(max(rho, 0.0), 1.0)
     return (1.0 - rho) / (1.0 + rho)
+
+
+def knife_edges_sentence(errors: BlockErrors, length: Scale) -> str:
+    """Name the held-out slips that were excepted, with a leading space; empty if none was."""
+    if not errors.knife_edges:
+        return ""
+    named = "; ".join(each.sentence for each in errors.knife_edges)
+    return f" Excepted on what was held out: {named}; without, {length.said(errors.test_rest_rmse_m)} rms."

@@ -13,8 +13,8 @@ from positioner.cli.parts.daemon_address import connected
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from positioner.dcs import Dcs
-    from workbench.select.discrimination import Player
-    from workbench.select.experiment_design import DesignedExperiment
+    from workbench.discriminate.discrimination import Player
+    from workbench.discriminate.experiment_design import DesignedExperiment
 
 RECORDED_WITHIN_S = 10.0
 POLL_S = 0.3
@@ -60,7 +60,7 @@ def require_ready(file: "DaemonFile", arguments: argparse.Namespace) -> None:
 def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
     """Return what plays experiments on the daemon's valve."""
     from config.codes import ExperimentState
-    from workbench.select.discrimination import Played
+    from workbench.discriminate.discrimination import Played
 
     folder = _folder(file, arguments)
 

@@ -13,14 +13,14 @@ from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.effect_panel import effect_section
 from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
+from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnose.extension import Extension, extension_of
 from workbench.fit.fit_result import Fit
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
 from workbench.report.units import OF_VALVE
-from workbench.select.diagnosis import Diagnosis
-from workbench.select.extension import Extension, extension_of
 
 LOOK_S = 0.2
 ADDING = """<q-td :props="props"><q-btn flat dense no-caps icon="add" color="primary" :label="props.value"

@@ -18,6 +18,13 @@ from sim.effect import find_effect, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
+from workbench.diagnose.judged_landings import judged_landings
+from workbench.diagnose.kept_mass import KeptMass, kept_mass
+from workbench.diagnose.measured_pressure import ByMeasuredPressure, by_measured_pressure
+from workbench.diagnose.moved_parameters import Moved, moved_parameters
+from workbench.diagnose.positioner_or_packing import PositionerOrPacking, positioner_or_packing
+from workbench.diagnose.verdict import EXPLAINED, Verdict, by_another_name, verdict
+from workbench.diagnose.verdict_sentence import verdict_line, verdict_sentence
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
@@ -28,14 +35,7 @@ from workbench.select.effect_search import EffectSearch, Progress, Race
 from workbench.select.equivalence import undetectable, unseen_without_spring
 from workbench.select.experiment import Experiment
 from workbench.select.forward_selection import ForwardSelection
-from workbench.select.judged_landings import judged_landings
-from workbench.select.kept_mass import KeptMass, kept_mass
-from workbench.select.measured_pressure import ByMeasuredPressure, by_measured_pressure
-from workbench.select.moved_parameters import Moved, moved_parameters
-from workbench.select.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.select.tangent_preview import TangentScore, preview
-from workbench.select.verdict import EXPLAINED, Verdict, by_another_name, verdict
-from workbench.select.verdict_sentence import verdict_line, verdict_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

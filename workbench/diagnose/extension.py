@@ -19,13 +19,13 @@ from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.effect import find_effect
 from workbench.data.held_out import Part, Split, residual_m, split
+from workbench.diagnose.diagnosis import Diagnosis
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import fit, profiled
 from workbench.model.free_run import FreeRun
 from workbench.model.sampling import Sampling
 from workbench.select.block_errors import BlockErrors, block_errors
-from workbench.select.diagnosis import Diagnosis
 from workbench.select.effect_acceptance import Gain, gain
 
 if TYPE_CHECKING:

@@ -47,6 +47,9 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.data.held_out import joined
 from workbench.data.record import ready, require_few_samples, require_fittable
+from workbench.discriminate.experiment_design import DesignedExperiment, Terms, designed
+from workbench.discriminate.slip_evidence import Slips, needed_m, slips
+from workbench.discriminate.slip_promise import promised_by_slips
 from workbench.fit.descent import MIDDLING, descended, settled
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
@@ -62,9 +65,6 @@ from workbench.select.block_errors import (
     relative_error_reduction,
 )
 from workbench.select.experiment import REST_S
-from workbench.select.experiment_design import DesignedExperiment, Terms, designed
-from workbench.select.slip_evidence import Slips, needed_m, slips
-from workbench.select.slip_promise import promised_by_slips
 
 ODDS = 100.0
 """Of the best against all others, that name it."""

@@ -6,8 +6,8 @@ more than a factor of 2 in it, so it never exceeds 0.5.
 
 from typing import Any
 
-from workbench.fit.fit_result import Fit
-from workbench.select.diagnosis import Diagnosis
+from workbench.diagnose.diagnosis import Diagnosis
+from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable
 
@@ -67,7 +67,7 @@ def _model(model: EvaluatedModel) -> dict[str, Any]:
         "rests_off_m": model.errors.rests.off_m if model.errors.rests else None,
         "rests_scatter_m": model.errors.rests.scatter_m if model.errors.rests else None,
         "pressure_off_pa": model.pressure.rms_pa if model.pressure else None,
-        "parameters": parameters_json(model.fit),
+        "parameters": parameters_json(model.fit.parameters),
     }
 
 
@@ -76,14 +76,6 @@ def _errors(model: EvaluatedModel) -> dict[str, float]:
         "train_rmse_m": model.errors.train_rmse_m,
         "test_rmse_m": model.errors.test_rmse_m,
         "test_typical_rmse_m": model.errors.test_block_m,
-    }
-
-
-def parameters_json(fit: Fit) -> dict[str, dict[str, float | bool | None]]:
-    """Return what was fitted; a bound that the recording leaves open is not finite: null, once it is written."""
-    return {
-        name: {key: getattr(each, key) for key in ("value", "std", "lower", "upper", "physical")}
-        for name, each in fit.parameters.items()
     }
 
 
@@ -99,7 +91,7 @@ def _candidate(candidate: EffectCandidate) -> dict[str, Any]:
         "evidence": found and found.bic,
         "held_out_gain": found and found.held_out,
         "held_out_standard_errors": found and found.standard_errors,
-        "parameters": parameters_json(model.fit) if model else {},
+        "parameters": parameters_json(model.fit.parameters) if model else {},
         "physical": candidate.physical,
         "accepted": candidate.accepted,
         "why_not": candidate.rejection_reason,

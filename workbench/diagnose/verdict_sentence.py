@@ -6,12 +6,12 @@ from config.drive import Kind, Scale
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
-from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
+from workbench.diagnose.judged_landings import unknown_between_samples
+from workbench.diagnose.verdict import EXPLAINED, Verdict, by_another_name
+from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, knife_edges_sentence
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
-from workbench.select.judged_landings import unknown_between_samples
 from workbench.select.pressure_errors import PressureErrors
-from workbench.select.verdict import EXPLAINED, Verdict, by_another_name
 
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
@@ -125,14 +125,6 @@ def reduction_sentence(before: BlockErrors, after: BlockErrors, length: Scale) -
     return (
         f"the held-out error of a typical second falls {typical}, though a narrowly mistimed slip moves the rms {whole}"
     )
-
-
-def knife_edges_sentence(errors: BlockErrors, length: Scale) -> str:
-    """Name the held-out slips that were excepted, with a leading space; empty if none was."""
-    if not errors.knife_edges:
-        return ""
-    named = "; ".join(each.sentence for each in errors.knife_edges)
-    return f" Excepted on what was held out: {named}; without, {length.said(errors.test_rest_rmse_m)} rms."
 
 
 def rivals_sentence(names: Sequence[str], library: Mapping[str, Effect]) -> str:

@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from workbench.diagnose.extension import Extension
+from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.block_errors import BlockErrors
-from workbench.select.diagnosis_json import parameters_json
-from workbench.select.extension import Extension
 
 
 def as_json(extension: Extension) -> dict[str, Any]:
@@ -17,8 +17,8 @@ def as_json(extension: Extension) -> dict[str, Any]:
             "train_rmse_m": extension.given_train_rmse_m,
             "test_rmse_m": extension.given_test_rmse_m,
         },
-        "refitted": _errors(extension.refitted_errors) | {"parameters": parameters_json(extension.refitted)},
-        "extended": _errors(extension.extended_errors) | {"parameters": parameters_json(extension.extended)},
+        "refitted": _errors(extension.refitted_errors) | {"parameters": parameters_json(extension.refitted.parameters)},
+        "extended": _errors(extension.extended_errors) | {"parameters": parameters_json(extension.extended.parameters)},
         "floor_m": extension.split.floor_m,
         "evidence": found.bic,
         "held_out_gain": found.held_out,

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from sim.karnopp import Vector
 from workbench.data.record import Record
+from workbench.discriminate.experiment_design import SEARCHED, Course, Rivalry, Terms, courses
+from workbench.discriminate.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 from workbench.fit.fit_result import Fit
 from workbench.fit.landings import FEWEST
 from workbench.fit.threads import on_threads
-from workbench.select.experiment_design import SEARCHED, Course, Rivalry, Terms, courses
-from workbench.select.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 
 Matrix = NDArray[np.float64]
 HOPELESS = 0.01

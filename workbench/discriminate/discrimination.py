@@ -23,13 +23,13 @@ from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
 from sim.effect import Effect
+from workbench.diagnose.diagnosis import Diagnosis
+from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms
+from workbench.discriminate.rival_race import ODDS, RivalRace
 from workbench.fit.fit_result import Fit
-from workbench.select.diagnosis import Diagnosis
-from workbench.select.diagnosis_json import parameters_json
+from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.effect_search import Progress
 from workbench.select.equivalence import classes
-from workbench.select.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms
-from workbench.select.rival_race import ODDS, RivalRace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,7 +183,8 @@ class Discrimination(Result):
                 for each in self.rounds
             ],
             "fits": {
-                name: {"rmse_m": each.rms_m, "parameters": parameters_json(each)} for name, each in self.fits.items()
+                name: {"rmse_m": each.rms_m, "parameters": parameters_json(each.parameters)}
+                for name, each in self.fits.items()
             },
         }
 

@@ -17,8 +17,8 @@ untrusted     the searches disagree, and the best of them explains nothing
 from collections.abc import Sequence
 from typing import Literal
 
+from workbench.diagnose.judged_landings import JudgedLandings
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
-from workbench.select.judged_landings import JudgedLandings
 
 Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "unfinished", "untrusted"]
 EXPLAINED: tuple[Verdict, ...] = ("adequate", "missing", "one_of")

@@ -1,0 +1,14 @@
+"""What a recording says that a valve lacks, and whether that can be promised.
+
+Its files:
+
+    diagnosis, diagnosis_json                     puts it together; the same as JSON
+    verdict, verdict_sentence                     what follows, and how it is said
+    judged_landings                               how many landings a verdict rests on, where nothing else is judged
+    moved_parameters                              what the file's own effects are by the recording
+    kept_mass                                     what another mass than the valve file's would leave
+    measured_pressure                             what the stem is from the measured pressure on
+    positioner_or_packing                         what holds a stem behind its positioner
+    extension, extension_json                     adds what was found; the same as JSON
+    extension_journal                             what was added when, and why
+"""

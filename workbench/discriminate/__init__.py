@@ -1,0 +1,10 @@
+"""Rivals told apart by experiments on the valve.
+
+Its files:
+
+    discrimination                                one experiment after another, until one rival is left
+    experiment_design                             the input that tells rivals apart, designed
+    rival_race                                    the rivals weighed against each other in all recordings so far
+    slip_evidence                                 what slips say of a rival: balances, whatever came between
+    slip_promise                                  what the slips of an experiment promise to say
+"""
