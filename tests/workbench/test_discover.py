@@ -21,7 +21,7 @@ from sim.simulation import simulate
 from tests.independent import independent_client
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.blind.input_signal import excitation
-from workbench.discover import discovery
+from workbench.discover import form_search
 from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.discovery import discover
 from workbench.discover.form_file import form_text, write_forms
@@ -129,7 +129,7 @@ def test_a_hidden_spring_is_found_written_added_and_served(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(discovery, "FORMS", tuple(map(named, FEW)))
+    monkeypatch.setattr(form_search, "FORMS", tuple(map(named, FEW)))
     words = ["discover", "rec.csv", "--valve", "known.toml", "--test", "test.csv"]
     assert main([*words, "-o", "met.py", "--picture", "met.png", "--json", "said.json"]) == 0
     said = capsys.readouterr().out

@@ -23,6 +23,7 @@ from workbench.diagnose.kept_mass import KeptMass, kept_mass
 from workbench.diagnose.measured_pressure import ByMeasuredPressure, by_measured_pressure
 from workbench.diagnose.moved_parameters import Moved, moved_parameters
 from workbench.diagnose.positioner_or_packing import PositionerOrPacking, positioner_or_packing
+from workbench.diagnose.stand_in import StandIn, stand_in
 from workbench.diagnose.verdict import EXPLAINED, Verdict, by_another_name, verdict
 from workbench.diagnose.verdict_sentence import verdict_line, verdict_sentence
 from workbench.fit.breaking_off import BrokenOff, ending
@@ -62,6 +63,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Another mass than the file's, beside which less is left."""
     by_pressure: ByMeasuredPressure | None = None
     """What the best model is from the measured pressure on, where its own is another."""
+    stand_in: StandIn | None = None
+    """A form without a name that does better than what was named, which is then no explanation."""
 
     @property
     def kind(self) -> Kind:
@@ -221,11 +224,16 @@ def diagnose(
             base, best = search.with_intervals((steps[0].before, _last(steps)))
             landed = judged_landings(best.fit, parts)
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
-            chosen = search.experiment(steps) if found == "one_of" else None
             mass = kept_mass(best, parts, tell)
             pressed = by_measured_pressure(best, parts, seed=seed, workers=threads, progress=tell)
+            outdone = None
+            if found in EXPLAINED and not (mass or pressed):
+                outdone = stand_in(best, steps, valve, library, parts, seed=seed, workers=threads, progress=tell)
+                found = "unexplained" if outdone else found
+            chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):
             steps, found, chosen, mass, pressed = search.so_far(base), "unfinished", None, None, None
+            outdone = None
             base, best = steps[0].before, _last(steps)
     own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
     moved = moved_parameters(valve, best.fit, library | own) if found in EXPLAINED else ()
@@ -238,6 +246,7 @@ def diagnose(
         experiment=chosen,
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts)
+        + (f" {outdone.sentence}." if outdone else "")
         + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
         + (f" But {mass.sentence}." if mass else "")
         + (f" But {pressed.sentence(best.fit.kind)}." if pressed else ""),
@@ -246,6 +255,7 @@ def diagnose(
         moved=moved,
         kept_mass=mass,
         by_pressure=pressed,
+        stand_in=outdone,
     )
 
 

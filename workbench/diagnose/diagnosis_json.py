@@ -46,6 +46,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "by_pressure": diagnosis.by_pressure
         and {"off_pa": diagnosis.by_pressure.off_pa, **_model(diagnosis.by_pressure.model)},
+        "stand_in": diagnosis.stand_in
+        and {"form": diagnosis.stand_in.form, "test_rmse_m": diagnosis.stand_in.form_rmse_m},
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,

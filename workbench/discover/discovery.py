@@ -7,11 +7,9 @@ leaves nothing to explain: a falling error alone proves nothing, of many forms l
 stands beside it.
 """
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import cpu_count
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from config.errors import InputError
@@ -19,16 +17,12 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import find_effect, written_here
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told
 from workbench.discover.added_force import Landing, landings
-from workbench.discover.form_file import write_forms
-from workbench.discover.form_search import FormSearch
+from workbench.discover.form_search import searched_forms
 from workbench.discover.found_form import FoundForm
-from workbench.discover.grammar import FORMS
 from workbench.fit.fitted_parameter import parameter_table
-from workbench.model.sampling import sampling
 from workbench.select.block_errors import knife_edges_sentence
 from workbench.select.candidate_table import candidate_columns, candidate_table, lengths
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
@@ -161,16 +155,18 @@ def discover(
         raise InputError("recording", "has a set point and no pressure: a form is sought where command_pa is there")
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
-    by = sampling(parts.train.record, valve.valve)
     base = EffectSearch(parts, {}, valve.valve, seed=seed, workers=threads, progress=tell).base(valve)
     if base.complete or parts.floor_m is None:
         return Discovery("explained" if base.complete else "unjudged", base, (), (), (), parts, ())
-    with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
-        written = write_forms(FORMS, Path(folder))
-        effects = {path: find_effect(path, "forms") for path in written}
-        effects = {path: each for path, each in effects.items() if not by.left_out(each)}
-        search = FormSearch(parts, valve, {path: written[path] for path in effects}, effects, seed, threads, tell)
-        searched = search.run(base, on_proposal or (lambda _names: None))
+    searched = searched_forms(
+        parts,
+        valve,
+        base,
+        seed=seed,
+        workers=threads,
+        progress=tell,
+        on_proposal=on_proposal or (lambda _names: None),
+    )
     found = searched.found
     outcome: Outcome = "none" if not found else "found" if len(found) == 1 else "one_of"
     missing = tuple(landings(searched.base.fit, parts))

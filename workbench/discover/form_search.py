@@ -6,6 +6,7 @@ curve is tried: the same place and variable with a free shape. The forms of the 
 of this explains the recordings.
 """
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -16,17 +17,18 @@ from config.errors import InputError
 from config.results.result import Brief
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from sim.effect import Effect, find_effect
+from sim.effect import Effect, find_effect, written_here
 from workbench.data.held_out import Split
 from workbench.discover.added_force import variable_range
 from workbench.discover.curve import curve_of, has_curve
 from workbench.discover.form_file import write_forms
 from workbench.discover.found_form import FoundForm
-from workbench.discover.grammar import Form
+from workbench.discover.grammar import FORMS, Form
 from workbench.discover.proposal import Proposal, proposed
 from workbench.fit.begun_fit import BegunFit
 from workbench.fit.fitting import begun_fit, profiled
 from workbench.fit.threads import on_threads
+from workbench.model.sampling import sampling
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel, judged_step
 from workbench.select.effect_search import BETTER, OUT_OF_RACE, EffectSearch, Progress, evaluated
 
@@ -62,6 +64,41 @@ class SearchedForms(Brief):
     """Forms that were not fitted."""
 
 
+def searched_forms(
+    parts: Split,
+    valve: ValveFile,
+    base: EvaluatedModel,
+    *,
+    seed: int,
+    workers: int,
+    progress: Progress,
+    on_proposal: Callable[[tuple[str, ...]], None] = lambda _names: None,
+    likeliest: bool = False,
+    against: float = inf,
+) -> SearchedForms:
+    """Search for a form beside a valve that a recording does not explain.
+
+    Args:
+        parts: of the record, fitted and held out.
+        valve: where fits begin; its own effects stay.
+        base: the same, fitted.
+        seed: of the searches.
+        workers: threads; the result does not depend on it.
+        progress: called with what is being done, and the fraction of it done.
+        on_proposal: given the forms' names, the likeliest first, as soon as they are there.
+        likeliest: whether the first turn is all.
+        against: cost of what they are held against.
+    """
+    by = sampling(parts.train.record, valve.valve)
+    with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
+        written = write_forms(FORMS, Path(folder))
+        effects = {path: find_effect(path, "forms") for path in written}
+        effects = {path: each for path, each in effects.items() if not by.left_out(each)}
+        forms = {path: written[path] for path in effects}
+        most = FIRST if likeliest else MOST
+        return FormSearch(parts, valve, forms, effects, seed, workers, progress, most, against).run(base, on_proposal)
+
+
 @dataclass(frozen=True, slots=True)
 class FormSearch:
     """The search for a form over one split recording."""
@@ -75,6 +112,10 @@ class FormSearch:
     seed: int
     workers: int
     tell: Progress
+    most: int = MOST
+    """Forms that are fitted at most."""
+    against: float = inf
+    """Cost of what they are held against: a form far above it waits."""
 
     def run(self, base: EvaluatedModel, on_proposal: Callable[[tuple[str, ...]], None]) -> SearchedForms:
         """Rank and fit the forms, the likeliest first, until one explains all."""
@@ -87,8 +128,8 @@ class FormSearch:
         on_proposal(tuple(self.forms[each.name].name for each in order))
         models: dict[str, EvaluatedModel | str] = {}
         here = _Tried(judged_step(base, models, 1, self.effects), dict(self.forms), dict(self.effects))
-        for turn in (order[:FIRST], order[FIRST:MOST]):
-            models |= self._fitted(here.step.before, turn, _least(models))
+        for turn in (order[:FIRST], order[FIRST : self.most]):
+            models |= self._fitted(here.step.before, turn, min(self.against, _least(models)))
             here = self._judged(here, models)
             for _ in range(ROUNDS):
                 if _explains(here.step):

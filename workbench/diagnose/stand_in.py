@@ -1,0 +1,121 @@
+"""Whether what was named only stands in for something: a form without a name does better, and acts elsewhere.
+
+Of a library that lacks the effect something else comes near, often to less than smooth friction leaves (`AT_FLOOR`).
+Where an explained record leaves more than the noise may be off by, the likeliest forms of the grammar
+(`workbench.discover`) are therefore fitted to the valve without what was named. One of them alone does better if
+
+    BIC(named) - BIC(form) > 10     in independent samples, and
+    the block error, fitted and held out, falls by more than two standard errors
+
+and acts elsewhere if it acts at another place on the path pressure, force, friction, motion, sensor than the one effect
+named, its rivals and what is the same by algebra. At the same place it is the same effect in another shape. One form
+that does better than several effects together makes stand-ins of them, wherever it acts.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from config.drive import Scale
+from config.results.result import Brief
+from config.valve_file import ValveFile
+from sim.effect import Effect
+from workbench.data.held_out import Split
+from workbench.diagnose.kept_mass import leaves_something
+from workbench.discover.form_search import searched_forms
+from workbench.discover.found_form import FoundForm
+from workbench.select.block_errors import relative_error_reduction
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, bic
+from workbench.select.effect_candidates import EffectStep, EvaluatedModel
+from workbench.select.effect_search import Progress
+from workbench.select.equivalence import algebraic_class
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class StandIn(Brief):
+    """What was named, and the form that does better."""
+
+    named: tuple[str, ...]
+    form: str
+    words: str
+    """What the form is."""
+    named_rmse_m: float
+    """Held out, with what was named."""
+    form_rmse_m: float
+    length: Scale
+    """As it is read."""
+
+    @property
+    def sentence(self) -> str:
+        """Say so, in one sentence."""
+        stand = "stands" if len(self.named) == 1 else "stand"
+        return (
+            f"A form without a name does better: {self.words}, alone, leaves {self.length.number(self.form_rmse_m)} "
+            f"held out in place of {self.length.said(self.named_rmse_m)}; {' and '.join(self.named)} only {stand} in "
+            "for it, and `positioner discover` writes it"
+        )
+
+
+def stand_in(
+    best: EvaluatedModel,
+    steps: Sequence[EffectStep],
+    valve: ValveFile,
+    library: Mapping[str, Effect],
+    parts: Split,
+    *,
+    seed: int,
+    workers: int,
+    progress: Progress,
+) -> StandIn | None:
+    """Return what does better than what was named; None where nothing does, or nothing is left of the record.
+
+    Nor is it asked behind a positioner, or where samples lie farther apart than slides last.
+
+    Args:
+        best: the model with what was named.
+        steps: to it.
+        valve: as it was diagnosed.
+        library: what was tried.
+        parts: of the record, fitted and held out.
+        seed: of the searches.
+        workers: threads.
+        progress: called with what is under way, and the fraction done.
+    """
+    added = [step for step in steps if step.added]
+    if not added or not leaves_something(best) or best.fit.by.slow or parts.train.record.by_setpoint:
+        return None
+    named = tuple(step.added.name for step in added if step.added)
+    rivals = [each.name for step in added for each in step.indistinguishable]
+    places = {place for name in (*named, *rivals) for place in _places(name, library)}
+    found = searched_forms(
+        parts,
+        valve,
+        steps[0].before,
+        against=best.fit.cost,
+        likeliest=True,
+        seed=seed,
+        workers=workers,
+        progress=progress,
+    ).found
+    better = [
+        each for each in found if _better(each, best) and (len(named) > 1 or each.form.place.function not in places)
+    ]
+    if not better:
+        return None
+    form, errors = better[0].form, better[0].model.errors
+    return StandIn(named, form.name, form.words, best.errors.test_rmse_m, errors.test_rmse_m, best.fit.kind.length)
+
+
+def _places(name: str, library: Mapping[str, Effect]) -> set[str]:
+    """Return where an effect acts, or what is the same by algebra."""
+    by_name = {each.name: each for each in library.values()}
+    return {
+        place for each in (name, *algebraic_class(name, library)) if each in by_name for place in by_name[each].places
+    }
+
+
+def _better(form: FoundForm, best: EvaluatedModel) -> bool:
+    """Whether a form does better than what was named, fitted and held out."""
+    errors = form.model.errors
+    evidence = errors.independent_share * (bic(best.fit) - bic(form.model.fit))
+    _, standard_errors = relative_error_reduction(best.errors.all_logs, errors.all_logs)
+    return evidence > LEAST_BIC and standard_errors > LEAST_STANDARD_ERRORS
