@@ -70,15 +70,15 @@ class LinkSettings:
         after = file.device.sampling == "after" and not lockstep
         read_back_s = 0.0 if file.cycle.shadow else file.safety.read_back_s
         return cls(
-            file.longest_unattended_s,
-            read_back_s,
-            tolerance_pa,
-            after,
-            file.cycle.shadow,
-            lockstep,
-            file.pressure.minimum_pa,
-            file.pressure.maximum_pa,
-            file.device.acts_alone_by,
+            longest_unattended_s=file.longest_unattended_s,
+            read_back_s=read_back_s,
+            read_back_tolerance_pa=tolerance_pa,
+            pressure_is_after=after,
+            shadow=file.cycle.shadow,
+            in_lockstep=lockstep,
+            vented_pa=file.pressure.minimum_pa,
+            filled_pa=file.pressure.maximum_pa,
+            acts_alone_by=file.device.acts_alone_by,
         )
 
 

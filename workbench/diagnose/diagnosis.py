@@ -7,14 +7,14 @@ accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all ste
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import cpu_count
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from config.drive import Kind
 from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import find_effect, tried_effects
+from sim.effect import Effect, find_effect, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
@@ -224,16 +224,11 @@ def diagnose(
             base, best = search.with_intervals((steps[0].before, _last(steps)))
             landed = judged_landings(best.fit, parts)
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
-            mass = kept_mass(best, parts, tell)
-            pressed = by_measured_pressure(best, parts, seed=seed, workers=threads, progress=tell)
-            outdone = None
-            if found in EXPLAINED and not (mass or pressed):
-                outdone = stand_in(best, steps, valve, library, parts, seed=seed, workers=threads, progress=tell)
-                found = "unexplained" if outdone else found
+            asked = _asked(found, best, steps, valve, library, parts, seed=seed, workers=threads, tell=tell)
+            found = "unexplained" if asked.stand_in else found
             chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):
-            steps, found, chosen, mass, pressed = search.so_far(base), "unfinished", None, None, None
-            outdone = None
+            steps, found, chosen, asked = search.so_far(base), "unfinished", None, Asked()
             base, best = steps[0].before, _last(steps)
     own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
     moved = moved_parameters(valve, best.fit, library | own) if found in EXPLAINED else ()
@@ -246,17 +241,46 @@ def diagnose(
         experiment=chosen,
         split=parts,
         sentence=verdict_sentence(found, best, steps, library, parts)
-        + (f" {outdone.sentence}." if outdone else "")
+        + (f" {asked.stand_in.sentence}." if asked.stand_in else "")
         + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
-        + (f" But {mass.sentence}." if mass else "")
-        + (f" But {pressed.sentence(best.fit.kind)}." if pressed else ""),
+        + (f" But {asked.kept_mass.sentence}." if asked.kept_mass else "")
+        + (f" But {asked.by_pressure.sentence(best.fit.kind)}." if asked.by_pressure else ""),
         unseen=unseen,
         positioner=held,
         moved=moved,
-        kept_mass=mass,
-        by_pressure=pressed,
-        stand_in=outdone,
+        kept_mass=asked.kept_mass,
+        by_pressure=asked.by_pressure,
+        stand_in=asked.stand_in,
     )
+
+
+class Asked(NamedTuple):
+    """What the best model is asked before it is believed; None where there is nothing to say."""
+
+    kept_mass: KeptMass | None = None
+    by_pressure: ByMeasuredPressure | None = None
+    stand_in: StandIn | None = None
+
+
+def _asked(
+    found: Verdict,
+    best: EvaluatedModel,
+    steps: Sequence[EffectStep],
+    valve: ValveFile,
+    library: Mapping[str, Effect],
+    parts: Split,
+    *,
+    seed: int,
+    workers: int,
+    tell: Progress,
+) -> Asked:
+    """Ask the best model for its mass, its pressure, and, where neither is another, whether it only stands in."""
+    mass = kept_mass(best, parts, tell)
+    pressed = by_measured_pressure(best, parts, seed=seed, workers=workers, progress=tell)
+    if found not in EXPLAINED or mass or pressed:
+        return Asked(mass, pressed)
+    outdone = stand_in(best, steps, valve, library, parts, seed=seed, workers=workers, progress=tell)
+    return Asked(stand_in=outdone)
 
 
 def _last(steps: Sequence[EffectStep]) -> EvaluatedModel:
