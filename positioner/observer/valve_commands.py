@@ -51,6 +51,13 @@ def refusal_for(role: Role, *registers: str) -> str | None:
     return None
 
 
+def _as_read(name: str, value: float) -> str:
+    """Return a register's value as a person reads it; the reference in %, as it is typed."""
+    if name in CODES:
+        return code_text(name, value)
+    return f"{100 * value:.6g} %" if name == "reference" else f"{value:.6g}"
+
+
 class ValveCommands:
     """Commands to one valve.
 
@@ -70,7 +77,7 @@ class ValveCommands:
 
         def written(dcs: Dcs) -> Confirmation:
             read = dcs.set_and_read_back(name, value)
-            said = code_text(name, read) if name in CODES else f"{read:.6g}"
+            said = _as_read(name, read)
             if abs(read - value) <= SAME * max(1.0, abs(value)):
                 return Confirmation(True, f"{name} is {said}, as read back")
             return Confirmation(False, f"{name} was written, but reads back {said}")
@@ -82,7 +89,9 @@ class ValveCommands:
         return self.set(role, "mode", mode)
 
     def set_reference(self, role: Role, reference_pu: float) -> Confirmation:
-        """Ask for a position."""
+        """Ask for a position; what is allowed is said in %, as it is typed."""
+        if refusal_for(role, "reference") is None and register_named("reference").problem_with(reference_pu):
+            return Confirmation(False, f"reference: allowed is 0 to 100 %, got {_as_read('reference', reference_pu)}")
         return self.set(role, "reference", reference_pu)
 
     def acknowledge(self, role: Role) -> Confirmation:

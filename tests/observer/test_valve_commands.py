@@ -66,9 +66,15 @@ def daemon() -> Daemon:
 
 
 def test_a_write_is_confirmed_by_what_reads_back(daemon: Daemon) -> None:
-    assert daemon.commands.set_reference(Role.OPERATOR, 0.25) == Confirmation(True, "reference is 0.25, as read back")
+    assert daemon.commands.set_reference(Role.OPERATOR, 0.25) == Confirmation(True, "reference is 25 %, as read back")
     assert daemon.commands.set_mode(Role.ENGINEER, Mode.HOLD) == Confirmation(True, "mode is hold, as read back")
     assert daemon.writes == [(Role.OPERATOR, "reference", 0.25), (Role.ENGINEER, "mode", Mode.HOLD)]
+
+
+def test_a_position_that_is_not_allowed_is_refused_in_what_it_was_typed_in(daemon: Daemon) -> None:
+    said = Confirmation(False, "reference: allowed is 0 to 100 %, got 150 %")
+    assert daemon.commands.set_reference(Role.OPERATOR, 1.5) == said
+    assert daemon.writes == []
 
 
 def test_a_write_that_reads_back_otherwise_is_not_confirmed(daemon: Daemon) -> None:

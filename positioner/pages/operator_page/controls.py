@@ -10,14 +10,15 @@ from dataclasses import dataclass
 from nicegui import ui
 
 from config.codes import Mode
+from config.errors import InputError
 from config.passwords import SignIn
-from config.registers import register_named
 from config.role_passwords import WRITERS
 from config.roles import Role
 from positioner.observer.permissives import identify_permissives
 from positioner.observer.valve_commands import EXCITATION, Confirmation, refusal_for
 from positioner.observer.valve_view import ValvePicture
 from positioner.observer.watched_valves import WatchedValve
+from positioner.pages.parts.number_field import NumberField
 from positioner.pages.parts.telling import aside, heading
 
 SIGNED_IN_S = 900.0
@@ -132,13 +133,8 @@ class Controls:
         self._bar.set_value(round(self._progress, 2))
 
     def _reference_row(self) -> None:
-        register = register_named("reference")
-        assert register.minimum is not None
-        assert register.maximum is not None
         with ui.row().classes("items-end full-width no-wrap"):
-            self._reference = ui.number(
-                "reference, %", min=100 * register.minimum, max=100 * register.maximum, step=1, format="%.6g"
-            )
+            self._reference = NumberField("reference, %", name="reference")
             self._reference.classes("col").props('data-testid="reference-input"').on(
                 "keydown.enter", self._set_reference
             )
@@ -176,10 +172,15 @@ class Controls:
         self._parts.append((self._identify, EXCITATION))
 
     async def _set_reference(self) -> None:
-        if self._reference.value is None:
+        try:
+            reference = self._reference.number()
+        except InputError as error:
+            self._said.set_text(f"✗ {error}")
+            return
+        if reference is None:
             self._said.set_text("reference: type a number")
             return
-        await self._do(self._valve.commands.set_reference, float(self._reference.value) / 100)
+        await self._do(self._valve.commands.set_reference, reference / 100)
 
     def _set_mode(self, role: Role, mode: Mode) -> Confirmation:
         return self._valve.commands.set_mode(role, mode)

@@ -9,6 +9,7 @@ Its files:
     telling              errors and sentences, shown
     units, unit_choice   the units that a person reads in, and where they are chosen
     live_text            a text that changes many times a second
+    number_field         where a number is typed
     drop_box             where a file is dropped
     figure_view          a plotly figure on a page, its colours those of the theme
 """

@@ -8,6 +8,7 @@ from nicegui import ui
 from config.errors import InputError
 from config.exports.column_mapping import offered_units
 from positioner.pages.parts.figure_view import Figure, FigureView
+from positioner.pages.parts.number_field import NumberField
 from positioner.pages.parts.telling import aside, heading, sentences
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.desk import Desk
@@ -47,7 +48,7 @@ class ColumnsPanel:
                 unit = desk.units.length_unit()
                 stroke_m = self._stroke_m()
                 value = None if stroke_m is None else round(unit.per_si * stroke_m, 6)
-                self._stroke = ui.number(f"stroke, {unit.name}, if position is in %", value=value, min=0)
+                self._stroke = NumberField(f"stroke, {unit.name}, if position is in %", value, name="--stroke-m")
                 self._time_format = ui.input("how dates are written", value=export.proposed.time_format)
                 for each in (self._stroke, self._time_format):
                     each.props("dense").classes("w-full").on("blur", self._show)
@@ -79,25 +80,26 @@ class ColumnsPanel:
             ours: f"{column.value}:{unit.value}" if column.value and unit.value else column.value or ""
             for ours, (column, unit) in self._columns.items()
         }
-        stroke = self._stroke.value
+        stroke = self._stroke.number()
         stroke_m = stroke / self._desk.units.length_unit().per_si if stroke else None
         return ColumnChoice(said, stroke_m, self._time_format.value or "")
 
     async def _show(self) -> None:
         """Read it as chosen and show what it would be, or why it cannot be read so."""
         self._asked += 1
-        mine, choice = self._asked, self._choice()
+        mine = self._asked
         self._confirm.set_enabled(False)
         try:
+            choice = self._choice()
             read = await aside(mapped, self._export, choice)
             said = await aside(wrong_with, read, choice.stroke_m)
         except InputError as error:
             asked = ASKED.get(error.source, self._export.name)
             self._put(mine, None, [f"{asked}: {error.problem}"])
             return
-        self._put(mine, read, list(said))
+        self._put(mine, read, list(said), choice.stroke_m)
 
-    def _put(self, asked: int, read: Opened | None, said: list[str]) -> None:
+    def _put(self, asked: int, read: Opened | None, said: list[str], stroke_m: float | None = None) -> None:
         if asked != self._asked or self._preview.is_deleted:
             return
         self._read = read
@@ -108,11 +110,12 @@ class ColumnsPanel:
                 ui.label("It cannot be read so:").classes("text-weight-medium")
             else:
                 ui.label(f"Read so: {read.recording.summary().splitlines()[0]}").classes("text-weight-medium")
-                FigureView(self._theme, lambda: self._drawn(read), PREVIEW_PX, "the recording as it would be read")
+                FigureView(
+                    self._theme, lambda: self._drawn(read, stroke_m), PREVIEW_PX, "the recording as it would be read"
+                )
             sentences(said, "preview-said")
 
-    def _drawn(self, read: Opened) -> Figure:
-        stroke_m = self._choice().stroke_m
+    def _drawn(self, read: Opened, stroke_m: float | None) -> Figure:
         return export_figure(
             read.recording, math.nan if stroke_m is None else stroke_m, self._desk.units, self._theme.ink
         )

@@ -12,6 +12,7 @@ from config.errors import InputError
 from config.loading import SHIPPED
 from config.writing import write_valve
 from positioner.pages.parts.drop_box import drop_box
+from positioner.pages.parts.number_field import NumberField
 from positioner.pages.parts.telling import aside, errors_told, heading, sentences
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.columns_panel import ColumnsPanel
@@ -119,20 +120,20 @@ class OpenPanel:
             self._data_sheet()
 
     def _data_sheet(self) -> None:
-        area = ui.number("diaphragm area, cm²", value=700.0, min=0)
-        low = ui.number("bench range from, bar", value=0.2, min=0, step=0.1)
-        high = ui.number("bench range to, bar", value=1.0, min=0, step=0.1)
-        stroke = ui.number("stroke, mm", value=40.0, min=0)
-        friction = ui.number("friction, % of range (PTFE 2-6, graphite 5-15)", value=5.0, min=0)
-        ratio = ui.number("break-away over sliding friction", value=1.3, min=1, step=0.1)
+        area = NumberField("diaphragm area, cm²", 700.0)
+        low = NumberField("bench range from, bar", 0.2)
+        high = NumberField("bench range to, bar", 1.0)
+        stroke = NumberField("stroke, mm", 40.0)
+        friction = NumberField("friction, % of range (PTFE 2-6, graphite 5-15)", 5.0)
+        ratio = NumberField("break-away over sliding friction", 1.3)
         told = ui.column()
 
         async def made() -> None:
             with errors_told():
-                values = [each.value for each in (area, low, high, stroke)]
-                if any(each is None for each in values):
+                area_cm2, low_bar, high_bar, stroke_mm = (each.number() for each in (area, low, high, stroke))
+                if area_cm2 is None or low_bar is None or high_bar is None or stroke_mm is None:
                     raise InputError("data sheet", "area, bench range and stroke are needed")
-                sheet = DataSheet(values[0], (values[1], values[2]), values[3], friction.value, ratio.value)
+                sheet = DataSheet(area_cm2, (low_bar, high_bar), stroke_mm, friction.number(), ratio.number())
                 file, given, assumed = from_data_sheet(sheet)
                 path = self._desk.folder / "data-sheet.toml"
                 write_valve(path, file)
