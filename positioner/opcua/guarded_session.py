@@ -128,7 +128,11 @@ class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
         write = self.iserver.door.writes.get(asked.NodeId)
         if write is None or asked.AttributeId != ua.AttributeIds.Value:
             return ua.StatusCode(ua.StatusCodes.BadNotWritable)
-        sent = asked.Value.Value
+        sent, quality = asked.Value.Value, asked.Value.StatusCode
+        if quality is not None and not quality.is_good():
+            # A value that its own client takes for bad or uncertain is nothing to move a valve by.
+            doubtful = Answer("BadWriteNotSupported", f"only a good value is taken, its status was {quality.name}")
+            return self._status(doubtful, "set point")
         value = number_in(sent.Value if sent is not None else None)
         return self._status(await write(self.role, value), "set point")
 

@@ -130,6 +130,11 @@ def test_an_operator_moves_the_valve_and_identifies_nothing(site: Site) -> None:
             await valve(SETPOINT).write_value(ua.Variant(141.0, ua.VariantType.Float))
         with pytest.raises(ua.uaerrors.BadOutOfRange):
             await valve(SETPOINT).write_value(ua.Variant("half", ua.VariantType.String))
+        # What the client itself says to be bad, or uncertain, as a broker that lost its source, moves nothing.
+        for doubt in (ua.StatusCodes.BadSensorFailure, ua.StatusCodes.UncertainLastUsableValue):
+            value = ua.DataValue(ua.Variant(77.0, ua.VariantType.Float), ua.StatusCode(doubt))
+            with pytest.raises(ua.uaerrors.BadWriteNotSupported):
+                await valve(SETPOINT).write_attribute(ua.AttributeIds.Value, value)
         assert await valve.call("Acknowledge") == [True, "acknowledged, no fault is latched any more"]
         with pytest.raises(ua.uaerrors.BadUserAccessDenied):
             await valve.call(ADJUST, "SignalSet.Position", START)
