@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from workbench.fleet.examination import Examination
     from workbench.fleet.manifest import Entry
 
-HELP = "rank many valves by their recordings; exit status 1 if any deserves a look"
+HELP = "rank many valves by their recordings; exit status 1 if any deserves a look or of any nothing is known"
 EXAMPLE = "positioner fleet plant.csv --out fleet-out --report fleet.html"
 
 
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(changes.summary())
         if arguments.picture is not None:
             changes.plot().savefig(arguments.picture, dpi=120)
-    return 1 if found.complaining else 0
+    return 1 if found.complaining or found.unknown else 0
 
 
 def _tell(valve: str, entry: "Entry", found: "Examination") -> None:

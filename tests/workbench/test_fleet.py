@@ -60,7 +60,7 @@ def test_the_valves_are_ranked_by_what_their_recordings_say(site: Path, ranked: 
         ("absent", "recordings/absent.csv"),
     }
     assert (found.count, len(found.courses)) == (9, 5)
-    assert found.summary().startswith("2 of 5 valves deserve a look; 9 recordings, ")
+    assert found.summary().startswith("2 of 5 valves deserve a look, of 1 nothing is known; 9 recordings, ")
 
 
 def test_a_second_run_examines_nothing_anew_and_is_the_same_to_the_byte(
@@ -130,6 +130,8 @@ def test_the_columns_are_of_the_same_types_whatever_was_found(tmp_path: Path, ra
             assert one.name == other.name
             assert one.type == (pa.timestamp("us", tz="UTC") if other.type == pa.timestamp("us") else other.type)
             assert one.metadata[b"meaning"]
+    (row,) = parquet.read_table(tmp_path / "out" / "valves.parquet").to_pylist()
+    assert (row["kind"], row["outcome"], row["cost_share"]) == ("nothing known", "unreadable", None)
     (row,) = parquet.read_table(tmp_path / "out" / "recordings.parquet").to_pylist()
     assert row["when"] == datetime(2025, 12, 31, 23, tzinfo=UTC)
 
@@ -186,6 +188,21 @@ def course(*changes: dict[str, tuple[float, float]]) -> ValveCourse:
 )
 def test_what_changed_is_called_what_an_engineer_calls_it(changes: list[Any], kind: str) -> None:
     assert course(*changes).kind == kind
+
+
+@pytest.mark.parametrize("outcome", ["untrusted", "unjudged", "unfinished", "untold"])
+def test_what_nobody_has_judged_is_not_called_something_new(outcome: str) -> None:
+    made = ValveCourse("V")
+    made.take(Entry.model_validate({**PLACES, "when": "2026-01-01"}), Examination(outcome=outcome, sentence=""))
+    assert (made.kind, made.sure) == ("not judged", "not sure what")
+
+
+def test_a_fleet_of_which_nothing_is_known_deserves_a_look(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], without_dask: None
+) -> None:
+    (tmp_path / "plant.csv").write_text(HEAD + "a,seed,absent.csv,2026-01-01\n")
+    assert main(["fleet", str(tmp_path / "plant.csv"), "--out", str(tmp_path / "out")]) == 1
+    assert "0 of 1 valves deserve a look, of 1 nothing is known; 1 recordings" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("share", "gain", "kind"), [(0.85, 1.0, "air supply or leak"), (1.0, 0.9, "lost calibration")])

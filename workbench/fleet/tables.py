@@ -17,7 +17,7 @@ from typing import Any
 
 from config.errors import InputError
 from config.extras import needed
-from workbench.fleet.examination import Examination
+from workbench.fleet.examination import AS_BEFORE, Examination, unreadable
 from workbench.fleet.valve_course import Model, ValveCourse
 
 Rows = list[Mapping[str, Any]]
@@ -61,11 +61,11 @@ TABLES: Mapping[str, tuple[str, tuple[Column, ...]]] = {
         (
             Column("rank", "count", "1 is the gravest"),
             VALVE,
-            Column("kind", "text", "what an engineer calls it; empty: nothing is wrong"),
-            Column("outcome", "text", "of its gravest recording, see `recordings`"),
+            Column("kind", "text", "what an engineer calls it; empty: nothing is wrong, as a recording shows"),
+            Column("outcome", "text", "of its gravest recording, see `recordings`; unreadable: so are all of them"),
             EFFECTS,
             RIVALS,
-            Column("since", "time", "the recording that shows it; null: nothing is wrong"),
+            Column("since", "time", "the recording that shows it; null: nothing is wrong, or nothing known"),
             Column("sure", "text", "sure, one of several, or not sure what"),
             Column(
                 "cost_share", "number", "how far the stem is from where the last good model has it, rms, of the stroke"
@@ -154,8 +154,12 @@ def _valves(courses: Sequence[ValveCourse]) -> Rows:
     return [_valve(rank, course) for rank, course in enumerate(courses, start=1)]
 
 
+WELL = Examination(outcome=AS_BEFORE, sentence="")
+UNKNOWN = unreadable("none of its recordings could be examined")
+
+
 def _valve(rank: int, course: ValveCourse) -> Mapping[str, Any]:
-    entry, found = course.gravest or (None, Examination(outcome="as_before", sentence=""))
+    entry, found = course.gravest or (None, WELL if course.readable else UNKNOWN)
     latest = next((each for _, each in reversed(course.readable)), found)
     return {
         "rank": rank,
@@ -164,7 +168,7 @@ def _valve(rank: int, course: ValveCourse) -> Mapping[str, Any]:
         **_said(found),
         "since": entry.time if entry else None,
         "sure": course.sure,
-        "cost_share": course.cost_share,
+        "cost_share": course.cost_share if course.readable else None,
         **_figures(found),
         "dead_band_share": latest.dead_band_share,
         "drifting": ", ".join(course.drifting),

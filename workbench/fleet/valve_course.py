@@ -41,6 +41,9 @@ KINDS: Mapping[str, tuple[str, ...]] = {
 }
 """What an engineer calls it, by the effect that is missing or the parameter that changed."""
 UNKNOWN_KIND = "something new"
+NOT_JUDGED, NOTHING_KNOWN = "not judged", "nothing known"
+JUDGED = ("missing", "one_of", "unexplained", CHANGED)
+"""Outcomes that say what it is, or that the library has nothing for it."""
 SPRING, COULOMB = "spring_n_per_m", "coulomb_n"
 LIKE = 0.05
 """Relative difference of two factors that are taken for one."""
@@ -99,12 +102,14 @@ class ValveCourse:
 
     @property
     def kind(self) -> str:
-        """What an engineer calls it; empty if nothing is wrong."""
+        """What an engineer calls it; empty if nothing is wrong, as a recording shows."""
         if self.gravest is None:
-            return ""
+            return "" if self.readable else NOTHING_KNOWN
         _, found = self.gravest
         kinds = [kind_of(name) for name in found.effects] or kinds_of_changes(found.changes)
-        return ", ".join(dict.fromkeys([*(["drifts"] if self.drifting else []), *kinds])) or UNKNOWN_KIND
+        return ", ".join(dict.fromkeys([*(["drifts"] if self.drifting else []), *kinds])) or (
+            UNKNOWN_KIND if found.outcome in JUDGED else NOT_JUDGED
+        )
 
     @property
     def drifting(self) -> tuple[str, ...]:
