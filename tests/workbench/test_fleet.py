@@ -18,6 +18,7 @@ from tests.workbench.fleets import HEAD, examined_here, plant, play, record, tab
 from workbench.fleet.examination import Change, Examination
 from workbench.fleet.fleet import fleet
 from workbench.fleet.manifest import Entry, read_manifest
+from workbench.fleet.model_changes import changed_since
 from workbench.fleet.tables import columns_told, write_tables
 from workbench.fleet.valve_course import ValveCourse
 
@@ -195,6 +196,43 @@ def test_what_nobody_has_judged_is_not_called_something_new(outcome: str) -> Non
     made = ValveCourse("V")
     made.take(Entry.model_validate({**PLACES, "when": "2026-01-01"}), Examination(outcome=outcome, sentence=""))
     assert (made.kind, made.sure) == ("not judged", "not sure what")
+
+
+def seen(*outcomes: tuple[str, str]) -> ValveCourse:
+    """A valve whose recordings, a month apart, had these outcomes and effects."""
+    made = ValveCourse("V")
+    for month, (outcome, effect) in enumerate(outcomes, start=1):
+        entry = Entry.model_validate({**PLACES, "when": f"2026-{month:02}-01"})
+        effects = (effect,) if effect else ()
+        made.take(entry, Examination(outcome=outcome, sentence="", effects=effects))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "month"),
+    [
+        ([("as_before", ""), ("one_of", "preload"), ("one_of", "preload"), ("one_of", "preload")], 2),
+        ([("unexplained", ""), ("unexplained", "")], 1),
+        ([("one_of", "preload"), ("unreadable", ""), ("one_of", "preload")], 1),
+        ([("one_of", "preload"), ("as_before", ""), ("one_of", "preload")], 3),
+        ([("one_of", "backlash"), ("one_of", "preload")], 2),
+        ([("as_before", ""), ("changed", ""), ("changed", "")], 3),
+    ],
+)
+def test_what_is_seen_again_and_again_is_there_since_it_was_seen_first(
+    outcomes: list[tuple[str, str]], month: int
+) -> None:
+    course = seen(*outcomes)
+    assert course.since == datetime(2026, month, 1)
+    assert course.gravest
+    assert course.gravest[0].time.month == len(outcomes), "told by the latest"
+
+
+def test_what_was_there_before_is_no_change() -> None:
+    course = seen(("as_before", ""), ("one_of", "preload"), ("one_of", "preload"), ("one_of", "preload"))
+    assert not changed_since([course], datetime(2026, 2, 15)).complaints
+    (complaint,) = changed_since([course], datetime(2026, 1, 15)).complaints
+    assert complaint.since == datetime(2026, 2, 1)
 
 
 def test_a_fleet_of_which_nothing_is_known_deserves_a_look(

@@ -220,7 +220,7 @@ def _valve_path(written: str, folder: Path) -> Path:
 
 
 def _since(course: ValveCourse) -> str:
-    return f"{course.gravest[0].time:%Y-%m-%d}" if course.gravest else ""
+    return f"{course.since:%Y-%m-%d}" if course.since else ""
 
 
 def _said(course: ValveCourse) -> str:

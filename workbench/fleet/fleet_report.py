@@ -134,7 +134,7 @@ def _outcome(found: Examination) -> str:
 
 
 def _since(course: ValveCourse) -> str:
-    return f"{course.gravest[0].time:%Y-%m-%d}" if course.gravest else ""
+    return f"{course.since:%Y-%m-%d}" if course.since else ""
 
 
 def _share(course: ValveCourse) -> Shown:

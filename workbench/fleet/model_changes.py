@@ -119,7 +119,11 @@ def changed_since(courses: Sequence[ValveCourse], time: datetime) -> ModelChange
         Complaint(course.name, entry.time, found.sentence)
         for course in courses
         for entry, found in course.complaints()
-        if entry.time > time and found.model is None and found.outcome != CHANGED
+        if entry.time > time
+        and found.model is None
+        and found.outcome != CHANGED
+        # What was seen before, too, is no change, and what is seen again not another complaint.
+        and course.first_seen(entry, found) == entry.time
     ]
     return ModelChanges(time, tuple(each for course in courses for each in _changes(course, time)), tuple(complaints))
 

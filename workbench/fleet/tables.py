@@ -65,7 +65,9 @@ TABLES: Mapping[str, tuple[str, tuple[Column, ...]]] = {
             Column("outcome", "text", "of its gravest recording, see `recordings`; unreadable: so are all of them"),
             EFFECTS,
             RIVALS,
-            Column("since", "time", "the recording that shows it; null: nothing is wrong, or nothing known"),
+            Column(
+                "since", "time", "the first of the recordings that show it; null: nothing is wrong, or nothing known"
+            ),
             Column("sure", "text", "sure, one of several, or not sure what"),
             Column(
                 "cost_share", "number", "how far the stem is from where the last good model has it, rms, of the stroke"
@@ -159,14 +161,14 @@ UNKNOWN = unreadable("none of its recordings could be examined")
 
 
 def _valve(rank: int, course: ValveCourse) -> Mapping[str, Any]:
-    entry, found = course.gravest or (None, WELL if course.readable else UNKNOWN)
+    found = course.gravest[1] if course.gravest else WELL if course.readable else UNKNOWN
     latest = next((each for _, each in reversed(course.readable)), found)
     return {
         "rank": rank,
         "valve": course.name,
         "kind": course.kind,
         **_said(found),
-        "since": entry.time if entry else None,
+        "since": course.since,
         "sure": course.sure,
         "cost_share": course.cost_share if course.readable else None,
         **_figures(found),

@@ -101,6 +101,25 @@ class ValveCourse:
         return min(found, key=lambda each: GRAVEST.index(each[1].outcome), default=None)
 
     @property
+    def since(self) -> datetime | None:
+        """When the gravest was first seen; None: nothing is wrong, or nothing known."""
+        return None if self.gravest is None else self.first_seen(*self.gravest)
+
+    def first_seen(self, entry: Entry, found: Examination) -> datetime:
+        """Return when what a recording shows was first seen: in each one since then that could be read.
+
+        What changed has another model from then on: seen before, it was another change.
+        """
+        since = entry.time
+        if found.outcome == CHANGED:
+            return since
+        for earlier, came in reversed([each for each in self.readable if each[0].time < entry.time]):
+            if came.outcome != found.outcome or came.effects != found.effects:
+                break
+            since = earlier.time
+        return since
+
+    @property
     def kind(self) -> str:
         """What an engineer calls it; empty if nothing is wrong, as a recording shows."""
         if self.gravest is None:
