@@ -1,7 +1,7 @@
 """`positioner events`: what has happened, out of a daemon's history, also while it runs."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.history import HistoryReader
 
     show = _as_json if arguments.json else _in_words
-    with HistoryReader(_history_of(arguments.source)) as history:
+    where, ours = _history_of(arguments.source)
+    with HistoryReader(where) as history:
+        _require_known(arguments.valve, {*ours, *history.valves()})
         row = 0
         while True:
             found = _found(history, arguments, row)
@@ -51,8 +53,17 @@ def run(arguments: argparse.Namespace) -> int:
             time.sleep(FOLLOW_EVERY_S)
 
 
-def _history_of(source: Path) -> Path:
-    """Return where the history is.
+def _require_known(valve: str | None, known: Collection[str]) -> None:
+    """Refuse a name that no valve has: nothing printed would read as: nothing has happened."""
+    from config.errors import InputError
+
+    if valve is not None and valve not in known:
+        there = ", ".join(sorted(known)) or "none"
+        raise InputError("--valve", f"no valve of that name; there are: {there}, got {valve}")
+
+
+def _history_of(source: Path) -> tuple[Path, list[str]]:
+    """Return where the history is, and the valves of the daemon's file.
 
     Raises:
         InputError: the daemon's file is at fault, or keeps none.
@@ -61,11 +72,12 @@ def _history_of(source: Path) -> Path:
     from config.errors import InputError
 
     if source.suffix != ".toml":
-        return source
-    table = load_valves(source)[0].history
+        return source, []
+    valves = load_valves(source)
+    table = valves[0].history
     if table is None:
         raise InputError(str(source), "has no table [history], so nothing is kept")
-    return source.parent / table.folder
+    return source.parent / table.folder, [each.valve.name for each in valves]
 
 
 def _found(history: "HistoryReader", arguments: argparse.Namespace, after_row: int) -> list[tuple[int, Any]]:

@@ -55,6 +55,18 @@ class HistoryReader:
         """Return the newest events, oldest first."""
         return [event for _, event in self.rows(Event, valve, since_s, limit=limit)]
 
+    def valves(self) -> list[str]:
+        """Return the names of the valves that anything has happened to.
+
+        Raises:
+            InputError: the file is damaged, or cannot be read any more.
+        """
+        try:
+            found = self._connection.execute(f"SELECT DISTINCT valve FROM {Event.TABLE} ORDER BY valve").fetchall()
+        except sqlite3.Error as error:
+            raise InputError(str(self.path), f"cannot be read: {error}") from None
+        return [name for (name,) in found]
+
     def rows(
         self,
         of: type[E],

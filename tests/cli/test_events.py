@@ -64,6 +64,22 @@ def test_events_are_lines_or_json_by_valve_time_and_number(tmp_path: Path, capsy
     ]
 
 
+def test_a_valve_of_which_nothing_is_kept_is_not_one_where_nothing_has_happened(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with opened(tmp_path) as file:
+        file.append([event(1), event(1, "FV 2")])
+    assert main(["events", str(tmp_path), "--valve", "FV 3"]) == 2
+    assert "--valve: no valve of that name; there are: FV 1, FV 2, got FV 3" in capsys.readouterr().err
+    # The file's own valve is known, before anything has happened to it.
+    (tmp_path / "empty").mkdir()
+    with opened(tmp_path / "empty"):
+        pass
+    config = tmp_path / "daemon.toml"
+    config.write_text("[valve]\nname = 'FV 9'\nstroke_m = 0.1\n[device]\nport = 5020\n[history]\nfolder = 'empty'\n")
+    assert printed(capsys, str(config), "--valve", "FV 9") == []
+
+
 def test_what_a_client_calls_itself_stays_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with opened(tmp_path) as file:
         file.append([write(1, "\x1b[2J\nforged line")])
