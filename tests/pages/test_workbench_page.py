@@ -171,6 +171,11 @@ def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, case: 
         drop(page, "drop", rubbish)
         expect(page.get_by_role("alert")).to_have_text(re.compile(r"^(warning)?rubbish\.csv: "))
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        # What the browser itself turns away is told why.
+        page.get_by_role("button", name="close").click()
+        expect(page.get_by_role("alert")).to_have_count(0)
+        drop(page, "drop-valve", rubbish)
+        expect(page.get_by_role("alert")).to_contain_text("rubbish.csv: a file whose name ends in .toml is wanted here")
 
         # Of another program's file the columns are proposed, and drawn as they would be read before they are taken.
         export_of(case, tmp_path / "export.csv")

@@ -115,7 +115,7 @@ class OpenPanel:
         shipped = sorted(path.stem for path in (SHIPPED / "valves").glob("*.toml"))
         self._names = ui.select(shipped, label="valve", on_change=lambda event: self._named(event.value))
         self._names.classes("w-full").props('data-testid="valve"')
-        drop_box("or drop a valve file, .toml", "drop-valve", self._valve_dropped, 'accept=".toml"')
+        drop_box("or drop a valve file, .toml", "drop-valve", self._valve_dropped, ".toml")
         with ui.expansion("from a data sheet", icon="straighten").classes("w-full"):
             self._data_sheet()
 
