@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from config.registers import BY_NAME
 from config.role_passwords import read_passwords, set_password
 from config.roles import Role
 from positioner.observer.freshness import Freshness
+from positioner.observer.happened import Happened
 from positioner.observer.trends import thinned
 from positioner.observer.valve_view import ValvePicture
 from positioner.pages.operator_page import facts
@@ -47,6 +49,23 @@ def test_figures_are_in_the_units_chosen() -> None:
     units.choose_pressure("psi")
     told = facts.figures(PICTURE, STROKE_M, units)
     assert (told["position"], told["pressure"]) == ("1.969 in", "6.40 psi")
+
+
+def test_nothing_is_not_below_nothing() -> None:
+    told = facts.figures(with_values(position_m=-3e-6, pressure=-20.0, command=-60.0), STROKE_M, Units())
+    assert (told["position"], told["pressure"], told["command"]) == ("0.00 %", "0.000 bar", "-0.001 bar")
+
+
+def test_when_something_has_happened_is_told_with_its_zone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page may be read in another zone than the gateway's, and `positioner events` says UTC."""
+    monkeypatch.setenv("TZ", "XYZ-3")
+    time.tzset()
+    try:
+        (line,) = facts.happened([Happened(0.0, "the daemon started")])
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert line == "1970-01-01 03:00:00 XYZ, the daemon started"
 
 
 def test_of_a_valve_whose_stroke_nobody_said_positions_are_lengths() -> None:

@@ -119,7 +119,7 @@ def happened(lines: Iterable[Happened]) -> Iterator[str]:
     """Yield a line an event: when, by this machine's clock and zone, its NE 107 class unless that is good, and what."""
     for line in lines:
         known = math.isfinite(line.time_s)
-        said = [time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(line.time_s))] if known else []
+        said = [time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(line.time_s))] if known else []
         yield ", ".join([*said, *([line.ne107] if line.ne107 else []), line.text])
 
 

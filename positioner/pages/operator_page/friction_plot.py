@@ -6,6 +6,7 @@ from typing import Any
 from nicegui import ui
 
 from positioner.observer.valve_view import ValveView
+from positioner.pages.operator_page.marks import DASHES
 from positioner.pages.parts.theme import Theme
 from positioner.pages.parts.units import Units
 
@@ -44,7 +45,7 @@ class FrictionPlot:
         styles = (("friction", ink.measured, "solid"), ("baseline", ink.model, "dashed"))
         return {
             "animation": False,
-            "legend": {"top": 0, "left": 0, "icon": "roundRect", "itemHeight": 3, "textStyle": {"color": ink.text}},
+            "legend": {"top": 0, "left": 0, **DASHES, "textStyle": {"color": ink.text}},
             "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
             "grid": {"left": 52, "right": 12, "top": 30, "bottom": 24},
             "xAxis": {"type": "time", "splitNumber": 3, **quiet},

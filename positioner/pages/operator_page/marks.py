@@ -14,6 +14,9 @@ NE107_COLOURS = {
 }
 """Beside the words, which say it without any colour."""
 
+DASHES = {"itemWidth": 30, "itemStyle": {"opacity": 0}}
+"""Of a plot's legend: a line is drawn there as it is in the plot, dashed or not, and without a mark on it."""
+
 UNHEARD = (
     ".unheard { visibility: hidden; position: fixed; left: 16px; right: 16px; bottom: 16px; z-index: 9; }"
     + "".join(

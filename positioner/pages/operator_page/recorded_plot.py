@@ -12,6 +12,7 @@ from nicegui import events, ui
 
 from config.recording import Column, Recording
 from positioner.observer.trends import thinned
+from positioner.pages.operator_page.marks import DASHES
 from positioner.pages.parts.theme import Theme
 from positioner.pages.parts.units import Unit, Units
 
@@ -85,7 +86,7 @@ class RecordedPlot:
         return {
             "animation": False,
             "tooltip": {"trigger": "axis", "backgroundColor": ink.paper, "textStyle": {"color": ink.text}},
-            "legend": {"top": 0, "left": 0, "icon": "roundRect", "itemHeight": 3, "textStyle": {"color": ink.text}},
+            "legend": {"top": 0, "left": 0, **DASHES, "textStyle": {"color": ink.text}},
             "grid": {"left": 52, "right": 12, "top": 52, "bottom": 64},
             "dataset": {"source": self._rows(time_s[0], time_s[-1]), "sourceHeader": False},
             "xAxis": {"type": "value", "min": float(time_s[0] - time_s[-1]), "max": 0, "name": "s", **quiet, **ends},

@@ -15,6 +15,7 @@ from config.codes import State
 from config.recording import Column
 from positioner.observer.trends import bands, thinned
 from positioner.observer.valve_view import ValveView
+from positioner.pages.operator_page.marks import DASHES
 from positioner.pages.parts.theme import Theme
 from positioner.pages.parts.units import Units
 
@@ -154,8 +155,7 @@ class TrendPlot:
             "legend": {
                 "top": 0,
                 "left": 0,
-                "icon": "roundRect",
-                "itemHeight": 3,
+                **DASHES,
                 "textStyle": {"color": ink.text},
                 "data": list(LINES),
             },

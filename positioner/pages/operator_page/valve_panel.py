@@ -181,7 +181,7 @@ class ValvePanel:
 
     def _event_list(self) -> None:
         with ui.card().classes("full-width").props('data-testid="events"'):
-            heading("Seen since this page looks")
+            heading(time.strftime("Seen since this page looks, times in %Z"))
             self._event_rows = ui.element("ul").classes("said")
 
     def _show_events(self, events: tuple[SeenEvent, ...]) -> None:

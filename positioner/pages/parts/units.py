@@ -32,8 +32,12 @@ class Unit:
         return f"{self.number(value_si)} {self.name}"
 
     def number(self, value_si: float) -> str:
-        """Return a value without its unit."""
-        return f"{self.per_si * value_si:.{self.places}f}" if math.isfinite(value_si) else NO_NUMBER
+        """Return a value without its unit; what rounds to nothing has no sign, which would come and go with the noise.
+
+        >>> Unit("bar", 1e-5, 3).number(-20.0), Unit("bar", 1e-5, 3).number(-60.0)
+        ('0.000', '-0.001')
+        """
+        return f"{self.per_si * value_si:z.{self.places}f}" if math.isfinite(value_si) else NO_NUMBER
 
 
 PRESSURES = {each.name: each for each in (Unit("bar", 1e-5, 3), Unit("kPa", 1e-3, 1), Unit("psi", 1 / 6894.757, 2))}
