@@ -263,8 +263,16 @@ def test_a_leak_and_a_lost_calibration_are_told_from_a_packing(
     ("text", "said"),
     [
         ("valve,file,when\n", "columns must be valve, file, recording, when, got valve, file, when"),
-        (HEAD, "recording: "),
-        (HEAD + "a,seed,r.csv,yesterday\n", "recording.0.when"),
+        (HEAD, "plant.csv: names no recording: under its first line stands a row for each"),
+        (HEAD + "a,seed,r.csv,20260301\n", "plant.csv: line 2: when: must be a date or time, 2026-03-01"),
+        (
+            HEAD + "a,seed,q.csv,2026-12-30\n\na,seed,r.csv,31.12.2026\n",
+            "plant.csv: line 4: when: must be a date or time, 2026-03-01 or 2026-03-01T14:00, got 31.12.2026",
+        ),
+        (
+            HEAD + "a,seed,r.csv,\n",
+            "plant.csv: line 2: when: must be a date or time, 2026-03-01 or 2026-03-01T14:00, got nothing",
+        ),
         (HEAD + "a,seed,r.csv,2026-01-01\na,ordinary,s.csv,2026-01-02\n", "a: file is seed and ordinary; a valve has"),
         (HEAD + "a,seed,r.csv,2026-01-01\nb,seed,r.csv,2026-01-02\n", "r.csv: valve is a and b; it is of one valve"),
         (HEAD + "a,seed,r.csv,2026-01-01\nb,seed,./r.csv,2026-01-02\n", "r.csv: valve is a and b; it is of one valve"),

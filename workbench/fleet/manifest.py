@@ -18,7 +18,7 @@ from os.path import normpath
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, Strict
+from pydantic import Field, Strict, TypeAdapter, ValidationError
 
 from config.errors import InputError
 from config.loading import FolderName, Many, Schema, read_toml, validated
@@ -27,13 +27,17 @@ from config.plain_file import read_plain
 KEYS = ("valve", "file", "recording", "when")
 
 
+When = Annotated[datetime, Strict(False)] | Annotated[date, Strict(False)]
+WHEN: TypeAdapter[datetime | date] = TypeAdapter(Annotated[When, Field(union_mode="left_to_right")])
+
+
 class Entry(Schema):
     """A recording of a valve; paths as they are written."""
 
     valve: FolderName
     file: FolderName
     recording: FolderName
-    when: Annotated[datetime, Strict(False)] | Annotated[date, Strict(False)] = Field(union_mode="left_to_right")
+    when: When = Field(union_mode="left_to_right")
 
     @property
     def time(self) -> datetime:
@@ -84,7 +88,26 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     if sorted(columns) != sorted(KEYS):
         raise InputError(str(path), f"columns must be {', '.join(KEYS)}, got {', '.join(columns) or 'none'}")
     reader.fieldnames = columns
-    return [{key: (row[key] or "").strip() for key in KEYS} for row in reader]
+    rows: list[dict[str, Any]] = []
+    for row in reader:
+        rows.append({key: (row[key] or "").strip() for key in KEYS})
+        when = rows[-1]["when"]
+        if not _is_time(when):
+            wanted = "must be a date or time, 2026-03-01 or 2026-03-01T14:00"
+            raise InputError(str(path), f"line {reader.line_num}: when: {wanted}, got {when or 'nothing'}")
+    if not rows:
+        raise InputError(str(path), "names no recording: under its first line stands a row for each")
+    return rows
+
+
+def _is_time(text: str) -> bool:
+    if "-" not in text:  # a bare number would be taken for seconds since 1970: 20260301 for a day of that year
+        return False
+    try:
+        WHEN.validate_python(text)
+    except ValidationError:
+        return False
+    return True
 
 
 def _refuse_doubles(path: Path, entries: Sequence[Entry]) -> None:
