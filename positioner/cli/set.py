@@ -32,4 +32,5 @@ def _number(name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError(name, f"{text!r} is not a number") from None
+        words = "".join(f", {mode.name.lower()}" for mode in Mode) if name == "mode" else ""
+        raise InputError(name, f"allowed is a number{words}, got {text!r}") from None

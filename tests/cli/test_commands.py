@@ -161,7 +161,8 @@ def test_no_daemon_to_talk_to_is_one_line_and_exit_status_1(free_port: int, caps
         (["get", "positio"], "positio: no register of that name; allowed: position"),
         (["map", "--config", "none.toml"], "--config: goes with --format telegraf, modbus-exporter, home-assistant"),
         (["compare", "none.csv", "--valve", ""], "valve file: must be its path or the name of a shipped one, got ''"),
-        (["set", "reference", "half"], "reference: 'half' is not a number"),
+        (["set", "reference", "half"], "reference: allowed is a number, got 'half'"),
+        (["set", "mode", "auto"], "mode: allowed is a number, hold, manual, automatic, got 'auto'"),
         (
             ["simulate", "none", "--input", "x.csv", "-o", "y.csv"],
             "none: no shipped valve of that name; there are: ordinary, seed",
