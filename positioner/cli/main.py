@@ -11,6 +11,7 @@ import os
 import select
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 COMMANDS = (
     "demo",
@@ -121,11 +122,19 @@ def _unread() -> bool:
     return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
+class OneLine(argparse.ArgumentParser):
+    """A parser that says what is wrong in one line, as every command does, without its usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with it, and with the status of bad input."""
+        self.exit(2, f"{self.prog}: {message}; `{self.prog} --help` says more\n")
+
+
 def command_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands, which are imported for it."""
     from importlib.metadata import version
 
-    parser = argparse.ArgumentParser(
+    parser = OneLine(
         prog="positioner",
         description="Identifies and positions sticking pneumatic control valves over fieldbus.",
         epilog="exit status: 0 done, 1 the thing asked about does not hold, 2 bad input",

@@ -158,6 +158,27 @@ def test_no_daemon_to_talk_to_is_one_line_and_exit_status_1(free_port: int, caps
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        ([], "positioner: the following arguments are required: COMMAND; `positioner --help` says more"),
+        (["valve"], "--stroke-mm, -o/--out; `positioner valve --help` says more"),
+        (["demo", "--bus", "x"], "invalid choice: 'x' (choose from 'modbus', 'canopen', 'rtu')"),
+        (["events", "daemon.toml", "--since", "noon"], "positioner events: argument --since: allowed are 30m, 2h, 7d"),
+        (["get", "--bogus"], "positioner: unrecognized arguments: --bogus"),
+    ],
+)
+def test_words_that_no_command_takes_are_one_line(
+    capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert said in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
         (["get", "positio"], "positio: no register of that name; allowed: position"),
         (["map", "--config", "none.toml"], "--config: goes with --format telegraf, modbus-exporter, home-assistant"),
         (["compare", "none.csv", "--valve", ""], "valve file: must be its path or the name of a shipped one, got ''"),

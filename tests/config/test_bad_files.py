@@ -87,7 +87,7 @@ def test_an_address_that_is_none_is_refused_before_anybody_is_called(
     with pytest.raises(SystemExit) as ended:
         main(["get", *words, "mode"])
     assert ended.value.code == 2
-    assert capsys.readouterr().err.splitlines()[-1].startswith(f"positioner get: error: argument {words[0]}: ")
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"positioner get: argument {words[0]}: ")
 
 
 HEADER = "time_s,command_pa,position_m"
