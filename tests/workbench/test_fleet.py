@@ -295,6 +295,14 @@ def test_a_manifest_that_is_wrong_is_one_line(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_number_is_no_date_in_a_toml_manifest_either(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "plant.toml"
+    path.write_text('[[recording]]\nvalve = "a"\nfile = "seed"\nrecording = "r.csv"\nwhen = 20260301\n')
+    assert main(["fleet", str(path), "--out", str(tmp_path / "out")]) == 2
+    err = capsys.readouterr().err
+    assert "recording.0.when: must be a date or time, 2026-03-01 or 2026-03-01T14:00, got 20260301\n" in err
+
+
 def test_recordings_in_other_units_are_listed_and_the_others_go_on(
     site: Path, tmp_path: Path, without_dask: None
 ) -> None:

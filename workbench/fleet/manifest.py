@@ -18,7 +18,7 @@ from os.path import normpath
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, Strict, TypeAdapter, ValidationError
+from pydantic import Field, Strict, TypeAdapter, ValidationError, field_validator
 
 from config.errors import InputError
 from config.loading import FolderName, Many, Schema, read_toml, validated
@@ -38,6 +38,14 @@ class Entry(Schema):
     file: FolderName
     recording: FolderName
     when: When = Field(union_mode="left_to_right")
+
+    @field_validator("when", mode="before")
+    @classmethod
+    def _is_no_number(cls, value: object) -> object:
+        """A number would count as seconds since 1970."""
+        if isinstance(value, int | float):
+            raise ValueError("must be a date or time, 2026-03-01 or 2026-03-01T14:00")
+        return value
 
     @property
     def time(self) -> datetime:

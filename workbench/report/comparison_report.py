@@ -216,7 +216,7 @@ def _phase(part: Phase, floor_m: float | None, stroke_m: float, read: Reading) -
             f"{part.count}",
             read.length(part.rms_m),
             times(part.rms_m, floor_m),
-            f"{100 * part.rms_m / stroke_m:.2g} %",
+            f"{100 * part.rms_m / stroke_m:.3g} %",
             read.length(part.mean_m, sign=True),
             f"{100 * part.share:.1f} %",
         ],

@@ -125,7 +125,7 @@ WRITTEN = {
 
 def of_stroke(value_m: float, stroke_m: float) -> str:
     """Say a length in per cent of the stroke."""
-    return f"{100 * value_m / stroke_m:.2g} % of stroke" if isfinite(value_m) else ""
+    return f"{100 * value_m / stroke_m:.3g} % of stroke" if isfinite(value_m) else ""
 
 
 def times(value: float, unit: float | None) -> str:
