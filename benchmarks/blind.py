@@ -32,7 +32,7 @@ from sim.effect import shipped_effect, tried_effects
 from tests.workbench.generators import KINDS, LAWS, case
 from workbench.blind.hiding import VISIBLE, hide
 from workbench.blind.trial import NOISE_M
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.select.block_errors import indistinguishable
 from workbench.select.equivalence import algebraic_class
 

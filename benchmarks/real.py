@@ -20,8 +20,8 @@ from config.recording import Recording
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from workbench.data.held_out import split
 from workbench.data.imposed_motion import read_imposed
-from workbench.diagnose.diagnosis import diagnose
-from workbench.diagnose.positioner_or_packing import positioner_or_packing
+from workbench.diagnosis.diagnosis import diagnose
+from workbench.diagnosis.positioner_or_packing import positioner_or_packing
 from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
 from workbench.select.block_errors import block_errors

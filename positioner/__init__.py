@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from workbench.blind.hiding import Hidden, hide
     from workbench.compare.comparison import Comparison, compare
     from workbench.data.imposed_motion import read_imposed
-    from workbench.diagnose.diagnosis import Diagnosis, diagnose
-    from workbench.diagnose.extension import Extension, extend
+    from workbench.diagnosis.diagnosis import Diagnosis, diagnose
+    from workbench.diagnosis.extension import Extension, extend
     from workbench.discover.discovery import Discovery, discover
     from workbench.fit.fit_result import Fit
     from workbench.fit.fitting import fit
@@ -84,8 +84,8 @@ _ROOMS = {
     "workbench.fit.fitting": ("Fit", "fit"),
     "workbench.fleet.fleet": ("Fleet", "fleet"),
     "workbench.forces.force_diagnosis": ("ForceDiagnosis", "diagnose_forces"),
-    "workbench.diagnose.diagnosis": ("Diagnosis", "diagnose"),
-    "workbench.diagnose.extension": ("Extension", "extend"),
+    "workbench.diagnosis.diagnosis": ("Diagnosis", "diagnose"),
+    "workbench.diagnosis.extension": ("Extension", "extend"),
 }
 """The library's names, by where they live today."""
 _LIVES_IN = {name: room for room, names in _ROOMS.items() for name in names}

@@ -15,7 +15,7 @@ Its rooms, each on those before it:
     fit            the parameters that explain it
     select         which effect is missing: the library refitted, the rule by which one is added
     discover       the form of an effect that the library lacks
-    diagnose       what is said of it, and the valve with it
+    diagnosis      what is said of it, and the valve with it
     forces         the same where a rig imposes the position, and there is nothing to simulate
     discriminate   rivals told apart by experiments
     blind          recordings with an effect that nobody knows
@@ -26,8 +26,8 @@ Its rooms, each on those before it:
 from config.recording import Recording
 from workbench.compare.comparison import Comparison, compare
 from workbench.data.imposed_motion import read_imposed
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
-from workbench.diagnose.extension import Extension, extend
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.extension import Extension, extend
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces

@@ -12,7 +12,7 @@ from positioner.cli.parts.output_files import writable, write_json
 
 if TYPE_CHECKING:
     from config.valve_file import ValveFile
-    from workbench.diagnose.diagnosis import Diagnosis
+    from workbench.diagnosis.diagnosis import Diagnosis
     from workbench.select.tangent_preview import TangentScore
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
@@ -61,8 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.next_step import discover_command, extend_commands
     from positioner.cli.parts.progress import Progress
     from workbench.data.imposed_motion import is_imposed
-    from workbench.diagnose.diagnosis import diagnose
-    from workbench.diagnose.diagnosis_json import as_json
+    from workbench.diagnosis.diagnosis import diagnose
+    from workbench.diagnosis.diagnosis_json import as_json
     from workbench.report import Subject, report_diagnosis, require_plotly
 
     for option in ("json", "report", "experiment", "out"):
@@ -142,8 +142,8 @@ def _write_valve(diagnosis: "Diagnosis", valve: "ValveFile", arguments: argparse
     """Write what was found with its journal, where the diagnosis is sure of it; say so where it is not."""
     from config.valve_file import find_valve
     from positioner.cli.parts.next_step import not_written
-    from workbench.diagnose.extension import extension_of
-    from workbench.diagnose.extension_journal import write_extended
+    from workbench.diagnosis.extension import extension_of
+    from workbench.diagnosis.extension_journal import write_extended
 
     if diagnosis.verdict != "missing":
         print(not_written(arguments.out, diagnosis))

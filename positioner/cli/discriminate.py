@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.naming import naming
     from positioner.cli.parts.progress import Progress
     from sim.effect import find_effect, tried_effects
-    from workbench.diagnose.diagnosis import diagnose
+    from workbench.diagnosis.diagnosis import diagnose
     from workbench.discriminate.discrimination import discriminate, rivals_of
 
     file = load_daemon(arguments.config, arguments.name)

@@ -39,9 +39,9 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import files_named, naming
     from positioner.cli.parts.progress import at_work
-    from workbench.diagnose.extension import extend
-    from workbench.diagnose.extension_journal import Journal, write_extended
-    from workbench.diagnose.extension_json import as_json
+    from workbench.diagnosis.extension import extend
+    from workbench.diagnosis.extension_journal import Journal, write_extended
+    from workbench.diagnosis.extension_json import as_json
     from workbench.report import report_journal, require_plotly
 
     writable(arguments.out, "-o")

@@ -11,7 +11,7 @@ import pytest
 from positioner.cli import discover, extend
 from positioner.cli.diagnose import add_arguments
 from positioner.cli.parts.next_step import discover_command, extend_commands, not_written
-from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis
 
 EXPORT = ["--column", "position_m=PV 1:%", "--column", "command_pa=OUT:bar", "--range-pa", "20000", "100000"]
 MORE = ["--stroke-m", "0.04", "--decimal", ",", "--status", "Quality=Good", "--sheet", "Sheet 2"]

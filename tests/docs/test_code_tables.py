@@ -10,7 +10,7 @@ from config import codes
 from config.codes import Code, Fault, InhibitReason
 from config.daemon_file import ControlTable
 from docs import code_tables
-from workbench.diagnose.verdict import Verdict
+from workbench.diagnosis.verdict import Verdict
 
 DOCS = Path(__file__).parents[2] / "docs"
 STALE = "stale: run python -m docs.code_tables"

@@ -18,7 +18,7 @@ from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve
 from positioner.pages.workbench_page.notebook import notebook
 from positioner.pages.workbench_page.opening import ColumnChoice, Opened, opened_like
 from tests.pages.laid_out import hidden
-from workbench.diagnose.extension import extend
+from workbench.diagnosis.extension import extend
 
 
 @cache

@@ -15,7 +15,7 @@ from config.writing import valve_toml, write_valve
 from sim.composition import Composition
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import Trial
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.fleet.examination import examine
 
 HEAD = "valve,file,recording,when\n"
@@ -85,7 +85,7 @@ def examined_here(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("workbench.fleet.drill_down.diagnose", once)
     patch.setattr("workbench.fleet.fleet.work", straight)
     patch.setattr("workbench.fleet.fleet.cluster", lambda *_: Straight())
-    patch.setattr("workbench.diagnose.diagnosis.tried_effects", lambda: FEW)
+    patch.setattr("workbench.diagnosis.diagnosis.tried_effects", lambda: FEW)
 
 
 def serve_cluster(said: Connection) -> None:

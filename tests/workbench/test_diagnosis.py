@@ -17,9 +17,9 @@ from config.valve_file import load_valve
 from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
-from workbench.diagnose.extension import extend, extension_of
-from workbench.diagnose.extension_journal import Journal, write_extended
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.extension import extend, extension_of
+from workbench.diagnosis.extension_journal import Journal, write_extended
 from workbench.fit.fitting import fit
 from workbench.select.experiment import MENU, experiment
 

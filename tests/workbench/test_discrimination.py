@@ -269,7 +269,7 @@ def words(fits: dict[str, Fit], recording: Recording, tmp_path: Path, monkeypatc
     rivals = [SimpleNamespace(name=name, model=SimpleNamespace(fit=each)) for name, each in fits.items()]
     steps = [SimpleNamespace(indistinguishable=rivals)]
     diagnosis = SimpleNamespace(verdict="one_of", sentence="one of two", steps=steps)
-    monkeypatch.setattr("workbench.diagnose.diagnosis.diagnose", lambda *_, **__: diagnosis)
+    monkeypatch.setattr("workbench.diagnosis.diagnosis.diagnose", lambda *_, **__: diagnosis)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.require_ready", lambda *_: None)
     monkeypatch.setattr("positioner.cli.parts.experiment_player.player_on", lambda *_: answering)
     config, rec = tmp_path / "site.toml", tmp_path / "rec.csv"

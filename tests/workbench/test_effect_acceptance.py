@@ -12,7 +12,7 @@ from sim.effect import shipped_effect, shipped_effects
 from tests.workbench.hand_made import FLOOR_M, model_of
 from workbench.data.held_out import joined, residual_m, split
 from workbench.data.record import ready
-from workbench.diagnose.verdict_sentence import reduction_sentence
+from workbench.diagnosis.verdict_sentence import reduction_sentence
 from workbench.select.block_errors import (
     BlockErrors,
     block_logs,

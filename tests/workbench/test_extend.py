@@ -13,7 +13,7 @@ from config.writing import valve_toml
 from positioner.cli.main import main
 from sim.valve import Valve
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.diagnose.extension_journal import Journal
+from workbench.diagnosis.extension_journal import Journal
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAG_S = 0.08

@@ -300,7 +300,7 @@ def test_a_number_is_no_date_in_a_toml_manifest_either(tmp_path: Path, capsys: p
     path.write_text('[[recording]]\nvalve = "a"\nfile = "seed"\nrecording = "r.csv"\nwhen = 20260301\n')
     assert main(["fleet", str(path), "--out", str(tmp_path / "out")]) == 2
     err = capsys.readouterr().err
-    assert "recording.0.when: must be a date or time, 2026-03-01 or 2026-03-01T14:00, got 20260301\n" in err
+    assert "recording.0.when: must be a date or time, 2026-03-01 or 2026-03-01T14:00, got 20260301" in err
 
 
 def test_recordings_in_other_units_are_listed_and_the_others_go_on(

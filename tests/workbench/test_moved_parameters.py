@@ -6,7 +6,7 @@ from config.drive import KINDS
 from config.valve_file import EffectTable, ValveFile
 from tests.workbench.hand_made import LIBRARY, fit_of
 from tests.workbench.valves import SEED
-from workbench.diagnose.moved_parameters import Moved, moved_parameters
+from workbench.diagnosis.moved_parameters import Moved, moved_parameters
 from workbench.fit.fitted_parameter import Fitted
 
 

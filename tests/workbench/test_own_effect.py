@@ -14,7 +14,7 @@ from config.writing import valve_toml, write_valve
 from positioner.cli.main import main
 from sim.effect import FOLDERS_ALLOWED, find_effect
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.diagnose.extension_journal import Journal
+from workbench.diagnosis.extension_journal import Journal
 from workbench.fit.fitting import fit
 
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"

@@ -16,7 +16,7 @@ from tests.workbench.valves import with_effect
 from workbench import compare, fit
 from workbench.data.held_out import split
 from workbench.data.record import ready
-from workbench.diagnose.positioner_or_packing import PositionerOrPacking, cause, positioner_or_packing
+from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, cause, positioner_or_packing
 from workbench.model.free_run import Accuracy, FreeRun
 from workbench.model.sampling import DYNAMIC
 from workbench.report import Subject, report_comparison

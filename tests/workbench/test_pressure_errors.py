@@ -12,7 +12,7 @@ from sim.open_loop import respond
 from tests.workbench.hand_made import LIBRARY, model_of
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, pressures, with_effect
 from workbench.data.held_out import split
-from workbench.diagnose.diagnosis import diagnose
+from workbench.diagnosis.diagnosis import diagnose
 from workbench.fit.fitting import fit
 from workbench.select.effect_candidates import EvaluatedModel, judged_step
 from workbench.select.pressure_errors import PressureErrors, pressure_errors

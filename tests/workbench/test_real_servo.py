@@ -17,7 +17,7 @@ from sim.effect import shipped_effect
 from workbench import compare, diagnose, fit
 from workbench.compare.friction_balance import forces
 from workbench.data.record import ready
-from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.model.free_run import FreeRun
 
 QUANTUM_RAD = 2.0 * np.pi / 1e4

@@ -16,8 +16,8 @@ from positioner.cli.main import main
 from tests.workbench.pages import Page, read
 from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.compare.comparison import Comparison, compare
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
-from workbench.diagnose.extension_journal import Journal
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.extension_journal import Journal
 from workbench.report import Subject, report_comparison, report_diagnosis, report_journal
 from workbench.report.page import plot
 from workbench.report.plot_series import drawn, extremes, running_s

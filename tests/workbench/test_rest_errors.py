@@ -8,7 +8,7 @@ import pytest
 from config.recording import Column, Recording
 from workbench.blind.hiding import hide
 from workbench.data.held_out import Split, split
-from workbench.diagnose.diagnosis import diagnose
+from workbench.diagnosis.diagnosis import diagnose
 from workbench.select.rest_errors import Missed, RestErrors, by_place, off_m, rest_errors
 
 NOISE_M = 5e-5

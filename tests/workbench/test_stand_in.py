@@ -7,8 +7,8 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.blind.input_signal import excitation
-from workbench.diagnose.diagnosis import diagnose
-from workbench.diagnose.diagnosis_json import as_json
+from workbench.diagnosis.diagnosis import diagnose
+from workbench.diagnosis.diagnosis_json import as_json
 from workbench.discover import form_search
 from workbench.discover.grammar import FORMS
 

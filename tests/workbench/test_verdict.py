@@ -8,11 +8,11 @@ import pytest
 from config.recording import Column, Recording
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, model_of
 from workbench.data.held_out import Split, split
-from workbench.diagnose.diagnosis import Diagnosis
-from workbench.diagnose.diagnosis_json import as_json
-from workbench.diagnose.judged_landings import JudgedLandings
-from workbench.diagnose.verdict import verdict
-from workbench.diagnose.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
+from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.judged_landings import JudgedLandings
+from workbench.diagnosis.verdict import verdict
+from workbench.diagnosis.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
 from workbench.model.sampling import Motion, Sampling
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
 from workbench.select.rest_errors import RestErrors

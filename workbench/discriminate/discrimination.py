@@ -23,7 +23,7 @@ from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
 from sim.effect import Effect
-from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms
 from workbench.discriminate.rival_race import ODDS, RivalRace
 from workbench.fit.fit_result import Fit

@@ -10,7 +10,7 @@ from pathlib import Path
 from config.errors import InputError
 from config.recording import Recording
 from config.writing import write_valve
-from workbench.diagnose.diagnosis import diagnose
+from workbench.diagnosis.diagnosis import diagnose
 from workbench.fleet.examination import CHANGED, UNTOLD
 from workbench.fleet.fleet import Fleet
 from workbench.fleet.store import request_key

@@ -29,7 +29,7 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from config.writing import valve_toml
 from workbench.compare.comparison import NUMERICAL, Comparison, compare
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
 from workbench.fit.fitting import fit, local_fit, profiled
@@ -96,7 +96,7 @@ class Examination(Schema):
 
     outcome: str
     """as_before, changed, unreadable, untold (off, in a recording that holds too little to say why), or a diagnosis'
-    verdict (`workbench.diagnose.verdict`)."""
+    verdict (`workbench.diagnosis.verdict`)."""
     sentence: str
     samples: int = 0
     duration_s: float = 0.0

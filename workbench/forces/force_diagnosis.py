@@ -19,8 +19,8 @@ from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.effect import Effect, shipped_effect
 from workbench.data.imposed_motion import Rows, rows_of
-from workbench.diagnose.verdict import Verdict
-from workbench.diagnose.verdict_sentence import rivals_sentence, verdict_line
+from workbench.diagnosis.verdict import Verdict
+from workbench.diagnosis.verdict_sentence import rivals_sentence, verdict_line
 from workbench.forces.force_balance import Balance, ForceFit, ForceModel, floor_of
 from workbench.select.block_errors import indistinguishable, relative_error_reduction
 from workbench.select.candidate_table import NEWTONS, Tried, candidate_columns, candidate_table, draw_race

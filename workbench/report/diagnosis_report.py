@@ -9,7 +9,7 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
-from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import MORE_LANDINGS
 from workbench.report import ranking

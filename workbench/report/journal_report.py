@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from config.drive import Kind
-from workbench.diagnose.extension_journal import ExtensionStep, Journal
+from workbench.diagnosis.extension_journal import ExtensionStep, Journal
 from workbench.report import ranking
 from workbench.report.page import (
     Html,

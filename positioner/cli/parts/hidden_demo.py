@@ -145,7 +145,7 @@ def _extended(recording: Path, bare: "ValveFile", better: Path) -> tuple[str, ..
     """Diagnose a recording and write the valve file with what it lacked; return that, by name."""
     from config.recording import read_recording
     from config.writing import write_valve
-    from workbench.diagnose.diagnosis import diagnose
+    from workbench.diagnosis.diagnosis import diagnose
 
     began_s = time.monotonic()
     diagnosis = diagnose(read_recording(recording), bare, effects=CANDIDATES)

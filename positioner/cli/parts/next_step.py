@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from positioner.cli.parts.export_arguments import export_words
 
 if TYPE_CHECKING:
-    from workbench.diagnose.diagnosis import Diagnosis
+    from workbench.diagnosis.diagnosis import Diagnosis
 
 OUT, FORM = "better.toml", "found.py"
 

@@ -18,8 +18,8 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.effect import written_here
 from sim.own_effect import checked
-from workbench.diagnose.diagnosis import Diagnosis, diagnose
-from workbench.diagnose.extension import Extension, extend
+from workbench.diagnosis.diagnosis import Diagnosis, diagnose
+from workbench.diagnosis.extension import Extension, extend
 from workbench.fit.breaking_off import BrokenOff
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit

@@ -27,9 +27,9 @@ from sim.effect import written_here
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
-from workbench.diagnose.diagnosis import Diagnosis
-from workbench.diagnose.extension import Extension
-from workbench.diagnose.extension_journal import Journal, write_extended
+from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.extension import Extension
+from workbench.diagnosis.extension_journal import Journal, write_extended
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
 

@@ -13,8 +13,8 @@ from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.effect_panel import effect_section
 from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
-from workbench.diagnose.diagnosis import Diagnosis
-from workbench.diagnose.extension import Extension, extension_of
+from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.extension import Extension, extension_of
 from workbench.fit.fit_result import Fit
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked

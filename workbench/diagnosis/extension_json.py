@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from workbench.diagnose.extension import Extension
+from workbench.diagnosis.extension import Extension
 from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.block_errors import BlockErrors
 

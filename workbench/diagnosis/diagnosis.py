@@ -18,14 +18,14 @@ from sim.effect import Effect, find_effect, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
-from workbench.diagnose.judged_landings import judged_landings
-from workbench.diagnose.kept_mass import KeptMass, kept_mass
-from workbench.diagnose.measured_pressure import ByMeasuredPressure, by_measured_pressure
-from workbench.diagnose.moved_parameters import Moved, moved_parameters
-from workbench.diagnose.positioner_or_packing import PositionerOrPacking, positioner_or_packing
-from workbench.diagnose.stand_in import StandIn, stand_in
-from workbench.diagnose.verdict import EXPLAINED, Verdict, by_another_name, verdict
-from workbench.diagnose.verdict_sentence import verdict_line, verdict_sentence
+from workbench.diagnosis.judged_landings import judged_landings
+from workbench.diagnosis.kept_mass import KeptMass, kept_mass
+from workbench.diagnosis.measured_pressure import ByMeasuredPressure, by_measured_pressure
+from workbench.diagnosis.moved_parameters import Moved, moved_parameters
+from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
+from workbench.diagnosis.stand_in import StandIn, stand_in
+from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
+from workbench.diagnosis.verdict_sentence import verdict_line, verdict_sentence
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone

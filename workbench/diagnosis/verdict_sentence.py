@@ -6,8 +6,8 @@ from config.drive import Kind, Scale
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
-from workbench.diagnose.judged_landings import unknown_between_samples
-from workbench.diagnose.verdict import EXPLAINED, Verdict, by_another_name
+from workbench.diagnosis.judged_landings import unknown_between_samples
+from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, knife_edges_sentence
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record

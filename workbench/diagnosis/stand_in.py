@@ -20,7 +20,7 @@ from config.results.result import Brief
 from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
-from workbench.diagnose.kept_mass import leaves_something
+from workbench.diagnosis.kept_mass import leaves_something
 from workbench.discover.form_search import searched_forms
 from workbench.discover.found_form import FoundForm
 from workbench.select.block_errors import relative_error_reduction

@@ -19,7 +19,7 @@ from config.valve_file import ValveFile
 from sim.composition import Composition
 from sim.effect import find_effect
 from workbench.data.held_out import Part, Split, residual_m, split
-from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import fit, profiled

@@ -10,7 +10,7 @@ from config.drive import Scale
 from config.errors import InputError
 from config.loading import Schema, validated
 from config.writing import write_valve
-from workbench.diagnose.extension import Extension
+from workbench.diagnosis.extension import Extension
 
 
 class ExtensionStep(Schema):

@@ -6,7 +6,7 @@ more than a factor of 2 in it, so it never exceeds 0.5.
 
 from typing import Any
 
-from workbench.diagnose.diagnosis import Diagnosis
+from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.effect_candidates import EffectCandidate, EvaluatedModel
 from workbench.select.equivalence import undetectable

@@ -17,7 +17,7 @@ untrusted     the searches disagree, and the best of them explains nothing
 from collections.abc import Sequence
 from typing import Literal
 
-from workbench.diagnose.judged_landings import JudgedLandings
+from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 
 Verdict = Literal["adequate", "missing", "one_of", "unexplained", "unjudged", "unfinished", "untrusted"]
