@@ -10,11 +10,11 @@ import pytest
 
 from config.errors import CommandFailed, InputError
 from config.recording import Recording, write_recording
-from config.valve_file import load_valve
-from config.writing import write_valve
+from config.valve_file import load_valve, shipped_valve
+from config.writing import valve_toml, write_valve
 from positioner.pages.workbench_page.background import Limits, News, Raced, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
-from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve
+from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve, named_valve
 from positioner.pages.workbench_page.notebook import notebook
 from positioner.pages.workbench_page.opening import ColumnChoice, Opened, opened_like
 from tests.pages.laid_out import hidden
@@ -139,3 +139,10 @@ def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
     assert "from config.historian_export import read_export" in text
     assert "'position_m=PV:%', 'command_pa=OUT:Pa']), 0.04, (20000.0, 100000.0), Exp" in text
     assert "ExportOptions(',', None)" in text
+
+
+def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: Path) -> None:
+    dropped = tmp_path / "upload-1.toml"
+    dropped.write_text(valve_toml(shipped_valve("seed")) + '\n[[effect]]\nname = "./tight_spot.py"\n')
+    with pytest.raises(InputError, match=r"^mine\.toml: names tight_spot\.py, an effect of your own"):
+        named_valve(str(dropped), "mine.toml")

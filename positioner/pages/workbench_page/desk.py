@@ -352,4 +352,12 @@ def named_valve(text: str, name: str = "") -> NamedValve:
     """
     path = find_valve(text)
     file = valve_alone(load_valve(path), name or text, "this page reads mm and kPa; positioner diagnose reads it")
+    own = [Path(each.name) for each in file.effect if each.name.endswith(".py")]
+    left_behind = [each.name for each in own if not each.is_file()]
+    if name and left_behind:
+        raise InputError(
+            name,
+            f"names {' and '.join(left_behind)}, an effect of your own, which does not come with a valve file that is "
+            "dropped here: start positioner workbench --valve FILE where both are",
+        )
     return NamedValve(name or text, path, file)
