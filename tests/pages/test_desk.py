@@ -10,8 +10,8 @@ import pytest
 
 from config.errors import CommandFailed, InputError
 from config.recording import Recording, write_recording
-from config.valve_file import ValveFile, load_valve, shipped_valve
-from config.writing import valve_toml, write_valve
+from config.valve_file import load_valve, shipped_valve
+from config.writing import write_valve
 from positioner.pages.workbench_page.background import Limits, News, Raced, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve, named_valve
@@ -143,6 +143,6 @@ def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
 
 def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: Path) -> None:
     dropped = tmp_path / "upload-1.toml"
-    dropped.write_text(valve_toml(ValveFile(valve=shipped_valve("seed"))) + '\n[[effect]]\nname = "./tight_spot.py"\n')
+    dropped.write_text(shipped_valve("seed").read_text() + '\n[[effect]]\nname = "./tight_spot.py"\n')
     with pytest.raises(InputError, match=r"^mine\.toml: names tight_spot\.py, an effect of your own"):
         named_valve(str(dropped), "mine.toml")
