@@ -34,7 +34,12 @@ lacks what the rounding of a stem at rest hides, for it rests at one place of th
 
 Where readings hardly ever change by one or two quanta, no noise of less than the least change was rounded: it would
 come to the edge of a quantum in some rest. A dead band or a historian's compression held small changes back then, or
-the sensor is that quiet; which, and what a reading is off by, the samples do not tell, and the noise is unknown.
+the sensor is that quiet; which, and what a reading is off by, the samples do not tell, and the noise is unknown. So it
+is where readings are not rounded and stand still: a hundred thousandth of what they span stands for the quantum.
+
+Where a window tells a noise about its line, the stem goes evenly, or a historian drew lines between the samples that it
+kept. Of such a line nothing shows but how it was rounded. So if that, or hardly anything, is all that is found, windows
+about their means tell nothing, and fewer than a quarter of all are level, as at rest, the noise is unknown.
 
 A reading that stands still for n samples while others scatter is no rest, but a transmitter or a gateway that repeats
 its last value. In N samples noise does so by a chance of N p^n, p = erf(q / (2 √2 σ_w)) amid a quantum. It is no less
@@ -101,8 +106,13 @@ ON_GRID, REACHES = 0.02, (10.5, 100.5, 1000.5, 10000.5)
 """Of a quantum, how far a step between levels may be off it; the steps that refine it, one after the other."""
 FEW_STEPS, MANY_STEPS = 5, 50
 """Steps between levels that show a quantum: a tenth of all, but no fewer nor more than these."""
-HELD_BACK, RARELY, FEWEST_CHANGES = 2.5, 0.1, 20
-"""Quanta below which no more than that share of so many changes is, where something holds small ones back."""
+HELD_BACK, RARELY, FEWEST_CHANGES, REPEATED = 2.5, 0.1, 20, 0.05
+"""Quanta below which no more than that share of so many changes is, where something holds small ones back; share of
+readings that are not rounded and like the one before: of a stem that never rests all changes are large."""
+HARDLY, MANY_WITHOUT = 1e-5, 0.1
+"""Of what they span: readings that are not rounded and change by less are alike; share of windows without any noise."""
+ROUNDING_ALONE, LEAST_LEVEL = 1.5, 0.25
+"""Times q/√12 up to which what is found is rounding and hardly anything else; share of the windows that go nowhere."""
 FROZEN_BY_CHANCE, FEWEST_FROZEN = 1e-6, 8
 """Chance, in all samples, of a run of like readings at rest, below which it is none; samples of a run at least."""
 NEAR, LEAST_NOISY = 4.5, 0.02
@@ -169,12 +179,16 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
     quantum = quantum_m(position_m)
     back_m = held_back_m(position_m, quantum)
     position_m = np.where(frozen(position_m, quantum), np.nan, position_m)
+    level = _rests(position_m, quantum)
     if quantum:
         position_m = position_m + quantum * np.random.default_rng(0).uniform(-0.5, 0.5, position_m.size)
     told = [_of_width(position_m, drive_pa, width) for width in WIDTHS]
     # Where a long window rests so do the shorter ones in it.
     longest = next((i + 1 for i in range(WIDTHS.index(STRAIGHT), -1, -1) if told[i] is None), 0)
+    finest_m = HARDLY * float(np.nanmax(position_m) - np.nanmin(position_m)) if np.isfinite(position_m).any() else 0.0
     found = [each for each in told[longest:] if each and not each.mixed]
+    # Few windows without any noise are lines between two samples, or a value that was repeated.
+    found = [each for each in found if each.noise_m >= finest_m or each.share >= MANY_WITHOUT]
     if not found:
         return None
     # Motion only adds: what another width finds far above the least is motion that looks like noise.
@@ -188,6 +202,9 @@ def position_noise_m(position_m: Array, drive_pa: Array | None = None) -> float 
         return None  # noise, or a stem that goes elsewhere from sample to sample: the drive would tell
     whole_m = _with_rounding(noise_m, quantum) if quantum else noise_m
     if whole_m < back_m:
+        return None
+    level |= any(each is not None for each, width in zip(told, WIDTHS, strict=True) if width < STRAIGHT)
+    if whole_m < max(ROUNDING_ALONE * quantum / 12.0**0.5, finest_m) and not level:
         return None
     return None if drive_pa is not None and _scatters_more(position_m, drive_pa, whole_m, quantum) else whole_m
 
@@ -216,19 +233,25 @@ def quantum_m(position_m: Array) -> float:
 def held_back_m(position_m: Array, quantum: float) -> float:
     """Return by how much positions, (n,), m, rounded to a quantum, m, change at least; 0 if by one or two of it.
 
-    A tenth of the changes may be smaller: a historian keeps a value now and then because it is old.
+    A tenth of the changes may be smaller: a historian keeps a value now and then because it is old. Quantum 0: they are
+    not rounded, and a small part of what they span stands for it.
 
     >>> rng = np.random.default_rng(0)
     >>> rests_m = np.round(np.repeat(rng.uniform(0.0, 0.1, 80), 5) / 25e-6) * 25e-6
     >>> held_back_m(rests_m, 25e-6) > 0.0, held_back_m(rests_m + 25e-6 * rng.integers(0, 2, 400), 25e-6)
     (True, 0.0)
     """
-    changes = np.abs(np.diff(position_m[np.isfinite(position_m)]))
-    changes = changes[changes > 0.5 * quantum]
-    if not quantum or changes.size < FEWEST_CHANGES:
+    finite_m = position_m[np.isfinite(position_m)]
+    changes = np.abs(np.diff(finite_m))
+    if changes.size < FEWEST_CHANGES:
+        return 0.0
+    least = quantum or HARDLY * float(np.ptp(finite_m))
+    alike = changes <= 0.5 * least
+    changes = changes[~alike]
+    if changes.size < FEWEST_CHANGES or (not quantum and np.mean(alike) < REPEATED):
         return 0.0
     least_m = float(np.quantile(changes, RARELY))
-    return least_m if least_m > HELD_BACK * quantum else 0.0
+    return least_m if least_m > HELD_BACK * least else 0.0
 
 
 def frozen(position_m: Array, quantum: float) -> Mask:
@@ -254,6 +277,15 @@ def frozen(position_m: Array, quantum: float) -> Mask:
         if last + 1 - first >= longest and position_m[first] not in ends_m:
             found[first + 1 : last + 1] = True
     return found if np.count_nonzero(found) < 0.5 * count else np.zeros_like(found)
+
+
+def _rests(position_m: Array, quantum: float) -> bool:
+    """Return whether positions, (n,), m, often are within a quantum, m, for as long as a line is told from a rest."""
+    if position_m.size < STRAIGHT:
+        return False
+    windows = sliding_window_view(position_m, STRAIGHT)
+    windows = windows[np.isfinite(windows).all(axis=1)]
+    return windows.size > 0 and bool(np.mean(np.ptp(windows, axis=1) <= 1.5 * quantum) >= LEAST_LEVEL)
 
 
 def _share_alike(changes: Array, quantum: float) -> float:

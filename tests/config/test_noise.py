@@ -96,7 +96,12 @@ def test_too_few_samples_tell_no_noise(count: int) -> None:
 
 
 def test_without_noise_it_is_none_at_all() -> None:
-    assert position_noise_m(steps(5)) == 0.0
+    assert position_noise_m(slow_to_settle(steps(50, 2000))) == 0.0
+
+
+def test_rests_without_noise_or_any_small_change_may_have_been_held_back_and_the_noise_is_unknown() -> None:
+    assert position_noise_m(steps(5)) is None
+    assert position_noise_m(exceptions(noisy(steps(12, 2000)), 5.0 * NOISE_M)) is None
 
 
 def test_missing_samples_are_left_out() -> None:
@@ -177,6 +182,43 @@ def test_what_a_historian_held_back_is_no_rounding_and_the_noise_is_unknown(ever
     held = exceptions(rounded, 10.0 * NOISE_M)
     assert held_back_m(held, quantum) > 10.0 * NOISE_M
     assert position_noise_m(held) is None
+
+
+def slow_to_settle(position_m: Array) -> Array:
+    """What comes to rest so slowly that its last changes are as small as one likes."""
+    stem = [float(position_m[0])]
+    for each in position_m[1:]:
+        left_m = 0.5 * (float(each) - stem[-1])
+        stem.append(stem[-1] + left_m if abs(left_m) > 1e-8 else float(each))
+    return np.asarray(stem)
+
+
+def through_a_door(position_m: Array, width_m: float) -> Array:
+    """What a historian shows that keeps a sample where no line from the one kept before passes all since."""
+    kept = [0]
+    up, down = np.inf, -np.inf
+    for i in range(1, position_m.size):
+        since = i - kept[-1]
+        up = min(up, (position_m[i] + width_m - position_m[kept[-1]]) / since)
+        down = max(down, (position_m[i] - width_m - position_m[kept[-1]]) / since)
+        if down > up:
+            kept.append(i - 1 if kept[-1] < i - 1 else i)
+            since = max(i - kept[-1], 1)
+            up = (position_m[i] + width_m - position_m[kept[-1]]) / since if kept[-1] < i else np.inf
+            down = (position_m[i] - width_m - position_m[kept[-1]]) / since if kept[-1] < i else -np.inf
+    return np.asarray(np.interp(np.arange(position_m.size), kept, position_m[kept]))
+
+
+@pytest.mark.parametrize("quantum", [0.0, NOISE_M / 500.0, NOISE_M / 10.0])
+@pytest.mark.parametrize("width", [2.0, 4.0, 8.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_straight_lines_that_a_historian_drew_are_no_sensor_without_noise(
+    quantum: float, width: float, seed: int
+) -> None:
+    shown = through_a_door(noisy(steps(15, 2000), seed), width * NOISE_M)
+    shown = np.round(shown / quantum) * quantum if quantum else shown
+    found = position_noise_m(shown, 4e5 * steps(15, 2000))
+    assert found is None or found == pytest.approx(NOISE_M, rel=0.5)
 
 
 def test_a_noise_greater_than_what_was_held_back_is_found_all_the_same() -> None:

@@ -122,7 +122,7 @@ def test_what_holds_small_changes_back_is_told_and_the_noise_is_unknown() -> Non
         position[i] = position[i] if abs(position[i] - position[i - 1]) > 5e-4 else position[i - 1]
     record = ready(Recording(columns | {"position_m": position}))
     assert record.noise_m is None
-    assert record.notes[-2].startswith("position_m hardly ever changes by one or two of its roundings")
+    assert record.notes[-2].startswith("position_m hardly ever changes by little")
     assert record.notes[-1] == UNKNOWN
 
 
@@ -245,9 +245,13 @@ def test_a_motion_that_no_command_of_the_record_began_is_not_judged() -> None:
 
 def test_a_recording_without_noise_is_judged_as_finely_as_a_model_is_simulated() -> None:
     columns = plain()
-    columns["position_m"] = np.repeat(np.append([0.02, 0.08], np.random.default_rng(4).uniform(0.02, 0.08, 38)), 25)
+    moves = np.repeat(np.append([0.02, 0.08], np.random.default_rng(4).uniform(0.02, 0.08, 23)), 40)
+    for i in range(1, moves.size):  # seen on the way, too, until it stands still
+        left_m = 0.5 * (moves[i] - moves[i - 1])
+        moves[i] = moves[i - 1] + left_m if abs(left_m) > 1e-8 else moves[i]
+    columns["position_m"] = moves
     record = ready(Recording(columns))
-    assert record.noise_m == pytest.approx(6e-7)
+    assert record.noise_m == pytest.approx(6e-7, rel=0.01)
     assert any("hardly has noise" in each and "--noise-m" in each for each in record.notes)
 
 

@@ -68,13 +68,18 @@ def test_a_record_that_begins_with_a_step_is_judged_from_where_the_stem_rests(nu
     assert any("about to move: simulated and judged from sample 2 on" in each for each in compared.notes)
 
 
-def test_a_recording_without_noise_has_a_verdict(tmp_path: Path, capsys: Capture) -> None:
+def test_rests_without_noise_have_a_verdict_where_it_is_said_that_nothing_was_held_back(
+    tmp_path: Path, capsys: Capture
+) -> None:
     path = tmp_path / "exact.csv"
     write_recording(path, seen(noise_m=0.0))
-    assert main(["diagnose", str(path), "--valve", "seed", "--effects", "asymmetric_friction"]) == 1
+    asked = ["diagnose", str(path), "--valve", "seed", "--effects", "asymmetric_friction"]
+    assert main(asked) == 1
     said = capsys.readouterr().out
-    assert "missing: asymmetric_friction" in said
-    assert "recording: position_m hardly has noise" in said
+    assert "unjudged" in said
+    assert "recording: position_m hardly ever changes by little" in said
+    assert main([*asked, "--noise-m", "1e-6"]) == 1
+    assert "missing: asymmetric_friction" in capsys.readouterr().out
 
 
 def test_where_nothing_rests_the_noise_is_unknown_and_nothing_is_judged(capsys: Capture, tmp_path: Path) -> None:

@@ -36,8 +36,8 @@ BY_CHANCE = 1e-4
 """Chance of what laps have in common in direction of motion, below which it is a change of friction and no scatter."""
 UNKNOWN = (
     "the noise of the sensor is unknown, so that no verdict rests on it: the stem rests nowhere long enough, or "
-    "to the last digit, and no command repeats. Say it, --noise-m M, or record the stem at rest, the command held for "
-    "40 samples, every reading as it was measured"
+    "to the last digit, or goes along straight lines, as a historian draws them, and no command repeats. Say it, "
+    "--noise-m M, or record the stem at rest, the command held for 40 samples, every reading as it was measured"
 )
 
 

@@ -143,8 +143,8 @@ def ready(recording: Recording) -> Record:
         notes.append(f"position_m is rounded to {quantum:.3g} {unit}")
     if noise_m is None and held_back_m(position_m, quantum):
         notes.append(
-            "position_m hardly ever changes by one or two of its roundings: if something holds small changes back, a "
-            "dead band or a historian's compression, say how much, --noise-m M"
+            "position_m hardly ever changes by little, one or two of its roundings: if something holds small changes "
+            "back, a dead band or a historian's compression, say how much, --noise-m M"
         )
     if noise_m is None and repeated_m is None:
         notes.append(UNKNOWN)
