@@ -70,7 +70,7 @@ from config.extended_valve import Inverse
 from config.valve_file import ValveParameters
 
 Memory = npt.NDArray[np.float64]
-Guess = Literal["", "lowest", "swept", "quantum"]
+Guess = Literal["", "lowest", "swept", "quantum", "delay"]
 
 EVERYWHERE = ("t", "x", "v", "p", "q", "z")
 PLACES: Mapping[str, tuple[str, ...]] = {
@@ -118,7 +118,7 @@ class Parameter:
     given: bool = False
     """Read from a drawing or a data sheet: a fit leaves it at its start."""
     guess: Guess = ""
-    """What a record's positions suggest for it, "lowest", "swept" or "quantum": a fit begins there too. Searches that
+    """What a record suggests for it, "lowest", "swept", "quantum" or "delay": a fit begins there too. Searches that
     begin elsewhere would not find it."""
 
     def starts_for(self, valve: ValveParameters) -> tuple[float, ...]:

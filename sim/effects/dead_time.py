@@ -42,7 +42,9 @@ CONFOUNDED = {
 class Parameters(NamedTuple):
     """T."""
 
-    dead_time_s: Annotated[float, Parameter("dead time", 0.0, 5.0, off=0.0, starts=(0.003, 0.01, 0.03, 0.1, 0.3))]
+    dead_time_s: Annotated[
+        float, Parameter("dead time", 0.0, 5.0, off=0.0, starts=(0.003, 0.01, 0.03, 0.1, 0.3), guess="delay")
+    ]
 
 
 def start(t: float, signal: float, z: Memory) -> None:

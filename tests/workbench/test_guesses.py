@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from config.recording import Recording
+from config.recording import Column, Recording
 from sim.composition import Composition
 from tests.workbench.valves import NOISE_M, drawn_valve, pressures, record_of, with_effect
 from workbench.data.record import ready
 from workbench.fit.fitting import fit
-from workbench.fit.guesses import FEWEST_RESTS, guessed_values, likely_quanta_m
+from workbench.fit.guesses import FEWEST_RESTS, guessed_values, likely_delays_s, likely_quanta_m
 from workbench.fit.landings import rests
 from workbench.fit.objective import SimulationError, smoothed
 from workbench.model.free_run import FreeRun
@@ -84,3 +84,15 @@ def test_before_rounding_the_truth_lies_inside_its_quanta_and_a_wrong_spring_out
         assert costs == sorted(costs), "downhill to the truth"
     off = truth * np.array([1.0, 0.0])
     assert smoothed(error, off) is error, "nothing is rounded there"
+
+
+@pytest.mark.parametrize("late", [0, 1, 3])
+def test_how_late_the_stem_is_shows_where_a_held_command_changes(late: int) -> None:
+    generator = np.random.default_rng(5)
+    steps = np.repeat(generator.uniform(0.02, 0.08, 30), 12)
+    position_m = steps[np.maximum(np.arange(360) - late, 0)] + 1e-5 * generator.standard_normal(360)
+    time_s: Column = 2.0 * np.arange(360.0, dtype=np.float64)
+    record = ready(Recording({"time_s": time_s, "command_pa": 1e6 * steps, "position_m": position_m}))
+    assert likely_delays_s(record) == ([2.0 * (late - 0.5)] if late else [])
+    ramps: dict[str, Column] = {"time_s": time_s, "command_pa": np.linspace(0.0, 8e4, 360), "position_m": position_m}
+    assert likely_delays_s(ready(Recording(ramps))) == []

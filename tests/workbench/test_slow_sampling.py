@@ -12,11 +12,13 @@ from config.recording import Column, Recording, write_recording
 from positioner.cli.main import main
 from sim.composition import Composition
 from sim.open_loop import respond
+from tests.workbench.slow_records import once_a_second
 from tests.workbench.valves import NOISE_M, SEED, with_effect
 from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.noise_floor import UNKNOWN, with_noise
 from workbench.data.record import ready
+from workbench.select.diagnosis import diagnose
 
 ASYMMETRIC = with_effect(SEED, "asymmetric_friction", asymmetry=0.15)
 EVERY, COUNT = 5, 400
@@ -149,3 +151,13 @@ def test_changes_between_samples_without_a_rest_are_refused_in_a_line(tmp_path: 
         said = capsys.readouterr().err.splitlines()
         assert len(said) == 1
         assert "no slide is seen to end in a rest of three samples, by which alone it could be judged" in said[0]
+
+
+def test_a_dead_time_between_two_samples_is_found_alone_and_no_other_effect_beside_it() -> None:
+    """Seen once a second its error is a stair, on any step of which a search ends."""
+    recording = once_a_second(SEED, 400, held_s=12.0, offset_s=0.5)
+    late = {name: column[3:] if name != "position_m" else column[:-3] for name, column in recording.columns.items()}
+    found = diagnose([Recording(late, recording.metadata)], SEED, effects=("dead_time", "flow_force"))
+    assert found.verdict == "missing"
+    assert found.missing == ("dead_time",)
+    assert 2.0 < found.best.fit.parameters["dead_time.dead_time_s"].value < 3.0

@@ -1,8 +1,11 @@
-"""What the positions of a record suggest for a parameter of an effect: stops at their ends, quanta of their rests.
+"""What a record suggests for a parameter of an effect: stops at the positions' ends, quanta of their rests, delays.
 
 S(q) = |sum exp(2 pi i x_j / q)|      x_j median position of the j-th rest, where the noise is small; q quantum, m
 
 Where rests are few, samples spread over the record stand in for them: these show a quantum of four noises and more.
+
+A move that is first seen d samples after a change of the command came after d - 1 to d of them. Seen so seldom, the
+error is a stair over the delay, on any step of which a search ends: it begins amid the likely ones.
 """
 
 from collections.abc import Sequence
@@ -30,12 +33,17 @@ THE_SAME = 1e-3
 FINEST, COARSEST = 2.0, 8.0
 """A quantum is sought from so many noises to the swept positions divided by so many."""
 PER_LOBE = 8.0
+MOVED = 5.0
+"""Noises from one sample to the next that are a move."""
+OF_DELAYS = (0.5, 0.25, 0.75)
+"""Quantiles of the delays from which searches begin."""
 
 
-def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[float, ...]]:
+def guessed_values(added: Sequence[Parameter], record: Record, *, slow: bool = False) -> list[tuple[float, ...]]:
     """Return values of the parameters that the positions suggest, for an effect that declares what of them it may be.
 
-    Just inside their lowest or highest, or both; and the quanta to which they look rounded. Empty if none is declared.
+    Just inside their lowest or highest, or both; the quanta to which they look rounded; where samples lie farther apart
+    than slides last, slow, the delays after which the stem moves. Empty if none is declared.
     """
     suggested: list[dict[str, float]] = []
     ends = _ends(added, record)
@@ -46,6 +54,8 @@ def guessed_values(added: Sequence[Parameter], record: Record) -> list[tuple[flo
             suggested += [{"lowest": lower, "swept": upper - lower} for lower, upper in stops]
     if any(each.guess == "quantum" for each in added):
         suggested += [{"quantum": each} for each in likely_quanta_m(record)]
+    if slow and any(each.guess == "delay" for each in added):
+        suggested += [{"delay": each} for each in likely_delays_s(record)]
     return [
         tuple(guess.get(each.guess, each.starts[0] if each.starts else each.least) for each in added)
         for guess in suggested
@@ -103,6 +113,24 @@ def with_other_end_kept(error: SimulationError, z: Vector, there: Vector, i: int
     before, theta = error.theta(z), error.theta(there)
     theta[travel.index] += before[moved.index] - theta[moved.index]
     return error.coordinates(theta)
+
+
+def likely_delays_s(record: Record) -> list[float]:
+    """Return how long after a change of a held command the stem moves, s, amid two samples, the likeliest first."""
+    delays: list[int] = []
+    for first, end in record.segments:
+        changed = np.flatnonzero(np.diff(record.command_pa[first:end])) + 1
+        seen_m = np.where(record.valid, record.position_m, np.nan)[first:end]
+        moved = np.flatnonzero(np.abs(np.diff(seen_m)) > MOVED * record.scale_m) + 1
+        if not moved.size:
+            continue
+        after = moved[np.minimum(np.searchsorted(moved, changed), moved.size - 1)]
+        before_next = (after >= changed) & (after < np.append(changed[1:], end - first))
+        delays += (after - changed)[before_next].tolist()
+    if len(delays) < FEWEST_RESTS:
+        return []
+    likely = np.quantile(delays, OF_DELAYS, method="nearest")
+    return [(each - 0.5) * record.period_s for each in dict.fromkeys(likely.tolist()) if each]
 
 
 def likely_quanta_m(record: Record) -> list[float]:

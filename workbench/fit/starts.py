@@ -114,7 +114,7 @@ def effect_starts(
         landed: begin at landings too; they are the same whatever the base fits.
         points: values of the added parameters; by default those that their effects declare, and the record suggests.
     """
-    guesses = guessed_values(added, error.run.record)
+    guesses = guessed_values(added, error.run.record, slow=error.run.by.slow)
     points = list(points) or [*strengths(added), *guesses]
     if error.run.by.slow:
         points += [tuple(_slower(each, value) for each, value in zip(added, values, strict=True)) for values in points]
