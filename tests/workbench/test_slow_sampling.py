@@ -18,7 +18,7 @@ from workbench.compare.comparison import compare
 from workbench.data.held_out import split
 from workbench.data.noise_floor import UNKNOWN, with_noise
 from workbench.data.record import ready
-from workbench.select.diagnosis import diagnose
+from workbench.diagnosis.diagnosis import diagnose
 
 ASYMMETRIC = with_effect(SEED, "asymmetric_friction", asymmetry=0.15)
 EVERY, COUNT = 5, 400
