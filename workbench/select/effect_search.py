@@ -307,9 +307,14 @@ class EffectSearch:
     def _base_from(self, before: EvaluatedModel, models: Sequence[EvaluatedModel]) -> EvaluatedModel:
         """Return the model before, fitted again where a search from a better one's parameters ends below it."""
         better = [each.fit.valve for each in models if bic(before.fit) - bic(each.fit) > LEAST_BIC]
-        imitations = [each for each in map(bare_imitation, better) if each]
-        valves = [*(each.valve for each in better), *imitations]
-        bare = [ValveFile(valve=valve, effect=before.fit.valve.effect) for valve in valves]
+        imitated = [(bare_imitation(each), each) for each in better]
+        # What was added before may be off, too: a dead time that ended on a step of its stair, say.
+        had = {each.name for each in before.fit.valve.effect}
+        bare = [
+            ValveFile(valve=valve, effect=tuple(each for each in of.effect if each.name in had))
+            for valve, of in [*((each.valve, each) for each in better), *imitated]
+            if valve
+        ]
         costs = list(on_threads(partial(self._local_minimum, before.fit), bare, self._workers))
         if not costs or min(costs) > BETTER * before.fit.cost:
             return before
