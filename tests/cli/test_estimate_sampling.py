@@ -9,7 +9,7 @@ from config.codes import Refusal
 from config.recording import Recording
 from config.valve_file import valve
 from positioner.estimation.recording_estimates import RecordingEstimates, estimate
-from sim.simulation import simulate
+from tests.simulated import simulated
 
 FINEST_S = 0.01
 ORDINARY = valve("ordinary")
@@ -28,7 +28,7 @@ def moved(kind: str, held: int) -> Recording:
         "triangle": 0.1 + 0.8 * np.abs((time_s / 20.0) % 2 - 1),
         "random": np.repeat(rng.uniform(0.1, 0.9, time_s.size), held)[: time_s.size],
     }[kind]
-    return simulate(ORDINARY, time_s, LOW_PA + SPAN_PA * share, noise_std_m=2e-4 * STROKE_M)
+    return simulated(ORDINARY, time_s, LOW_PA + SPAN_PA * share, noise_std_m=2e-4 * STROKE_M)
 
 
 def driven(kind: str, period_s: float) -> RecordingEstimates:

@@ -21,6 +21,7 @@ from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.virtual.virtual_cycle import virtual_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -61,7 +62,9 @@ class Loop:
             "sensor": {"noise_std_m": noise_pu * STROKE_M, "seed": 1},
             "initial": {"pressure_pa": K_S * 0.6 * STROKE_M / A if "law" in tables else 0.0},
         }
-        self.valve = Valve.from_file(ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": effects}))
+        self.valve = Valve.from_file(
+            ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": effects}), step_s=FINE_STEP_S
+        )
         told = "law" in tables  # then nothing has to be identified
         self.valve.rest_at(0.6 * STROKE_M if told else 0.0)
         self.device = Device(self.valve, SlaveFile.model_validate(slave), {})

@@ -15,6 +15,7 @@ from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.daemon.cycle import Cycle
 from positioner.virtual.virtual_cycle import virtual_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -47,7 +48,7 @@ class Frozen:
 
     def __init__(self, period_s: float, after_s: float) -> None:
         file = ValveFile.model_validate({"valve": VALVE, "effect": EFFECTS})
-        self.valve = Valve.from_file(file)
+        self.valve = Valve.from_file(file, step_s=FINE_STEP_S)
         self.valve.rest_at(0.5 * STROKE_M, START_PA)
         slave = {
             "clock": {"mode": "lockstep", "period_s": period_s},

@@ -19,6 +19,7 @@ from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.daemon.cycle import Cycle
 from positioner.virtual.virtual_cycle import identified, lockstep_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -81,7 +82,9 @@ class Loop:
             "initial": {"pressure_pa": 30e3},
         }
         lag = {"name": "ip_lag", "time_constant_s": LAG_S}
-        self.valve = Valve.from_file(ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": [lag]}))
+        self.valve = Valve.from_file(
+            ValveFile.model_validate({"valve": VALVE.model_dump(), "effect": [lag]}), step_s=FINE_STEP_S
+        )
         self.valve.rest_at(0.3 * STROKE_M, 30e3)
         self.device = Device(self.valve, SlaveFile.model_validate(slave), {})
         self.driver = FaultyDriver(self.device)

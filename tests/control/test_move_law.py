@@ -18,6 +18,7 @@ from positioner.control.slide_margins import Margin, Margins
 from positioner.control.valve_knowledge import ValveKnowledge, with_learnt
 from positioner.estimation.acceptance import Ratios
 from positioner.virtual.virtual_cycle import virtual_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -50,7 +51,7 @@ class Loop:
     def __init__(self, period_s: float, **control: object) -> None:
         self.period_s = period_s
         slave = {"clock": {"mode": "lockstep", "period_s": period_s}, "sensor": {"noise_std_m": 1e-5, "seed": 1}}
-        self.valve = Valve.from_file(ValveFile.model_validate({"valve": VALVE.model_dump()}))
+        self.valve = Valve.from_file(ValveFile.model_validate({"valve": VALVE.model_dump()}), step_s=FINE_STEP_S)
         self.valve.rest_at(0.0, 0.0)
         device = Device(self.valve, SlaveFile.model_validate(slave), {})
         file, _ = settings_at(period_s, **control)

@@ -21,6 +21,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.snapshot import Snapshot
 from positioner.estimation.landings.static_law import StaticLaw
 from positioner.virtual.virtual_cycle import identified, played, virtual_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -76,7 +77,7 @@ class Loop:
         sensor = file.sensor.model_copy(update={"seed": seed})
         clock = SlaveClock(mode="lockstep", period_s=PERIOD_S)
         file = file.model_copy(update={"clock": clock, "initial": initial, "sensor": sensor})
-        self.valve = Valve.from_file(FILE)
+        self.valve = Valve.from_file(FILE, step_s=FINE_STEP_S)
         self.valve.rest_at(initial.position_m, initial.pressure_pa)
         device = WholeMillibars(Device(self.valve, file, {}))
         self.cycle: Cycle = virtual_cycle(daemon_file(), device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))

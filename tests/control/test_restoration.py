@@ -20,6 +20,7 @@ from positioner.daemon.cycle import Cycle
 from positioner.daemon.memory.conditions import changed, conditions_of
 from positioner.estimation.acceptance import Ratios
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.static_inverse import extended_valve
 from sim.valve import Valve
@@ -61,7 +62,7 @@ class Bench:
             }
         )
         self._settings = Settings.of(self._daemon, extended)
-        self.valve = Valve.from_file(file)
+        self.valve = Valve.from_file(file, step_s=FINE_STEP_S)
         self.valve.rest_at(0.5 * STROKE_M, 45e3)
         self._device = Device(self.valve, slave, {})
 

@@ -24,6 +24,7 @@ from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.stem_at_rest import Rest
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
+from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
 
@@ -59,7 +60,7 @@ class Loop:
             "sensor": {"noise_std_m": 1e-5, "quantum_m": STROKE_M / 4096, "seed": 1},
         }
         valve = VALVE.model_dump() | {"stribeck_velocity_m_per_s": stribeck_velocity_m_per_s}
-        self.valve = Valve.from_file(ValveFile.model_validate({"valve": valve, "effect": effects}))
+        self.valve = Valve.from_file(ValveFile.model_validate({"valve": valve, "effect": effects}), step_s=FINE_STEP_S)
         self.valve.rest_at(0.0, 0.0)
         device = Device(self.valve, SlaveFile.model_validate(slave), {})
         self.cycle = virtual_cycle(

@@ -5,7 +5,7 @@ import numpy as np
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
-from sim.effect import shipped_effect, shipped_effects
+from sim.effect import FINE_STEP_S, shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, PERIOD_S, SEED, with_effect
 from workbench.data.held_out import split
@@ -36,7 +36,13 @@ def position_m(file: ValveFile, command: Column) -> Column:
     composition = Composition.from_file(file)
     start_m = float(command[0]) * file.valve.diaphragm_area_m2 / file.valve.spring_n_per_m
     response = respond(
-        composition, composition.theta, command[:-1], PERIOD_S, position_m=start_m, pressure_pa=float(command[0])
+        composition,
+        composition.theta,
+        command[:-1],
+        PERIOD_S,
+        position_m=start_m,
+        pressure_pa=float(command[0]),
+        step_s=FINE_STEP_S,
     )
     return response.indicated_m
 

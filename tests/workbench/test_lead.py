@@ -6,6 +6,7 @@ import pytest
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED, with_effect
 from workbench.data.record import ready
@@ -24,7 +25,9 @@ def begun_with_a_step(file: ValveFile, period_s: float = 0.01, begun_s: float = 
     held = round(2.0 / 0.01)
     command_pa = np.repeat(levels_pa, held)
     composition = Composition.from_file(file)
-    response = respond(composition, composition.theta, command_pa[:-1], 0.01, position_m=0.0, pressure_pa=0.0)
+    response = respond(
+        composition, composition.theta, command_pa[:-1], 0.01, position_m=0.0, pressure_pa=0.0, step_s=FINE_STEP_S
+    )
     noise_m = NOISE_M * np.random.default_rng(3).standard_normal(command_pa.size)
     rows = slice(round(begun_s / 0.01), None, round(period_s / 0.01))
     time_s = 0.01 * np.arange(command_pa.size)

@@ -10,8 +10,8 @@ from config.exports.column_mapping import read_mapping
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from sim.simulation import simulate
 from tests.sim.test_positioner import PA_PER_M, valve_file
+from tests.simulated import simulated
 from tests.workbench.valves import with_effect
 from workbench import compare, fit
 from workbench.data.held_out import split
@@ -36,7 +36,7 @@ def recorded(valve: ValveFile, seed: int, duration_s: int = 150) -> Recording:
         holds = int(generator.integers(3, 20))
         setpoint_m[k : k + holds] = here = float(np.clip(here, 0.01, 0.09))
         k += holds
-    whole = simulate(valve, np.arange(duration_s, dtype=float), setpoint_m, noise_std_m=5e-5, seed=seed)
+    whole = simulated(valve, np.arange(duration_s, dtype=float), setpoint_m, noise_std_m=5e-5, seed=seed)
     return Recording({name: column for name, column in whole.columns.items() if name != "pressure_pa"})
 
 
@@ -183,7 +183,7 @@ def small_moves(valve: ValveFile) -> Recording:
         holds = int(generator.integers(3, 12))
         setpoint_m[k : k + holds] = here
         k += holds
-    whole = simulate(valve, np.arange(130.0), setpoint_m, noise_std_m=2e-4, seed=3)
+    whole = simulated(valve, np.arange(130.0), setpoint_m, noise_std_m=2e-4, seed=3)
     measured_pa = whole.columns["pressure_pa"] + 100.0 * generator.standard_normal(130)
     return Recording({**whole.columns, "pressure_pa": measured_pa})
 

@@ -8,6 +8,7 @@ import pytest
 from config.recording import Column, Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from tests.workbench.hand_made import LIBRARY, model_of
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, pressures, with_effect
@@ -45,6 +46,7 @@ def recorded(valve: ValveFile, *, measured: bool = True, hysteresis_pa: float = 
         PERIOD_S,
         position_m=begin_m,
         pressure_pa=float(COMMAND_PA[0]),
+        step_s=FINE_STEP_S,
     )
     position_m = answer.indicated_m + NOISE_M * generator.standard_normal(COUNT)
     pressure_pa = SPAN * answer.pressure_pa + ZERO_PA + NOISE_PA * generator.standard_normal(COUNT)

@@ -6,6 +6,7 @@ import pytest
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from tests.workbench.valves import NOISE_M, SEED
 from workbench.compare.comparison import compare
@@ -33,7 +34,7 @@ def staircase(valve: ValveFile, seed: int = 4, count: int = 300) -> Recording:
     composition = Composition.from_file(valve)
     finely = np.repeat(command_pa[:-1], FINE)
     begin = {"position_m": 0.5 * SEED.valve.stroke_m, "pressure_pa": 0.5 * span_pa}
-    answer = respond(composition, composition.theta, finely, 1.0 / FINE, **begin)
+    answer = respond(composition, composition.theta, finely, 1.0 / FINE, step_s=FINE_STEP_S, **begin)
     position_m = answer.indicated_m[::FINE] + NOISE_M * generator.standard_normal(count)
     return Recording({"time_s": np.arange(float(count)), "command_pa": command_pa, "position_m": position_m})
 

@@ -12,6 +12,7 @@ import pytest
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from workbench.fit.fitting import fit
 
@@ -74,7 +75,9 @@ def answered(true: ValveFile, command_pa: Column, generator: np.random.Generator
     count = command_pa.size
     composition = Composition.from_file(true)
     finely = np.repeat(command_pa[:-1], FINE)
-    answer = respond(composition, composition.theta, finely, 1.0 / FINE, position_m=0.02, pressure_pa=42e3)
+    answer = respond(
+        composition, composition.theta, finely, 1.0 / FINE, position_m=0.02, pressure_pa=42e3, step_s=FINE_STEP_S
+    )
     position_m = answer.indicated_m[::FINE] + NOISE_M * generator.standard_normal(count)
     return Recording({"time_s": np.arange(float(count)), "command_pa": command_pa, "position_m": position_m})
 

@@ -5,6 +5,7 @@ import numpy as np
 from config.recording import Column, Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters, load_valve, shipped_valve
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
 from workbench.compare.measures import rms
 from workbench.data.record import ready
@@ -74,7 +75,13 @@ def record_of(
     begin_m = float(command[0]) * valve.diaphragm_area_m2 / valve.spring_n_per_m
     composition = Composition.from_file(file)
     response = respond(
-        composition, composition.theta, drive[:-1], PERIOD_S, position_m=begin_m, pressure_pa=float(command[0])
+        composition,
+        composition.theta,
+        drive[:-1],
+        PERIOD_S,
+        position_m=begin_m,
+        pressure_pa=float(command[0]),
+        step_s=FINE_STEP_S,
     )
     position = response.indicated_m + NOISE_M * generator.standard_normal(count)
     if dirty:
