@@ -16,7 +16,7 @@ import socket
 import struct
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import exp
 from threading import Event, Thread
@@ -132,7 +132,7 @@ class OtherDevice:
         """Answer nobody any more."""
         self._ended.set()
         self._thread.join()
-        self._server.stop()
+        stop_server(self._server, self.port)
 
     @property
     def command_mbar(self) -> int:
@@ -194,6 +194,14 @@ def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port: int = free.getsockname()[1]
     return port
+
+
+def stop_server(server: TcpServer, port: int) -> None:
+    """End a server of modbus-tk at once: it looks whether it is to end once a second, or when somebody comes."""
+    server._go.clear()
+    with suppress(OSError):  # it has looked by now
+        socket.create_connection(("127.0.0.1", port), 1.0).close()
+    server.stop()
 
 
 def await_listening(port: int) -> None:

@@ -84,8 +84,11 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_older_files_with_a_later_stamp_do_not_cost_the_file_that_is_written(tmp_path: Path) -> None:
+def test_older_files_with_a_later_stamp_do_not_cost_the_file_that_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The clock was set back."""
+    monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
     for number in (1, 2, 3):
         (tmp_path / f"v-20990101T000000Z-000{number}.csv").write_text("time_s\n")
     recorder = Recorder(tmp_path, "v", 10_000, 2)
@@ -124,7 +127,10 @@ def test_a_rotation_that_fails_goes_on_in_the_old_file_and_is_tried_again(
     assert times_s == pytest.approx([index * 1e-3 for index in range(200)]), "no row is lost"
 
 
-def test_valves_of_like_names_and_starts_within_a_second_do_not_meet(tmp_path: Path) -> None:
+def test_valves_of_like_names_and_starts_within_a_second_do_not_meet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(room, "WRITE_EVERY_S", 0.0)
     valves = ["FV 1", "FV-1", "FV/1", "阀门一", "阀门二"]
     for valve in valves * 2:
         recorder = Recorder(tmp_path, valve, 10_000, 5)

@@ -22,6 +22,7 @@ from drivers.modbus_device import ModbusDriver
 from drivers.modbus_rtu import ModbusRtuDriver
 from drivers.modbus_tcp import ModbusTcpDriver
 from positioner.cli.parts.pseudo_line import pseudo_line
+from tests.other_device import stop_server
 
 pytestmark = [
     pytest.mark.real_time,
@@ -61,7 +62,7 @@ def on_tcp() -> Iterator[tuple[ModbusDriver, Slave]]:
         pass
     yield driver, slave
     driver.close()
-    server.stop()
+    stop_server(server, port)
 
 
 def listens(port: int) -> bool:

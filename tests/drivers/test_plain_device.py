@@ -19,7 +19,7 @@ from positioner.cli.parts.sampling import when_shown
 from positioner.control.settings import Settings
 from positioner.daemon.link import SETTINGS_EVERY, Link, LinkSettings
 from positioner.daemon.pacing import RealTimePace
-from tests.other_device import await_listening, free_port
+from tests.other_device import await_listening, free_port, stop_server
 
 pytestmark = [
     pytest.mark.real_time,
@@ -77,7 +77,7 @@ def device() -> Iterator[PlainDevice]:
     device = PlainDevice()
     yield device
     with suppress(Exception):
-        device.server.stop()
+        stop_server(device.server, device.port)
 
 
 @pytest.mark.parametrize(("bits", "last"), [(None, 65535), (8, 255)])

@@ -88,7 +88,7 @@ def write_until_killed(folder: Path, said: Connection) -> None:
         said.send(number)
 
 
-@pytest.mark.real_time
+@pytest.mark.patient
 def test_a_writer_killed_at_any_moment_loses_nothing_that_it_said_was_written(tmp_path: Path) -> None:
     dice = random.Random(3)
     forks = multiprocessing.get_context("fork")

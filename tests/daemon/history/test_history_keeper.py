@@ -369,7 +369,7 @@ def test_a_thread_that_dies_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert site.events()[-1].text == "history died"
 
 
-@pytest.mark.real_time
+@pytest.mark.patient
 def test_the_thread_writes_by_itself_and_the_end_waits_for_what_waits(tmp_path: Path) -> None:
     site = Site(tmp_path)
     site.keeper.start()
