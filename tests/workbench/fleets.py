@@ -13,6 +13,7 @@ from config.slave_file import Sensor
 from config.valve_file import ValveFile, valve
 from config.writing import valve_toml, write_valve
 from sim.composition import Composition
+from sim.effect import FINE_STEP_S
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import Trial
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
@@ -30,7 +31,7 @@ def record(file: ValveFile, path: Path, seed: int, *, share: float = 1.0, gain: 
     path.parent.mkdir(exist_ok=True)
     command_pa = excitation(valve("seed").valve, np.random.default_rng(seed), ROWS)
     composition = Composition.from_file(file)
-    answer_m = gain * Trial(share * command_pa, PERIOD_S).answer_m(composition, composition.theta)
+    answer_m = gain * Trial(share * command_pa, PERIOD_S).answer_m(composition, composition.theta, FINE_STEP_S)
     Trial(command_pa, PERIOD_S).recording(answer_m, Sensor(noise_std_m=5e-5, seed=seed)).write(path)
 
 

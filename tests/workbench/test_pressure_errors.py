@@ -18,7 +18,7 @@ from workbench.fit.fitting import fit
 from workbench.select.effect_candidates import EvaluatedModel, judged_step
 from workbench.select.pressure_errors import PressureErrors, pressure_errors
 
-COUNT = 3000
+COUNT = 2000
 COMMAND_PA: Column = pressures(np.random.default_rng(2), COUNT)
 BARE = drawn_valve(np.random.default_rng(11))
 LIMITED = with_effect(BARE, "supply_limit", supply_pa=0.8 * float(COMMAND_PA.max()), exhaust_pa=-101325.0)
