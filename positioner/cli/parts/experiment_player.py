@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from workbench.discriminate.discrimination import Player
     from workbench.discriminate.experiment_design import DesignedExperiment
 
-RECORDED_WITHIN_S = 10.0
+RECORDED_WITHIN_S = 30.0
 POLL_S = 0.3
 LATEST_FILES = 2
 """Of the recorder, in which an experiment may lie."""
