@@ -1,13 +1,24 @@
 """A device on Modbus TCP, secured by TLS where its table says so.
 
 A late reply is never taken for another's: after a time-out, or a reply that does not fit, the connection is closed.
+A gateway to a serial line may hand out what the line said too late as the answer to the next request all the same, in
+a frame that fits, on the next connection too: a position would be taken for the command that the device holds, and be
+commanded. So `open` first asks for two reads of unlike lengths. Whoever is an answer behind gives the first one's
+for the second.
 """
 
+import random
+import struct
+from contextlib import suppress
+
 from config.device import ModbusTcpDevice
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply
+from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
 from drivers.modbus_device import ModbusDriver
 from fieldbus.modbus.client import ModbusClient, NotConnected, ReplyTimeout, UnexpectedReply
 from fieldbus.modbus.exception_codes import exception_code
+
+READ_COUNTS = (1, 2, 3, 4)
+"""Of registers; the first of the two reads is of one of them, drawn by lot: one far behind would not fit for long."""
 
 
 class ModbusTcpDriver(ModbusDriver):
@@ -33,6 +44,23 @@ class ModbusTcpDriver(ModbusDriver):
             self._client.open()
         except NotConnected as error:
             raise NoConnection(f"{self._who}: {error}") from None
+        self._require_answers_in_step()
+
+    def _require_answers_in_step(self) -> None:
+        """Make sure that what answers now answers what is asked now; moves nothing.
+
+        The first read may reach beyond the device's registers and be refused; the second is of a value it has.
+        """
+        place = self._config.map.position_m
+        words = place.format.words
+        with suppress(Refused):
+            self._read_words(random.choice([each for each in READ_COUNTS if each != words]))
+        self._read_words(words)
+
+    def _read_words(self, count: int) -> None:
+        place = self._config.map.position_m
+        request = struct.pack(">BHH", 3 if place.table == "holding" else 4, place.address, count)
+        self._transact(request, bytes((request[0], 2 * count)), 2 + 2 * count)
 
     def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
         try:

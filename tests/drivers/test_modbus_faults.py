@@ -248,7 +248,11 @@ def test_only_an_unknown_function_makes_it_use_two_transactions_for_good(
 
 
 def test_open_refuses_a_held_command_that_is_no_number(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
-    scripted.fault = lambda transaction, *_: frame(transaction, b"\3\4" + struct.pack(">f", float("nan")))
+    no_number = b"\3\4" + struct.pack(">f", float("nan"))
+    of_command = struct.pack(">BH", 3, SIMULATED_MAP.command_pa.address)
+    scripted.fault = lambda transaction, request, reply: frame(
+        transaction, no_number if request.startswith(of_command) else reply
+    )
     assert "the command it holds is nan" in refused_as(BadReply, driver.open)
     recovers(driver, scripted)
 

@@ -117,6 +117,37 @@ def test_a_device_that_was_silent_behind_its_gateway_is_looked_at_before_it_is_c
     assert (held_pa, device.command) == ([None, 0.0], 0)
 
 
+def test_a_gateway_that_is_an_answer_behind_is_not_believed(
+    device: PlainDevice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What its line says too late it gives for the next question: the position, 150, for the command, in kPa."""
+    registers = ModbusMap(
+        position_m=Place(address=POSITION, type="uint16", scale=1e-4),
+        command_pa=Place(address=COMMAND, type="uint16", scale=1000.0),
+    )
+    link = Link(driver_for(ModbusTcpDevice(port=device.port, unit=UNIT, map=registers)), RealTimePace(0.01))
+    link.open()
+    link.exchange(50e3)
+    answers, behind = device.slave.handle_request, list[bytes]()
+
+    def one_behind(request: bytes, broadcast: bool = False) -> bytes:
+        behind.append(answers(request, broadcast))
+        if len(behind) > 1:
+            return behind.pop(0)
+        return struct.pack(">BB", request[0] | 0x80, 11) if request[0] == 3 else behind.pop()
+
+    monkeypatch.setattr(device.slave, "handle_request", one_behind)
+    samples = [link.exchange(50e3) for _ in range(3)]
+    assert {(each.quality, each.held_pa) for each in samples} == {(Quality.LOST, None)}
+    assert behind, "it was behind all the while"
+    monkeypatch.setattr(device.slave, "handle_request", answers)
+    while (back := link.exchange(50e3)).quality is Quality.LOST:
+        pass
+    assert (back.held_pa, device.command) == (50e3, 50)
+    assert back.position_m == pytest.approx(0.015)
+    link.release()
+
+
 def test_a_set_point_of_coarse_digits_is_no_restart(device: PlainDevice) -> None:
     """The device may round to its own digits what it is told."""
     file = DaemonFile.model_validate({"valve": {"stroke_m": 0.03}, "device": device.described(None).model_dump()})

@@ -195,7 +195,7 @@ def test_a_device_that_dribbles_on_tcp_is_no_reply(
 
     driver.close()
     monkeypatch.setattr(Connection, "handle", slowly)
-    driver._connect()
+    driver._client.open()
     with pytest.raises(NoReply, match="no reply within 200 ms"):
         driver.exchange(PUSH_PA)
     assert bytewise.sent < 31

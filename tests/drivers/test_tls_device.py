@@ -210,7 +210,7 @@ def test_tls_1_2_will_do() -> None:
 
 def test_a_plain_driver_at_a_secured_device_does_not_get_in(caplog: pytest.LogCaptureFixture) -> None:
     with device_with(guarded()) as (device, server):
-        assert turned_away(server, None) == "function 3, read 2 at 11: the connection is closed"
+        assert turned_away(server, None).endswith(" at 0: the connection is closed")
         assert device.samples == 0
         assert refusals(caplog) == ["TLS: wrong version number"]
 
