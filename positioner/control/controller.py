@@ -144,7 +144,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         now.statics,
         by_slides=settings.staircase is not None,
     )
-    memory, applied, restoration = _confirmed(now, found, outcome, excitation, experiment)
+    memory, applied, restoration = _confirmed(now, found, outcome, excitation, experiment, supervision.mode)
     now = now._replace(memory=memory)
     situation = Situation(
         supervision.mode is AUTOMATIC,
@@ -265,12 +265,13 @@ def _confirmed(
     outcome: SlideOutcome | None,
     excitation: ActiveExcitation | None,
     experiment: PlayedExperiment,
+    mode: Mode,
 ) -> tuple[ControllerMemory, Applied, Restoration]:
     """Return the memory, what is applied, and what has become of what was restored, after what a slide said of them."""
     memory = now.memory
     playing = experiment.commands
     exciting = excitation is not None and not excitation.ended
-    restoration = _restoration(now, found, None if exciting or playing else outcome)
+    restoration = _restoration(now, found, None if exciting or playing else outcome, mode)
     if restoration.trust is Restored.DROPPED and memory.restoration.provisional:
         return *_nothing_known(now, found), restoration
     if outcome is not None and outcome.landing and not playing:
@@ -386,18 +387,29 @@ def _waits(now: Now, mode: Mode) -> bool:
 
     A law that commands all the while has no such moves.
     """
+    return _tries_restored(now, mode) and now.settings.moves_by_single_steps and now.statics.detector.rest is None
+
+
+def _tries_restored(now: Now, mode: Mode) -> bool:
+    """Whether a reference that is new would be followed by what was restored and is provisional."""
     memory, requests = now.memory, now.requests
-    if not memory.restoration.provisional or mode is not AUTOMATIC or not now.settings.moves_by_single_steps:
+    if not memory.restoration.provisional or mode is not AUTOMATIC:
         return False
     asked = requests.reference_writes != memory.consumed.reference_writes
-    return asked and requests.reference_m != memory.reference.value_m and now.statics.detector.rest is None
+    return asked and requests.reference_m != memory.reference.value_m
 
 
-def _restoration(now: Now, applied: Applied, outcome: SlideOutcome | None) -> Restoration:
+def _restoration(now: Now, applied: Applied, outcome: SlideOutcome | None, mode: Mode) -> Restoration:
     """Return what has become of what was restored; an identification that is applied takes its place."""
-    if applied.count != now.memory.applied.count:
-        return now.memory.restoration.replaced()
-    return now.memory.restoration.after(outcome, now.settings.limits.stroke_m)
+    memory, stroke_m = now.memory, now.settings.limits.stroke_m
+    if applied.count != memory.applied.count:
+        return memory.restoration.replaced()
+    rest = now.statics.detector.rest
+    if outcome is None and rest is not None and now.stem_m is not None and _tries_restored(now, mode):
+        return memory.restoration.where_it_rests(
+            rest.position_m, rest.std_m, memory.wanted_pa, now.sample.now_s, stroke_m
+        )
+    return memory.restoration.after(outcome, stroke_m)
 
 
 def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:

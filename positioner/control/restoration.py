@@ -7,6 +7,9 @@ It is used at once, so that a valve that has not changed is controlled as before
     no landing   the stem rests where static friction can hold it: no slide by the law from there is much longer than
                  the shortest that breaks loose, in either direction
 
+The second holds before the first move, too: a stem that rests where it cannot by what was restored is another valve's,
+and a reference moves nothing.
+
 The deviation is that of what was kept, widened by 1 % of friction, for a packing that sat still. Three landings that
 agree, one in each direction at least, confirm. One that does not, and all that was restored is dropped: nothing is left
 to command by, the pressure is held, and somebody must identify the valve. Until then a reference waits for the stem to
@@ -75,6 +78,15 @@ class Restoration:
         ups, downs = self.ups + (outcome.direction > 0), self.downs + (outcome.direction < 0)
         confirmed = ups + downs >= CONFIRMING and min(ups, downs) > 0
         return replace(self, ups=ups, downs=downs, trust=Restored.CONFIRMED if confirmed else self.trust)
+
+    def where_it_rests(
+        self, position_m: float, std_m: float, command_pa: float, now_s: float, stroke_m: float
+    ) -> "Restoration":
+        """Return what has become of it by where the stem rests under a command, whatever brought it there."""
+        if not self.provisional or self.knowledge is None:
+            return self
+        rests = SlideOutcome(now_s, 1, position_m, command_pa, position_m, std_m, moved=False, landing=False)
+        return self.after(rests, stroke_m)
 
 
 def _agrees(

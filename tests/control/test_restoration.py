@@ -43,7 +43,12 @@ class Bench:
     """A valve on its device, and the controllers that come and go."""
 
     def __init__(
-        self, file: ValveFile, law: str = "slides", seed: int = 1, extended: ExtendedValve | None = None
+        self,
+        file: ValveFile,
+        law: str = "slides",
+        seed: int = 1,
+        extended: ExtendedValve | None = None,
+        held_pa: float = 45e3,
     ) -> None:
         self._daemon = DaemonFile.model_validate(
             {
@@ -58,12 +63,12 @@ class Bench:
             {
                 "clock": {"mode": "lockstep", "period_s": PERIOD_S},
                 "sensor": {"noise_std_m": 1e-5, "quantum_m": STROKE_M / 4096, "seed": seed},
-                "initial": {"position_m": 0.5 * STROKE_M, "pressure_pa": 45e3},
+                "initial": {"position_m": 0.5 * STROKE_M, "pressure_pa": held_pa},
             }
         )
         self._settings = Settings.of(self._daemon, extended)
         self.valve = Valve.from_file(file, step_s=FINE_STEP_S)
-        self.valve.rest_at(0.5 * STROKE_M, 45e3)
+        self.valve.rest_at(0.5 * STROKE_M, held_pa)
         self._device = Device(self.valve, slave, {})
 
     def start(self, restored: ValveKnowledge | None = None, mode: Mode = Mode.AUTOMATIC) -> None:
@@ -214,6 +219,23 @@ def test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing(told: dict[
     after = run(0.045, **told)
     assert after.fault in (Fault.RESTARTED, Fault.STALLED)
     assert (after.restoration, after.static_law.landings) == (agreed, 2)
+
+
+@pytest.mark.parametrize("law", ["slides", "seed", "breakaway"])
+@pytest.mark.parametrize("changed_first", [Mode.AUTOMATIC, Mode.HOLD])
+def test_another_valve_is_not_moved_by_what_is_known_of_this_one(
+    knowledge: ValveKnowledge, law: str, changed_first: Mode
+) -> None:
+    """Half its diaphragm: it rests in mid-travel under 90 kPa. A reference 5 % up would send it to its seat."""
+    bench = Bench(changed_valve(diaphragm_area_m2=0.5), law, held_pa=90e3)
+    bench.start(knowledge, changed_first)
+    bench.run(1.0)
+    bench.ask(mode=Mode.AUTOMATIC, mode_writes=2)
+    for at in (0.55, 0.5, 0.3):
+        bench.step_to(at)
+    assert (bench.decision.command_pa, bench.trust()) == (90e3, Restored.DROPPED)
+    assert bench.decision.inhibit_reason is InhibitReason.RESTORED_CONTRADICTED
+    assert bench.valve.indicated_m == pytest.approx(0.5 * STROKE_M, abs=1e-4 * STROKE_M)
 
 
 def test_identified_anew_it_is_replaced(knowledge: ValveKnowledge) -> None:
