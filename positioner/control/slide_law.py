@@ -14,9 +14,9 @@ With the stem at rest at x, e = r - x and s = sign(e):
 
 The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
 farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round, by r - s M with
-M = max(1.02 m_s, m_-s + abs(e)), where the first would leave the travel or the pressure limits. To 1.02 m comes what
-sensor and device round: a first slide that fell so much short would leave no way back. Only resting times depend on
-the period of the loop, not where the stem lands.
+M = max(1.02 m_s, m_-s + abs(e)), where one of the two would leave the travel or the pressure limits. To 1.02 m comes
+what sensor and device round: a first slide that fell so much short would leave no way back. Only resting times depend
+on the period of the loop, not where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. A
 stem that does not come to rest, off its reference, is not moved, and that is said.
@@ -323,6 +323,8 @@ def _next_slide(
     anchor = memory.anchor.at(rest.position_m, settings.stroke_m)
     memory = replace(memory, anchor=anchor)
     way_m = _way_m(memory, memory.margin(s), settings)
+    if memory.excursion and s == -memory.direction:  # planned by what may do: it is tried before more is asked for
+        way_m = min(way_m, max(memory.margin(s).way_m, LEAST * settings.stroke_m))
     to_m = target_m + _lead_m(memory, observation.now_s, s, way_m, balance, settings)
     if s * (to_m - anchor.position_m) >= way_m:
         return _slide(memory, observation.now_s, to_m, s, balance, settings, excursion=False)
@@ -437,7 +439,8 @@ def _excursion(
     for direction, by_m in ways:
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
-        if not settings.minimum_pa <= balance.pressure_pa(by_m, direction) <= settings.maximum_pa:
+        both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)
+        if not all(settings.minimum_pa <= each <= settings.maximum_pa for each in both_pa):
             why = InhibitReason.LAW_BEYOND_LIMITS
             continue
         spent_m = memory.spent_at_m(now_s, settings) + 2 * abs(by_m - target_m)

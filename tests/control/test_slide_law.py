@@ -676,7 +676,8 @@ def test_a_slide_onto_a_stop_is_not_made_again(s: int, target: float, given: boo
         margins=KNOWN,
     )
     at = Rest(stop_m, 1e-6, 1e-6, 100, 0.1)
-    after = step(memory, StemObservation(10.0, stop_m, True, at, 0.0, None), target_m, BALANCE, SETTINGS)
+    preloaded = replace(BALANCE, ratios=Ratios(-SLOPE_PA_PER_M, -FRICTION_PA, 30e3))
+    after = step(memory, StemObservation(10.0, stop_m, True, at, 0.0, None), target_m, preloaded, SETTINGS)
     assert (after.slides > 1) is given
     assert given or after.inhibit_reason is InhibitReason.TRIM_ENDED
 
@@ -715,3 +716,30 @@ def test_where_the_device_takes_whole_numbers_the_second_of_two_slides_is_long_e
             delivered_pa = settings.command_step_pa * round(memory.level_pa / settings.command_step_pa)
             stood_m = (delivered_pa - BALANCE.pressure_pa(0.0, memory.direction)) / SLOPE_PA_PER_M
             memory = replace(memory, anchor=Anchor(stood_m, memory.direction))
+
+
+def rested(position_m: float, memory: SlideMemory, target_m: float = 0.06) -> SlideMemory:
+    """Return the memory after one step of the law on a stem at rest."""
+    at = Rest(position_m, 1e-6, 1e-6, 100, 0.1)
+    known = replace(memory, target_m=target_m, course=ReferenceCourse(target_m, 0.0), slide_s=9.5)
+    return step(known, StemObservation(10.0, position_m, True, at, 0.0, None), target_m, BALANCE, SETTINGS)
+
+
+def test_the_second_of_two_slides_is_given_as_the_first_was_planned() -> None:
+    """The first, the second slide of its move, went by what may break loose; then the way back asked for what has.
+
+    So a stem 8 % away went farther, or was left there for good: an excursion beyond the limit, it was said.
+    """
+    margins = Margins(*(4 * [Margin(0.004, 0.015)]))
+    memory = SlideMemory(direction=-1, excursion=True, slides=2, aim_m=0.052, anchor=Anchor(0.052, -1), margins=margins)
+    after = rested(0.052, memory)
+    assert (after.excursion, after.direction) == (False, 1)
+    assert after.level_pa == pytest.approx(BALANCE.pressure_pa(0.06, 1))
+
+
+def test_no_excursion_goes_where_the_pressures_allowed_do_not_bring_it_back_from() -> None:
+    """No pressure is low enough for a slide down to this reference: the stem went 6 % away from it, and stayed."""
+    target_m = (FRICTION_PA - 1e3) / SLOPE_PA_PER_M
+    memory = SlideMemory(anchor=Anchor(target_m + 0.003, -1), margins=KNOWN, level_pa=5e3)
+    after = rested(target_m + 0.003, memory, target_m)
+    assert (after.level_pa, after.inhibit_reason) == (5e3, InhibitReason.LAW_BEYOND_LIMITS)
