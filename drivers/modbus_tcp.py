@@ -7,9 +7,9 @@ commanded. So `open` first asks for two reads of unlike lengths. Whoever is an a
 for the second.
 """
 
-import random
 import struct
 from contextlib import suppress
+from itertools import cycle
 
 from config.device import ModbusTcpDevice
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
@@ -18,7 +18,7 @@ from fieldbus.modbus.client import ModbusClient, NotConnected, ReplyTimeout, Une
 from fieldbus.modbus.exception_codes import exception_code
 
 READ_COUNTS = (1, 2, 3, 4)
-"""Of registers; the first of the two reads is of one of them, drawn by lot: one far behind would not fit for long."""
+"""Of registers; the first of the two reads takes them in turn: one far behind would not fit for long."""
 
 
 class ModbusTcpDriver(ModbusDriver):
@@ -34,6 +34,7 @@ class ModbusTcpDriver(ModbusDriver):
     def __init__(self, config: ModbusTcpDevice) -> None:
         super().__init__(config, f"{config.host}:{config.port} unit {config.unit}")
         self._client = ModbusClient(config.host, config.port, config.unit, config.reply_timeout_s, config.tls)
+        self._other_counts = cycle(READ_COUNTS)
 
     def close(self) -> None:
         """Close the connection; the device keeps its last command until its own time-out."""
@@ -54,7 +55,7 @@ class ModbusTcpDriver(ModbusDriver):
         place = self._config.map.position_m
         words = place.format.words
         with suppress(Refused):
-            self._read_words(random.choice([each for each in READ_COUNTS if each != words]))
+            self._read_words(next(each for each in self._other_counts if each != words))
         self._read_words(words)
 
     def _read_words(self, count: int) -> None:
