@@ -16,7 +16,7 @@ from config.drive import VALVE
 from config.results.block import Table, as_html, as_text
 from config.results.result import Result
 from positioner.cli.main import main
-from workbench.discover import discovery
+from workbench.discover import form_search
 from workbench.discover.grammar import FORMS
 
 LONGEST = 300
@@ -53,7 +53,7 @@ def results(hidden: pos.Hidden, stepped: pos.Recording, bench: pos.Recording) ->
     """One result of each kind."""
     effects = ["asymmetric_friction"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(discovery, "FORMS", [form for form in FORMS if form.name == "scaled_over_direction_sign"])
+        patch.setattr(form_search, "FORMS", [form for form in FORMS if form.name == "scaled_over_direction_sign"])
         discovered = pos.discover(hidden.fit, hidden.base, test=hidden.test)
     return {
         "Recording": hidden.fit,
