@@ -28,9 +28,10 @@ from config.exports.export_units import (
     ending_of,
     unit_named,
 )
+from config.exports.file_kind import raw_tables
 from config.exports.header_search import Header, begins_number, find_header
 from config.exports.number_notation import decimal_sign, is_numeral, number
-from config.exports.raw_table import Cell, raw_tables
+from config.exports.raw_table import Cell
 from config.exports.time_order import in_order
 from config.exports.time_stamps import clock_unit, has_date, seconds_of
 from config.recording import REQUIRED, Column, Recording

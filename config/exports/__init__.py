@@ -2,7 +2,8 @@
 
 From the file to the recording:
 
-    raw_table                               rows of cells before anything is understood; which kind of file it is
+    file_kind                               which kind of file it is, and the tables that it may be
+    raw_table                               rows of cells before anything is understood
     text_table                              encodings, separators, quotation marks
     typed_tables                            Excel workbooks, Parquet
     measurement_files                       MATLAB, HDF5, TDMS, MDF4

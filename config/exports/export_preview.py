@@ -15,9 +15,10 @@ import numpy as np
 from config.drive import KINDS, VALVE
 from config.errors import InputError
 from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_in_header, unit_named
+from config.exports.file_kind import raw_tables
 from config.exports.header_search import Header, begins_number, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
-from config.exports.raw_table import Cell, raw_tables
+from config.exports.raw_table import Cell
 from config.exports.time_stamps import clock_unit, proposed_formats
 from config.results.block import Block, Table, as_text
 

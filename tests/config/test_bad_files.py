@@ -10,7 +10,7 @@ import pytest
 from config import plain_file
 from config.daemon_file import load_valves
 from config.errors import LONGEST, InputError
-from config.exports.raw_table import raw_tables
+from config.exports.file_kind import raw_tables
 from config.exports.text_table import text_tables
 from config.plain_file import MOST_BYTES, MOST_COLUMNS, MOST_VALUES
 from config.recording import Recording
