@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.broken_promises import BREAKAGES, Breakage
+
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = ("reliability.md", "history.md", "interfaces.md")
 TABLES = [
@@ -26,6 +28,11 @@ def test_a_promise_names_a_test_that_is_there(row: list[str]) -> None:
     assert named, row
     module = ast.parse((ROOT / named[1]).read_text(encoding="utf-8"))
     assert named[2] in {each.name for each in ast.walk(module) if isinstance(each, ast.FunctionDef)}
+
+
+@pytest.mark.parametrize("each", BREAKAGES, ids=lambda each: each.promise[:40])
+def test_the_line_that_keeps_a_promise_is_there_to_be_broken(each: Breakage) -> None:
+    assert (ROOT / each.file).read_text(encoding="utf-8").count(each.kept) == 1
 
 
 THREATS = [
