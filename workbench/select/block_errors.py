@@ -47,6 +47,8 @@ NEGLIGIBLE = 0.1
 """Of the floor: what an error below it is does not matter."""
 SAME_STANDARD_ERRORS, SAME_REDUCTION = 2.0, 0.02
 """Within one of these two models are indistinguishable."""
+MOST_NAMED = 3
+"""Excepted slips that a sentence names: a week's are dozens, and one rule excepts them all."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -191,5 +193,7 @@ def knife_edges_sentence(errors: BlockErrors, length: Scale) -> str:
     """Name the held-out slips that were excepted, with a leading space; empty if none was."""
     if not errors.knife_edges:
         return ""
-    named = "; ".join(each.sentence for each in errors.knife_edges)
-    return f" Excepted on what was held out: {named}; without, {length.said(errors.test_rest_rmse_m)} rms."
+    named = "; ".join(each.sentence for each in errors.knife_edges[:MOST_NAMED])
+    left = len(errors.knife_edges) - MOST_NAMED
+    more = f"; and {left} more" if left > 0 else ""
+    return f" Excepted on what was held out: {named}{more}; without, {length.said(errors.test_rest_rmse_m)} rms."
