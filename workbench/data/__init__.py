@@ -4,6 +4,7 @@ Its files:
 
     record            cut where it is broken, its bad samples marked, all of it told
     held_out          what is fitted, and what judges
+    clocks            whether the stem moves before its command
     noise_floor       what no model explains: noise, rounding, how well the valve repeats itself
     motion            velocity, and the slips
     plateaus          where the stem rests, of few samples a move

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.result import Brief
+from workbench.data.clocks import Early
 from workbench.data.record import Mask, Record, ready, require_few_samples
 from workbench.data.stretches import informative
 
@@ -61,6 +62,12 @@ class Split(Brief):
     def motion_std_m(self) -> float:
         """The standard deviation of the position that is fitted, m."""
         return float(np.std(self.train.record.position_m[self.train.counted]))
+
+    @property
+    def early(self) -> Early | None:
+        """How much the stem moves before its command, if it does: no verdict rests on such a recording."""
+        known = [each.record.early for each in (self.train, self.test) if each.record.early]
+        return max(known, key=lambda each: each.turns, default=None)
 
     @property
     def repeats(self) -> bool:

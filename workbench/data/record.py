@@ -21,6 +21,7 @@ from config.noise import frozen, held_back_m, quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
 from config.valve_file import ValveParameters
+from workbench.data.clocks import Early, early
 from workbench.data.motion import AT_ONCE, rests_first, slips
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
 
@@ -79,6 +80,8 @@ class Record(Brief):
     """Whose it is."""
     commanded_from: tuple[int, ...] = ()
     """For each segment the row from which its command is known: what lies between was left out, being in motion."""
+    early: Early | None = None
+    """How much the stem moves before its command: their clocks differ, and no verdict may rest on it."""
 
     @property
     def floor_m(self) -> float | None:
@@ -164,8 +167,13 @@ def ready(recording: Recording) -> Record:
         recording.kind.name,
     )
     at_rest = tuple(_from_rest(record, notes))
+    before = early(time_s, command_pa, seen_m, record.scale_m, segments)
+    if before:
+        notes.append(before.sentence)
     begun = tuple(first for first, _ in segments)
-    return replace(record, segments=at_rest, notes=tuple(map(recording.kind.text, notes)), commanded_from=begun)
+    return replace(
+        record, segments=at_rest, notes=tuple(map(recording.kind.text, notes)), commanded_from=begun, early=before
+    )
 
 
 def _from_rest(record: Record, notes: list[str]) -> Iterator[tuple[int, int]]:

@@ -122,8 +122,10 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         said: list[Block] = [self.verdict_line]
         if self.best.fit.by.sentence:
             said.append(self.best.fit.by.sentence)
-        noted = dict.fromkeys(note for each in (self.split.train, self.split.test) for note in each.record.notes)
-        said += [f"recording: {note}" for note in shortened([note for note in noted if note != UNKNOWN])]
+        parts = (self.split.train, self.split.test)
+        noted = dict.fromkeys(note for each in parts for note in each.record.notes)
+        in_verdict = {UNKNOWN, *(each.record.early.sentence for each in parts if each.record.early)}
+        said += [f"recording: {note}" for note in shortened([note for note in noted if note not in in_verdict])]
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         if self.positioner:
             said.append(self.positioner.sentence)
@@ -212,7 +214,7 @@ def diagnose(
         scores: tuple[TangentScore, ...] = ()
         held = None
         try:
-            if parts.train.record.by_setpoint:
+            if parts.train.record.by_setpoint and not parts.early:
                 held = positioner_or_packing(
                     parts, base, seed=seed, workers=threads, progress=lambda done: tell("positioner or packing", done)
                 )
@@ -223,7 +225,7 @@ def diagnose(
             steps = search.steps(base)
             base, best = search.with_intervals((steps[0].before, _last(steps)))
             landed = judged_landings(best.fit, parts)
-            found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed)
+            found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
             asked = _asked(found, best, steps, valve, library, parts, seed=seed, workers=threads, tell=tell)
             found = "unexplained" if asked.stand_in else found
             chosen = search.experiment(steps) if found == "one_of" else None
@@ -275,6 +277,8 @@ def _asked(
     tell: Progress,
 ) -> Asked:
     """Ask the best model for its mass, its pressure, and, where neither is another, whether it only stands in."""
+    if parts.early:
+        return Asked()
     mass = kept_mass(best, parts, tell)
     pressed = by_measured_pressure(best, parts, seed=seed, workers=workers, progress=tell)
     if found not in EXPLAINED or mass or pressed:

@@ -8,6 +8,7 @@ unexplained   something is missing that the library does not have; what lowered 
               Or slides end elsewhere, so that what explains the rest stands in for it; or the valve scatters so much
               that a tenth of the motion is left, which no model could explain
 unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named.
+              Or the stem moves before its command, so that no model of it can hold (`workbench.data.clocks`).
               Or landings alone are judged, and they are too few, or do not lie where any model has them: what the
               pressure did between samples is not known (`judged_landings`). Or that the command was held there is not
 unfinished    broken off before the search was through; what was known by then is named
@@ -17,6 +18,7 @@ untrusted     the searches disagree, and the best of them explains nothing
 from collections.abc import Sequence
 from typing import Literal
 
+from workbench.data.clocks import Early
 from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 
@@ -30,6 +32,7 @@ def verdict(
     motion_std_m: float,
     floor_m: float | None,
     landed: JudgedLandings | None = None,
+    early: Early | None = None,
 ) -> Verdict:
     """Return the verdict of a search that is through.
 
@@ -39,8 +42,9 @@ def verdict(
         motion_std_m: standard deviation of the position that was fitted, m.
         floor_m: what no model undercuts; None: unknown.
         landed: the landings of the best model, where they alone are judged.
+        early: how much the stem moves before its command, if it does.
     """
-    if floor_m is None or (landed and not landed.enough):
+    if early or floor_m is None or (landed and not landed.enough):
         return "unjudged"
     found = _verdict_of_all(best, steps, motion_std_m)
     known_between = landed is None and best.fit.by.sure

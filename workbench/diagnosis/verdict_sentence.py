@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from config.drive import Kind, Scale
 from sim.effect import Effect
+from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
 from workbench.diagnosis.judged_landings import unknown_between_samples
@@ -108,12 +109,18 @@ def _unproved(
 ) -> str:
     """Say why nothing is judged."""
     if verdict == "unjudged":
-        return f"Not judged: {f'{UNKNOWN}.' if parts.floor_m is None else unknown_between_samples(best.fit, parts)}"
+        return f"Not judged: {_not_known(best, parts)}"
     if verdict == "untrusted":
         return "Not to be trusted: searches from independent starts do not come to the same."
     tried = sum(each.model is not None for each in steps[-1].candidates)
     missing = sum(name not in steps[-1].before.effects for name in library)
     return f"Broken off in step {len(steps)}, with {tried} of {missing} effects refitted; nothing is judged."
+
+
+def _not_known(best: EvaluatedModel, parts: Split) -> str:
+    if parts.early:
+        return f"{parts.early.sentence}. {SAME_CLOCK}."
+    return f"{UNKNOWN}." if parts.floor_m is None else unknown_between_samples(best.fit, parts)
 
 
 def reduction_sentence(before: BlockErrors, after: BlockErrors, length: Scale) -> str:

@@ -17,6 +17,7 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
+from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import told
 from workbench.discover.added_force import Landing, landings
@@ -58,6 +59,8 @@ class Discovery(Result):
                 said = "nothing is left to explain: the valve as it is, refitted, is at the floor; no form is sought"
                 excepted = knife_edges_sentence(self.base.errors, length)
                 return f"{said}.{excepted}" if excepted else said
+            case "unjudged" if self.split.early:
+                return f"{self.split.early.sentence}. {SAME_CLOCK}"
             case "unjudged":
                 return "the noise is unknown, and with it whether anything is missing: say it, --noise-m M"
             case "none":
@@ -156,8 +159,8 @@ def discover(
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
     base = EffectSearch(parts, {}, valve.valve, seed=seed, workers=threads, progress=tell).base(valve)
-    if base.complete or parts.floor_m is None:
-        return Discovery("explained" if base.complete else "unjudged", base, (), (), (), parts, ())
+    if base.complete or parts.floor_m is None or parts.early:
+        return Discovery("explained" if base.complete and not parts.early else "unjudged", base, (), (), (), parts, ())
     searched = searched_forms(
         parts,
         valve,

@@ -9,6 +9,8 @@ import numpy as np
 from config.recording import Recording
 from sim.effect import find_effect
 from workbench.compare.comparison import Comparison, compare
+from workbench.data.clocks import SAME_CLOCK
+from workbench.data.held_out import Split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.sampling import MORE_LANDINGS
@@ -316,6 +318,15 @@ def _next(diagnosis: Diagnosis, commands: Sequence[str]) -> Html:
     )
 
 
+def _to_be_judged(split: Split) -> str:
+    """Say what would let a recording be judged."""
+    if split.early:
+        return SAME_CLOCK[0].lower() + SAME_CLOCK[1:]
+    if split.floor_m is not None:
+        return MORE_LANDINGS
+    return "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
+
+
 def _advice(diagnosis: Diagnosis) -> list[str]:
     advice = []
     if diagnosis.verdict == "adequate":
@@ -329,12 +340,8 @@ def _advice(diagnosis: Diagnosis) -> list[str]:
             "record again with slow ramps, steps of several heights and restarts in the same direction after holds"
         )
         advice.append("write the missing effect as a file of your own, where the section above says what is left")
-    if diagnosis.verdict == "unjudged" and diagnosis.split.floor_m is not None:
-        advice.append(MORE_LANDINGS)
-    elif diagnosis.verdict == "unjudged":
-        advice.append(
-            "say the noise of the sensor, --noise-m, or record the stem at rest, the command held for 40 samples"
-        )
+    if diagnosis.verdict == "unjudged":
+        advice.append(_to_be_judged(diagnosis.split))
     if diagnosis.verdict == "unfinished":
         advice.append("let the diagnosis run through, or name fewer effects, --effects")
     if diagnosis.split.train.record.pressure_pa is None and diagnosis.verdict != "adequate":

@@ -1,0 +1,92 @@
+"""Whether the clocks of command and position differ, so that the stem is seen to move before it is told to.
+
+    ... u_a, u_b, u_c | u_d ...        levels of a held command; s_b = sgn(u_b - u_a), s_c, s_d its changes
+                   ^ the stem leaves its place, direction w
+
+A stem that leaves under u_c does what that change asked for, or one before. Where two changes went one way and the next
+goes the other, s_b = s_c = -s_d, it therefore goes on, w = s_c, however late it is; w = s_d turns before the command
+does. In a closed loop the command follows the stem, but against it: it turns because the stem has gone on, w = s_c. So
+where nearly all such turns are made by the stem first, and by the same time, one of the two clocks is off. A move
+between two samples is n samples before a change between two: early by n - 1 to n + 1 periods.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from config.recording import Column
+
+MOVED = 6.0
+"""Noises by which a stem moves from one sample to the next."""
+HELD = 3
+"""Samples for which a command is held before it turns: those of a loop that is faster than they are show any order."""
+FEWEST = 6
+"""Turns that tell."""
+NEARLY_ALL = 0.9
+"""Share of the turns that the stem makes first, and of these of those that are early by the same time."""
+THE_SAME = 1
+"""Samples by which they may differ from their median."""
+SAME_CLOCK = "Record both by one clock, or shift one of the columns by that, and diagnose again"
+"""What to do about it."""
+Rows = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Early:
+    """By how much a stem moves before its command, s, at least and at most, and in how many of the turns that tell."""
+
+    least_s: float
+    most_s: float
+    early: int
+    turns: int
+
+    @property
+    def sentence(self) -> str:
+        """Say so."""
+        by = f"{self.least_s:.3g} to {self.most_s:.3g} s" if self.least_s else f"up to {self.most_s:.3g} s"
+        return (
+            f"the stem turns before its command in {self.early} of {self.turns} turns, by {by}: their two clocks "
+            "differ by that or more"
+        )
+
+
+def early(
+    time_s: Column, command: Column, position_m: Column, scale_m: float, segments: tuple[tuple[int, int], ...]
+) -> Early | None:
+    """Return by how much the stem moves before its command; None where it does not, or too few turns tell.
+
+    Args:
+        time_s: s, (samples,).
+        command: what was asked of it, a pressure or a set point, (samples,).
+        position_m: m, (samples,), NaN where it does not count.
+        scale_m: what tells motion from rest, m.
+        segments: ranges of rows, half open, without a gap.
+    """
+    found = [_turns(command[first:end], position_m[first:end], scale_m) for first, end in segments]
+    turns = sum(count for count, _ in found)
+    samples = np.concatenate([each for _, each in found])
+    if turns < FEWEST or samples.size < NEARLY_ALL * turns:
+        return None
+    middle = float(np.median(samples))
+    if np.mean(np.abs(samples - middle) <= THE_SAME) < NEARLY_ALL:
+        return None
+    period_s = float(np.median(np.concatenate([np.diff(time_s[first:end]) for first, end in segments])))
+    return Early((middle - 1.0) * period_s, (middle + 1.0) * period_s, samples.size, turns)
+
+
+def _turns(command: Column, position_m: Column, scale_m: float) -> tuple[int, Rows]:
+    """Return how many turns of a segment tell, and by how many samples the stem makes them first, (those,)."""
+    steps_m = np.diff(position_m)
+    moved = np.abs(steps_m) > MOVED * scale_m
+    leaves = 1 + np.flatnonzero(moved & ~np.append(False, moved[:-1]))
+    changes = 1 + np.flatnonzero(np.diff(command))
+    way = np.sign(np.diff(command)[changes - 1])
+    following = np.searchsorted(changes, leaves, side="right")
+    known = (following >= 2) & (following < changes.size)
+    leaves, following = leaves[known], following[known]
+    turn = (way[following - 1] == way[following - 2]) & (way[following] != way[following - 1])
+    turn &= changes[following] - changes[following - 1] >= HELD
+    leaves, following = leaves[turn], following[turn]
+    first = np.sign(steps_m[leaves - 1]) == way[following]
+    return leaves.size, (changes[following] - leaves)[first]
