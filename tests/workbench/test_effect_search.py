@@ -13,6 +13,7 @@ from sim.effect import Effect
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, fit_of, model_of, valve_with
 from workbench.data.held_out import split
 from workbench.fit.fit_result import Fit
+from workbench.fit.fitted_parameter import Fitted
 from workbench.select import effect_search
 from workbench.select.block_errors import BlockErrors
 from workbench.select.effect_candidates import EffectStep, judged_step
@@ -79,6 +80,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         way: float = 1.0,
         first: float = 1.0,
         from_landings: list[tuple[str, bool]] | None = None,
+        strengths: Mapping[str, Fitted] | None = None,
     ) -> tuple[EffectStep, ...]:
         def made(valve: ValveFile, effects: Sequence[str]) -> Fit:
             there = tuple(each.name for each in valve.effect)
@@ -102,10 +104,16 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
 
         monkeypatch.setattr(effect_search, "fit", fit)
         monkeypatch.setattr(effect_search, "begun_fit", begun_fit)
+
+        def profiled(found: Fit, _: object) -> Fit:
+            return replace(found, parameters={**found.parameters, **(strengths or {})})
+
+        monkeypatch.setattr(effect_search, "profiled", profiled)
         monkeypatch.setattr(effect_search, "block_errors", block_errors)
         monkeypatch.setattr(EffectSearch, "_local_minimum", lambda *_: local_minimum)
         search = search_of({name: LIBRARY[name] for name in library}, workers)
-        return search.steps(search.base(valve_with()))
+        steps = search.steps(search.base(valve_with()))
+        return search.proved(steps)[0] if strengths else steps
 
     return searched
 
@@ -287,6 +295,29 @@ def test_an_optimisers_failure_does_not_look_like_physics(searched: Callable[...
     (step,) = steps
     assert step.added is None
     assert step.before.explained, "the base as it was fitted again"
+
+
+@pytest.mark.parametrize(
+    ("lower", "alone", "named"),
+    [(-0.1, 1.0, ["ip_lag"]), (-0.1, 2.0, ["ip_lag", "flow_force"]), (0.1, 1.0, ["ip_lag", "flow_force"])],
+    ids=["none, and needless", "none, but needed", "some"],
+)
+def test_an_effect_whose_evidence_is_anothers_is_not_named(
+    searched: Callable[..., tuple[EffectStep, ...]], lower: float, alone: float, named: list[str]
+) -> None:
+    """A dead time on a wrong step of its stair, put right beside a flow force of 0: the lag alone, from there, does."""
+
+    def ends(there: Effects, added: Effects) -> float:
+        if {"ip_lag", "flow_force"} <= there | added:
+            return 1.0
+        if "ip_lag" in there:
+            return alone
+        return 5.0 if "ip_lag" in added else 20.0
+
+    strength = {"flow_force.force_n": Fitted(0.1, 0.1, lower, 0.3, False, True)}
+    steps = searched(ends, "ip_lag", "flow_force", strengths=strength)
+    assert [step.added.name for step in steps if step.added] == named
+    assert steps[-1].before.explained == (named == ["ip_lag"])
 
 
 def test_what_the_base_left_behind_is_refitted_from_it(searched: Callable[..., tuple[EffectStep, ...]]) -> None:

@@ -223,7 +223,7 @@ def diagnose(
             if on_preview:
                 on_preview(scores)
             steps = search.steps(base)
-            base, best = search.with_intervals((steps[0].before, _last(steps)))
+            steps, base, best = search.proved(steps)
             landed = judged_landings(best.fit, parts)
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
             asked = _asked(found, best, steps, valve, library, parts, seed=seed, workers=threads, tell=tell)

@@ -209,6 +209,42 @@ class EffectSearch:
         rivals = tuple(each for each in step.candidates if each.name in own_rivals | as_good and each.physical)
         return replace(step, indistinguishable=rivals)
 
+    def proved(self, steps: tuple[EffectStep, ...]) -> tuple[tuple[EffectStep, ...], EvaluatedModel, EvaluatedModel]:
+        """Return the steps as far as they hold, and the model they begin with and the one they come to, with intervals.
+
+        The interval of an effect's strength follows the cost with all else given way. Where it holds none, the evidence
+        may be another's: beside the effect something was searched anew, and ended lower. So the valve without is
+        searched from where it ended beside the effect, and the step is judged anew if that leaves the effect nothing.
+        """
+        base, best = self.with_intervals((steps[0].before, _best(steps[-1])))
+        for _ in range(MOST_ADDED):
+            fewer = self._without_evidence(steps, best)
+            if fewer is None:
+                break
+            steps = fewer
+            base, best = self.with_intervals((steps[0].before, _best(steps[-1])))
+        return steps, base, best
+
+    def _without_evidence(self, steps: tuple[EffectStep, ...], best: EvaluatedModel) -> tuple[EffectStep, ...] | None:
+        """Return the steps with the last that added an effect judged anew; None where the effect has evidence."""
+        i = max((i for i, step in enumerate(steps) if step.added), default=None)
+        added = steps[i].added if i is not None else None
+        if i is None or added is None or not best.explained or not _may_be_none(best.fit, self._library[added.name]):
+            return None
+        valve = best.fit.valve
+        own = self._library[added.name].name
+        without = self.base(
+            ValveFile(valve=valve.valve, effect=tuple(each for each in valve.effect if each.name != own))
+        )
+        if bic(without.fit) - bic(best.fit) > LEAST_BIC:
+            return None
+        self._known = _Known(steps[:i], without)
+        models = {each.name: each.model or each.rejection_reason for each in steps[i].candidates}
+        fits = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
+        behind = [name for name, each in fits.items() if log_likelihood_difference(without.fit, each) > LEFT_BEHIND]
+        models |= self._refitted(i + 1, without, behind, landed=False)
+        return (*steps[:i], self._judged_in_full(without, models, i + 1))
+
     def with_intervals(self, models: Sequence[EvaluatedModel]) -> tuple[EvaluatedModel, ...]:
         """Return models with the profile intervals of their parameters; equal ones once."""
 
@@ -443,6 +479,15 @@ def _rms_so_far_m(found: BegunFit | EvaluatedModel | str) -> float | None:
 
 def _best(step: EffectStep) -> EvaluatedModel:
     return step.added.model if step.added and step.added.model else step.before
+
+
+def _may_be_none(found: Fit, effect: Effect) -> bool:
+    """Whether the interval of an effect's strength holds the value at which it vanishes."""
+    return any(
+        each.lower <= declared.off <= each.upper
+        for key, declared in effect.parameters.items()
+        if declared.off is not None and (each := found.parameters.get(f"{effect.name}.{key}"))
+    )
 
 
 def _may_stand(candidate: EffectCandidate) -> bool:
