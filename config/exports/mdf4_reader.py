@@ -57,10 +57,14 @@ def _group(path: Path, file: Any, index: int) -> Columns:
     for number, channel in enumerate(group.channels):
         if number == file.masters_db.get(index):
             continue
-        signal = file.get(group=index, index=number)
+        # By itself asammdf leaves out what is invalid of each channel: its rows would no longer be those of the others.
+        signal = file.get(group=index, index=number, ignore_invalidation_bits=True)
         if signal.samples.ndim == 1 and signal.samples.dtype.kind in NUMBERS:
             columns.setdefault("time [s]", np.asarray(signal.timestamps, dtype=np.float64))
-            columns[with_unit(channel.name, signal.unit or "")] = signal.samples.astype(np.float64)
+            values = signal.samples.astype(np.float64)
+            if signal.invalidation_bits is not None:
+                values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+            columns[with_unit(channel.name, signal.unit or "")] = values
     return columns
 
 

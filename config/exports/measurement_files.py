@@ -24,6 +24,9 @@ from config.exports.typed_tables import NUMBERS, Columns, by_length, column_rows
 from config.extras import needed
 from config.plain_file import require_moderate
 
+WAVEFORM = ("wf_start_time", "wf_start_offset", "wf_increment")
+"""By what TDMS says of when the samples of a channel are."""
+
 
 def matlab(path: Path) -> list[RawTable]:
     """Return the tables that the vectors of a MATLAB file before version 7.3 make, those of one length each.
@@ -98,7 +101,7 @@ def tdms(path: Path) -> list[RawTable]:
         with warnings.catch_warnings(action="ignore"), path.open("rb") as data, nptdms.TdmsFile.open(data) as file:
             for group in file.groups():
                 require_moderate(path, max((len(each) for each in group.channels()), default=0), len(group.channels()))
-            groups = [(group.name, _tdms_group(group)) for group in file.groups()]
+            groups = [(group.name, columns) for group in file.groups() for columns in _tdms_group(group)]
     except InputError:
         raise
     except Exception as error:  # a damaged file fails anywhere in its reader
@@ -117,18 +120,26 @@ class _Told(logging.Handler):
         self.first = self.first or " ".join(record.getMessage().split())
 
 
-def _tdms_group(group: Any) -> Columns:
-    columns: Columns = {}
+def _tdms_group(group: Any) -> list[Columns]:
+    """Return the channels of a group that are of one time each: waveforms may begin and go on differently."""
+    of_times: dict[tuple[str, ...], Columns] = {}
     for channel in group.channels():
         values = channel[:]
+        kept = channel.properties
+        waveform = bool(kept.get("wf_increment")) and values.dtype.kind in NUMBERS
+        times = tuple(str(kept.get(each)) for each in WAVEFORM) if waveform else ()
+        columns = of_times.setdefault(times, {})
         if values.dtype.kind == "M":
             columns[channel.name] = [str(np.datetime_as_string(each, unit="us")) for each in values]
         elif values.dtype.kind in NUMBERS:
-            if channel.properties.get("wf_increment") and "time [s]" not in columns:
-                columns["time [s]"] = channel.time_track()
-            unit = channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or ""
+            if waveform:
+                columns.setdefault("time [s]", channel.time_track())
+            unit = kept.get("unit_string") or kept.get("NI_UnitDescription") or ""
             columns[with_unit(channel.name, str(unit))] = values.astype(np.float64)
-    return columns
+    if len(of_times) == 2 and () in of_times:  # what says no time of its own goes with the one that is said
+        plain = of_times.pop(())
+        return [next(iter(of_times.values())) | plain]
+    return list(of_times.values())
 
 
 def mdf4(path: Path) -> list[RawTable]:

@@ -154,6 +154,51 @@ def test_a_matlab_file_that_ends_its_reader_is_one_line(tmp_path: Path) -> None:
         preview(tmp_path / "old.mat")
 
 
+def test_what_mdf_marks_invalid_is_missing_and_moves_no_other_row(tmp_path: Path) -> None:
+    """asammdf leaves them out of each channel by itself: as many here and there made a table of shifted rows."""
+    import asammdf
+
+    invalid = {"PV": slice(20, 30), "OUT": slice(150, 160)}
+    with asammdf.MDF(version="4.10") as file:
+        signals = []
+        for name, values, unit in (("PV", POSITION_MM, "mm"), ("OUT", COMMAND_BAR, "bar")):
+            bits = np.zeros(len(TIME_S), dtype=bool)
+            bits[invalid[name]] = True
+            signals.append(asammdf.Signal(values, TIME_S, name=name, unit=unit, invalidation_bits=bits))
+        file.append(signals)
+        file.save(tmp_path / "run.mf4", overwrite=True)
+    recording = read_export(tmp_path / "run.mf4", read_mapping(FILES["run.mf4"][1]), None)
+    expected_m, expected_pa = 1e-3 * POSITION_MM, 1e5 * COMMAND_BAR
+    expected_m[invalid["PV"]], expected_pa[invalid["OUT"]] = np.nan, np.nan
+    np.testing.assert_allclose(recording.time_s, TIME_S, atol=1e-12)
+    np.testing.assert_allclose(recording.position_m, expected_m)
+    np.testing.assert_allclose(recording.columns["command_pa"], expected_pa)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"wf_increment": 0.02},
+        {"wf_start_offset": 0.3},
+        {"wf_start_time": np.datetime64("2026-01-01T00:00:01")},
+    ],
+    ids=lambda other: next(iter(other)),
+)
+def test_waveforms_of_tdms_of_other_times_are_no_columns_of_one_table(other: dict[str, object], tmp_path: Path) -> None:
+    """As many samples of twice the spacing stood beside one another as if they were of the same time."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    told = {"wf_start_time": np.datetime64("2026-01-01T00:00:00"), "wf_start_offset": 0.0, "wf_increment": 0.01}
+    with TdmsWriter(tmp_path / "run.tdms") as writer:
+        writer.write_segment(
+            [
+                ChannelObject("rig", "PV", POSITION_MM, properties={"unit_string": "mm", **told}),
+                ChannelObject("rig", "OUT", COMMAND_BAR, properties={"unit_string": "bar", **told, **other}),
+            ]
+        )
+    assert "column 'OUT' is missing" in said_of(tmp_path / "run.tdms", FILES["run.tdms"][1])
+
+
 def said_of(path: Path, words: list[str]) -> str:
     try:
         return f"{len(read_export(path, read_mapping(words), None))} rows"
