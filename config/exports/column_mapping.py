@@ -37,7 +37,7 @@ class ExportOptions:
         decimal: the decimal sign, "." or ","; None: as the numbers themselves show.
         time_format: of `datetime.strptime`; None: seconds or ISO 8601.
         status: rows of other words hold no values.
-        sheet: of a workbook; None: the one that has the columns.
+        sheet: of a workbook, or group of a measurement file; None: the one that has the columns.
     """
 
     decimal: str | None = None

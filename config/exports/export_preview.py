@@ -16,15 +16,16 @@ from config.drive import KINDS, VALVE
 from config.errors import InputError
 from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_in_header, unit_named
 from config.exports.file_kind import raw_tables
-from config.exports.header_search import Header, begins_number, guess_header
+from config.exports.header_search import SHOWN, Header, begins_number, guess_header
 from config.exports.number_notation import decimal_sign, is_numeral
-from config.exports.raw_table import Cell
+from config.exports.raw_table import Cell, RawTable
 from config.exports.time_stamps import clock_unit, proposed_formats
 from config.results.block import Block, Table, as_text
 
 LOOKED_AT = 200
 FIRST = 3
 MOST_SIGNALS = 20
+MOST_TABLES = 5
 WIDEST = 24
 SETPOINT = r"soll|\bsp\b|set ?point"
 COMMON = {
@@ -142,12 +143,20 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
     )
     what = header.table.what
     if header.table.sheet and len(tables) > 1:
-        what += f" of {', '.join(repr(each.sheet) for each in tables)}"
+        what += f" of {', '.join(repr(each) for each in dict.fromkeys(each.sheet for each in tables))}"
     place = f"{header.table.place} {header.line} names the columns"
     if not header.line:
         place = "no line names the columns" if header.names[0] == "#1" else "its columns"
     words, open_ = _proposal(columns, header)
-    return ExportPreview(what, place, columns, words, open_)
+    return ExportPreview(what, place, columns, words, (*open_, *_besides(header.table, tables)))
+
+
+def _besides(shown: RawTable, tables: Sequence[RawTable]) -> list[str]:
+    """Return what the other tables of a measurement file hold, which are of other times than the one that is shown."""
+    others = [each for each in tables if each is not shown and each.length and each.place == "row"]
+    named = [f"{each.what}: {', '.join(map(str, next(each.rows())[1][:SHOWN]))}" for each in others[:MOST_TABLES]]
+    more = [f"and {len(others) - MOST_TABLES} more"] if len(others) > MOST_TABLES else []
+    return ["of other times, not shown: " + each for each in (*named, *more)]
 
 
 def _proposal(columns: Sequence[ColumnPreview], header: Header) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -43,8 +43,6 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
             raise InputError(str(path), problem)
     if begin.startswith(b"PK\x03\x04"):
         return typed_tables.workbook(path, sheet)
-    if sheet is not None:
-        raise InputError("--sheet", f"goes with an Excel workbook, and {path} is none")
     for magic, read in (
         (b"PAR1", typed_tables.parquet),
         (b"MATLAB 5.0 MAT-file", measurement_files.matlab),
@@ -54,7 +52,25 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
         (b"MDF     ", measurement_files.mdf4),
     ):
         if begin.startswith(magic):
-            return read(path)
+            return _of_group(path, read(path), sheet)
+    if sheet is not None:
+        raise _without_sheets(path)
     if line_protocol.is_line_protocol(begin):
         return line_protocol.line_protocol(path)
     return text_table.text_tables(path)
+
+
+def _of_group(path: Path, tables: list[RawTable], group: str | None) -> list[RawTable]:
+    """Return the tables of the group that is named, or all."""
+    if group is None:
+        return tables
+    names = ", ".join(dict.fromkeys(each.sheet for each in tables if each.sheet))
+    if not names:
+        raise _without_sheets(path)
+    if not (chosen := [each for each in tables if each.sheet == group]):
+        raise InputError("--sheet", f"{path} has no group {group!r}; it has: {names}")
+    return chosen
+
+
+def _without_sheets(path: Path) -> InputError:
+    return InputError("--sheet", f"goes with an Excel workbook, or groups of TDMS and MDF; {path} is none of them")

@@ -59,7 +59,7 @@ def find_header(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -
     """Return where the columns of the names that are wanted are.
 
     Raises:
-        InputError: no line holds them all, one stands twice in it, or several sheets hold them.
+        InputError: no line holds them all, one stands twice in it, or several sheets or groups hold them.
     """
     found: list[Header] = []
     broken: list[InputError] = []
@@ -70,8 +70,9 @@ def find_header(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -
         except InputError as error:  # as it would be read with a separator that is none
             broken.append(error)
     if len({each.table.sheet for each in found}) > 1:
-        sheets = ", ".join(repr(each.table.sheet) for each in found)
-        raise InputError(str(path), f"the sheets {sheets} all have these columns: say which, --sheet NAME")
+        sheets = ", ".join(repr(each) for each in dict.fromkeys(each.table.sheet for each in found))
+        plural = "sheets" if found[0].table.what.startswith("sheet ") else "groups"
+        raise InputError(str(path), f"the {plural} {sheets} all have these columns: say which, --sheet NAME")
     if not found:
         raise broken[0] if broken else _missing(path, tables, wanted)
     return _with_units(found[0])
@@ -165,6 +166,8 @@ def _missing(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -> I
     parts = [part for each in wanted for part in ([each] if "+" not in each else each.split("+"))]
     absent = [each for each in parts if not _matches(guess.names, each)] or parts[:1]
     missing = absent[0]
+    if apart := _apart(tables, parts):
+        return InputError(str(path), apart)
     if said := next((said for each in absent if (said := _in_the_rows(guess, each))), None):
         return InputError(str(path), said)
     if not guess.line and guess.names[0] == "#1":
@@ -175,6 +178,27 @@ def _missing(path: Path, tables: Sequence[RawTable], wanted: Sequence[str]) -> I
     more = f" and {len(guess.names) - SHOWN} more" if len(guess.names) > SHOWN else ""
     where = f"{guess.table.place} {guess.line} names" if guess.line else "there are"
     return InputError(str(path), f"column {missing!r} is missing; {where}: {named}{more}")
+
+
+def _apart(tables: Sequence[RawTable], parts: Sequence[str]) -> str | None:
+    """Return what to say where each column stands in some table, and no table has them all: they are of other times."""
+    held = [(table, [part for part in parts if _names_it(table, part)]) for table in tables if table.place == "row"]
+    left = list(dict.fromkeys(parts))
+    said: list[str] = []
+    for table, of_it in sorted(held, key=lambda each: -len(each[1])):
+        if found := [part for part in left if part in of_it]:
+            said.append(f"{', '.join(map(repr, found))} in {table.what}")
+            left = [part for part in left if part not in found]
+    if left or len(said) < 2:
+        return None
+    return f"its columns stand in tables of other times: {'; '.join(said)}; export them on one time"
+
+
+def _names_it(table: RawTable, part: str) -> bool:
+    try:
+        return any(_matches([str(cell) for cell in cells], part) for _, cells in islice(table.rows(), SEARCHED))
+    except InputError:
+        return False
 
 
 def _in_the_rows(guess: Header, name: str) -> str | None:

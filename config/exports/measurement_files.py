@@ -107,7 +107,7 @@ def tdms(path: Path) -> list[RawTable]:
     except Exception as error:  # a damaged file fails anywhere in its reader
         raise InputError(str(path), f"is a damaged TDMS file: {first_line(error)}") from None
     notes = (("torn", told.first),) if told.first else ()
-    tables = [replace(table, notes=notes) for name, columns in groups for table in _tables(columns, name)]
+    tables = [replace(table, notes=notes) for name, columns in groups for table in _tables(columns, name, name)]
     return _required(path, tables)
 
 
@@ -149,13 +149,13 @@ def mdf4(path: Path) -> list[RawTable]:
         InputError: it is of another version, is damaged, or holds no channels of numbers.
         ModuleNotFoundError: asammdf is not installed; names the extra.
     """
-    return _required(path, [table for name, columns in mdf4_groups(path) for table in _tables(columns, name)])
+    return _required(path, [table for name, columns in mdf4_groups(path) for table in _tables(columns, name, name)])
 
 
-def _tables(columns: Columns, name: str) -> list[RawTable]:
+def _tables(columns: Columns, name: str, group: str = "") -> list[RawTable]:
     """Return a table for each length among columns, the longest first."""
     return [
-        RawTable(f"{name}, {length} rows", "row", partial(column_rows, chosen), length=length)
+        RawTable(f"{name}, {length} rows", "row", partial(column_rows, chosen), sheet=group, length=length)
         for length, chosen in by_length(columns)
         if length > 1
     ]

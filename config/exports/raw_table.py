@@ -19,7 +19,7 @@ class RawTable:
         place: what a row is called in messages: "line" or "row".
         rows: begins anew at the first row; each with its number, blank ones too.
         separator: between fields of a text.
-        sheet: name of a workbook's sheet.
+        sheet: name of a workbook's sheet, or of a measurement file's group.
         ended: whether the last line of a text has its end.
         notes: what is to be told about it, by key.
         length: about how many rows there are; 0: not known before they are read.

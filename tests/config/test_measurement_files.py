@@ -11,7 +11,7 @@ import pytest
 
 from config.errors import InputError
 from config.exports import reader_process
-from config.exports.column_mapping import read_mapping
+from config.exports.column_mapping import ExportOptions, read_mapping
 from config.exports.export_preview import preview
 from config.historian_export import read_export
 
@@ -196,7 +196,44 @@ def test_waveforms_of_tdms_of_other_times_are_no_columns_of_one_table(other: dic
                 ChannelObject("rig", "OUT", COMMAND_BAR, properties={"unit_string": "bar", **told, **other}),
             ]
         )
-    assert "column 'OUT' is missing" in said_of(tmp_path / "run.tdms", FILES["run.tdms"][1])
+    said = said_of(tmp_path / "run.tdms", FILES["run.tdms"][1])
+    assert (
+        "tables of other times: 'time', 'PV' in rig, 200 rows; 'OUT' in rig, 200 rows; export them on one time" in said
+    )
+
+
+def write_runs(path: Path, *commands: str) -> None:
+    """Write two groups of the same channels, but for what the second calls the command."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(path) as writer:
+        for group, name in zip(("run 1", "run 2"), commands, strict=True):
+            writer.write_segment(
+                [
+                    ChannelObject(group, "t", TIME_S, properties={"unit_string": "s"}),
+                    ChannelObject(group, "PV", POSITION_MM, properties={"unit_string": "mm"}),
+                    ChannelObject(group, name, COMMAND_BAR, properties={"unit_string": "bar"}),
+                ]
+            )
+
+
+def test_of_several_groups_that_have_the_columns_a_person_says_which(tmp_path: Path) -> None:
+    write_runs(tmp_path / "run.tdms", "OUT", "OUT")
+    mapping = read_mapping(["time_s=t", "position_m=PV", "command_pa=OUT"])
+    with pytest.raises(InputError, match="the groups 'run 1', 'run 2' all have these columns: say which, --sheet NAME"):
+        read_export(tmp_path / "run.tdms", mapping, None)
+    assert len(read_export(tmp_path / "run.tdms", mapping, None, options=ExportOptions(sheet="run 2"))) == len(TIME_S)
+    with pytest.raises(InputError, match=r"--sheet: .*run.tdms has no group 'run 3'; it has: run 1, run 2"):
+        read_export(tmp_path / "run.tdms", mapping, None, options=ExportOptions(sheet="run 3"))
+
+
+def test_columns_of_other_times_are_said_to_be_so(tmp_path: Path) -> None:
+    write_runs(tmp_path / "run.tdms", "Cmd", "OUT")
+    said = said_of(tmp_path / "run.tdms", ["time_s=t", "position_m=PV", "command_pa=Cmd", "pressure_pa=OUT"])
+    assert "tables of other times: 't', 'PV', 'Cmd' in run 1, 200 rows; 'OUT' in run 2, 200 rows" in said
+    assert (
+        "of other times, not shown: run 2, 200 rows: t [s], PV [mm], OUT [bar]" in preview(tmp_path / "run.tdms").open
+    )
 
 
 def said_of(path: Path, words: list[str]) -> str:

@@ -52,7 +52,9 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="THEIRS=GOOD,..",
         help="a column of words; rows of others than these hold no values",
     )
-    export.add_argument("--sheet", metavar="NAME", help="of a workbook (else the one that has the columns)")
+    export.add_argument(
+        "--sheet", metavar="NAME", help="of a workbook, or a group of TDMS or MDF (else the one that has the columns)"
+    )
 
 
 def _stroke(word: str) -> float:
