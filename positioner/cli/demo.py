@@ -44,6 +44,10 @@ SETTLED_S = 0.2
 """The error of a step is the mean over this last part of it."""
 IDENTIFICATIONS = 3
 """At most in a phase: a machine that is held up for a moment loses samples, and what they leave is refused."""
+ACKNOWLEDGEMENTS = 10
+"""At most at the start, half a second apart: on a machine that is that busy replies are lost for seconds."""
+NEW = "new"
+"""The phase before the packing ages."""
 LARGEST_ERROR_PU = 0.01
 LARGEST_RATIO_ERROR = 0.01
 RATIOS = ("b_over_c", "k_over_c")
@@ -92,15 +96,24 @@ class DemoOutcome:
     @property
     def problems(self) -> list[str]:
         """What does not hold."""
-        return [
-            f"step to {step.reference_pu:g} p.u. ({step.phase}) ended {step.error_pu:+.4f} p.u. off"
-            for step in self.steps
-            if step.counted and not abs(step.error_pu) <= LARGEST_ERROR_PU
-        ] + [
-            f"{each.name} ({each.phase}): {_percent(each.deviation)} off the truth"
-            for each in self.identified
-            if each.name in RATIOS and (each.deviation is None or abs(each.deviation) > LARGEST_RATIO_ERROR)
-        ]
+        return (
+            [
+                f"step to {step.reference_pu:g} p.u. ({step.phase}) ended {step.error_pu:+.4f} p.u. off"
+                for step in self.steps
+                if step.counted and not abs(step.error_pu) <= LARGEST_ERROR_PU
+            ]
+            + [
+                f"{each.name} ({each.phase}): {_percent(each.deviation)} off the truth"
+                for each in self.identified
+                if each.name in RATIOS and (each.deviation is None or abs(each.deviation) > LARGEST_RATIO_ERROR)
+            ]
+            + [
+                f"the packing aged before the step to {step.reference_pu:g} p.u. ({step.phase}) was over: the "
+                "machine is too busy for the demo's times, run it again"
+                for step in self.steps
+                if step.phase == NEW and not step.counted
+            ][:1]
+        )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -180,12 +193,12 @@ def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
         _observe(dcs, 0.5, "S0, nothing moves")
         _acknowledge(dcs)
         dcs.set("mode", 2)
-        identified = identify(dcs, "new", ALPHA_PA, valve)
-        steps = _steps(dcs, "new", counted=True)
+        identified = identify(dcs, NEW, ALPHA_PA, valve)
+        steps = _steps(dcs, NEW, counted_until_s=powered_s + AGES_AT_S)
         _observe(dcs, AGES_AT_S + 0.5 - (time.monotonic() - powered_s), "the packing ages by 30 %")
-        steps += _steps(dcs, "aged", counted=False)
+        steps += _steps(dcs, "aged", counted_until_s=-math.inf)
         identified += identify(dcs, "aged", AGED_ALPHA_PA, aged)
-        steps += _steps(dcs, "identified anew", counted=True)
+        steps += _steps(dcs, "identified anew")
         cycle = dcs.get_all(*(register.name for register in STATISTICS))
     return DemoOutcome(steps, identified, cycle)
 
@@ -194,7 +207,9 @@ def _acknowledge(dcs: "Dcs") -> None:
     """Acknowledge, as an operator would, what was latched while the processes began on a busy machine; say it."""
     from config.codes import Fault
 
-    if fault := int(dcs.get("fault")):
+    for _ in range(ACKNOWLEDGEMENTS):
+        if not (fault := int(dcs.get("fault"))):
+            return
         _print_line(f"acknowledged: {Fault(fault).text}")
         dcs.set("acknowledge", 1)
         _observe(dcs, 0.5, "S0, nothing moves")
@@ -224,13 +239,15 @@ def _compared(dcs: "Dcs", phase: str, name: str, true: float) -> ComparedEstimat
     return ComparedEstimate(phase, name, now[f"{name}_e"], now[f"{name}_std"], true, refusal)
 
 
-def _steps(dcs: "Dcs", phase: str, *, counted: bool) -> list[StepOutcome]:
+def _steps(dcs: "Dcs", phase: str, counted_until_s: float = math.inf) -> list[StepOutcome]:
+    """Make the steps; what is over after the packing has aged does not count for the packing that was identified."""
     steps = []
     for reference_pu in STEPS:
         dcs.set("reference", reference_pu)
         label = f"{phase}: step to {reference_pu:g} p.u."
         _observe(dcs, STEP_S - SETTLED_S, label)
         settled_pu = _observe(dcs, SETTLED_S, label)
+        counted = time.monotonic() < counted_until_s
         steps.append(StepOutcome(phase, reference_pu, settled_pu - reference_pu, counted))
     _print_line(f"{phase}: {len(steps)} steps, worst {max(abs(step.error_pu) for step in steps):.4f} p.u.")
     return steps

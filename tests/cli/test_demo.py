@@ -8,7 +8,9 @@ import pytest
 from config.codes import Fault, Mode
 from config.recording import read_recording
 from config.valve_file import load_valve, shipped_valve
+from positioner.cli import demo
 from positioner.cli.demo import (
+    ACKNOWLEDGEMENTS,
     ALPHA_PA,
     IDENTIFICATIONS,
     LARGEST_ERROR_PU,
@@ -28,9 +30,9 @@ from tests.cli.test_daemon_process import until
 pytestmark = pytest.mark.real_time
 
 
-def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True) -> DemoOutcome:
+def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, phase: str = "new", counted: bool = True) -> DemoOutcome:
     identified = [ComparedEstimate("new", "b_over_c", -800e3 * ratio, 1.0, -800e3, "")]
-    return DemoOutcome([StepOutcome("new", 0.5, error_pu, counted)], identified, {})
+    return DemoOutcome([StepOutcome(phase, 0.5, error_pu, counted)], identified, {})
 
 
 @pytest.mark.parametrize(
@@ -39,7 +41,8 @@ def outcome(error_pu: float = 0.001, ratio: float = 1.0, *, counted: bool = True
         (outcome(), True),
         (outcome(error_pu=-1.01 * LARGEST_ERROR_PU), False),
         (outcome(error_pu=float("nan")), False),
-        (outcome(error_pu=0.08, counted=False), True),
+        (outcome(error_pu=0.08, phase="aged", counted=False), True),
+        (outcome(error_pu=0.08, counted=False), False),
         (outcome(ratio=1.011), False),
         (outcome(ratio=0.991), True),
         (outcome(ratio=float("nan")), False),
@@ -63,6 +66,39 @@ def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
     identified = any(not each["refusal"] for each in told["identified"])
     states = set(read_recording(recording).columns["state"].tolist())
     assert states == ({0.0, 1.0, 2.0, 3.0} if identified else {0.0, 3.0}), "what is refused moves no stem"
+
+
+def test_steps_that_come_after_the_ageing_are_said_to_be_late_and_not_to_be_off() -> None:
+    """A valve that was 0.08 off, for its packing had aged while the processes were started, was said not to hold."""
+    (problem,) = outcome(error_pu=0.08, counted=False).problems
+    assert problem.startswith("the packing aged before the step to 0.5 p.u. (new) was over: the machine is too busy")
+
+
+class FaultyAtFirst:
+    """A daemon whose device's replies are lost so many times."""
+
+    def __init__(self, faults: int) -> None:
+        self.faults = faults
+
+    def get(self, _: str) -> float:
+        return Fault.NO_REPLY if self.faults else Fault.NONE
+
+    def get_all(self, *names: str) -> dict[str, float]:
+        return dict.fromkeys(names, 0.0)
+
+    def set(self, name: str, _: float) -> None:
+        assert name == "acknowledge"
+        self.faults -= 1
+
+
+@pytest.mark.parametrize(("faults", "left"), [(0, 0), (3, 0), (ACKNOWLEDGEMENTS + 1, 1)])
+def test_faults_of_the_start_are_acknowledged_until_there_are_none(
+    faults: int, left: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(demo, "_observe", lambda *_: 0.0)
+    dcs = FaultyAtFirst(faults)
+    demo._acknowledge(dcs)  # type: ignore[arg-type]
+    assert dcs.faults == left
 
 
 class RefusedAtFirst:
