@@ -97,7 +97,7 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
     import time
 
     from drivers.boundary import DriverError, ForeseesRefusal
-    from positioner.cli.probe import watching_driver
+    from positioner.cli.probe import not_plausible, watching_driver
     from positioner.control.settings import Settings
 
     driver = watching_driver(file)
@@ -119,7 +119,10 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
     # A reading piece by piece, as a watcher of CANopen has it, says nothing of the cycle.
     if took_s > file.cycle.period_s and driver.capabilities.one_transaction:
         raise FailedCheck(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
-    return f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"
+    # No failure: one that nobody has commanded may well say so, or wait for its master to be made ready.
+    said = not_plausible(reading, Settings.of(file).limits)
+    seen = f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"
+    return f"{seen}; but {said}" if said else seen
 
 
 def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:

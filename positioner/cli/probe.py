@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from drivers.boundary import Driver, Reading
+    from positioner.control.supervision import Limits
 
 HELP = "read the valve once a second: bus rate, age, plausibility; moves nothing"
 EXAMPLE = "positioner probe daemon.toml --count 5"
@@ -34,14 +35,14 @@ def run(arguments: argparse.Namespace) -> int:
     file = load_daemon(arguments.config, arguments.valve)
     limits = Settings.of(file).limits
     driver = watching_driver(file)
-    good = False
+    wrong = ""
     try:
-        print(f"{file.valve.name} holds {driver.open():.1f} Pa; {driver.capabilities}")
+        print(f"{file.valve.name} holds {driver.open():.1f} Pa")
         for count in itertools.count(1):
             readings, took_s = _burst(driver)
             last = readings[-1]
-            good = limits.plausible(last.position_m) and not last.status
-            print(_line(readings, took_s, last.position_m / limits.stroke_m, good), flush=True)
+            wrong = not_plausible(last, limits)
+            print(_line(readings, took_s, last.position_m / limits.stroke_m, wrong), flush=True)
             if count == arguments.count:
                 break
             time.sleep(max(0.0, 1.0 - took_s))
@@ -50,7 +51,22 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     finally:
         driver.close()
-    return 0 if good else 1
+    return 1 if wrong else 0
+
+
+def not_plausible(reading: "Reading", limits: "Limits") -> str:
+    """Return why the daemon would take a reading for none, or latch a fault; empty where it would not."""
+    from positioner.control.supervision import UNFIT_STATUS
+    from positioner.observer.words import device_status
+
+    if not limits.plausible(reading.position_m):
+        return "the position is outside the travel: device.map?"
+    if reading.status & UNFIT_STATUS:
+        return (
+            f"the device says {device_status(reading.status)}, which is a fault, by its status {reading.status}; "
+            "if these bits are its own, device.map's status_bits says what they are"
+        )
+    return ""
 
 
 def watching_driver(file: "DaemonFile") -> "Driver":
@@ -68,7 +84,7 @@ def _burst(driver: "Driver") -> tuple[list["Reading"], float]:
     return readings, time.perf_counter() - started_s
 
 
-def _line(readings: list["Reading"], took_s: float, position_pu: float, good: bool) -> str:
+def _line(readings: list["Reading"], took_s: float, position_pu: float, wrong: str) -> str:
     last = readings[-1]
     parts = [f"{len(readings) / took_s:6.0f} readings/s", f"position {last.position_m:.6f} m ({position_pu:.4f} p.u.)"]
     if last.pressure_pa is not None:
@@ -76,5 +92,5 @@ def _line(readings: list["Reading"], took_s: float, position_pu: float, good: bo
     if last.device_time_s is not None:
         new = len({reading.device_time_s for reading in readings})
         parts.append(f"{new} new of {len(readings)}")
-    parts.append("plausible" if good else f"NOT plausible (status {last.status})")
+    parts.append(f"NOT plausible: {wrong}" if wrong else "plausible")
     return ", ".join(parts)
