@@ -24,6 +24,7 @@ from config.exports.typed_tables import NUMBERS, Columns, by_length, column_rows
 from config.extras import needed
 from config.plain_file import require_moderate
 
+PACKING = ("_FillValue", "missing_value", "scale_factor", "add_offset")
 WAVEFORM = ("wf_start_time", "wf_start_offset", "wf_increment")
 """By what TDMS says of when the samples of a channel are."""
 
@@ -78,13 +79,25 @@ def _channels(name: str, dataset: Any) -> Iterator[tuple[str, Any]]:
         return
     if dataset.dtype.kind not in NUMBERS or (kind is not None and bytes(kind) in (b"char", b"cell")):
         return
-    values = np.asarray(dataset[...], dtype=np.float64)
+    values = _unpacked(dataset)
     unit = next((_text(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs), "")
     if values.ndim == 1 or 1 in values.shape:
         yield with_unit(name, unit), values.ravel()
         return
     for index, column in enumerate(values if kind is not None else values.T, start=1):
         yield with_unit(f"{name}(:,{index})", unit), column
+
+
+def _unpacked(dataset: Any) -> Any:
+    """Return what a dataset stands for: netCDF, which is HDF5, packs numbers and marks missing ones (CF 2.5, 8.1)."""
+    kept = {key: np.ravel(dataset.attrs[key]) for key in PACKING if key in dataset.attrs}
+    kept = {key: value for key, value in kept.items() if value.size == 1 and value.dtype.kind in NUMBERS}
+    values = np.asarray(dataset[...], dtype=np.float64)
+    missing = np.isin(values, [float(kept[key][0]) for key in PACKING[:2] if key in kept])
+    scale, offset = (
+        float(kept[key][0]) if key in kept else usual for key, usual in zip(PACKING[2:], (1, 0), strict=True)
+    )
+    return np.where(missing, np.nan, values * scale + offset)
 
 
 def tdms(path: Path) -> list[RawTable]:

@@ -202,6 +202,23 @@ def test_waveforms_of_tdms_of_other_times_are_no_columns_of_one_table(other: dic
     )
 
 
+def test_what_netcdf_packs_is_unpacked_and_what_it_marks_as_missing_is(tmp_path: Path) -> None:
+    """16 bits of 0.004 mm were read as so many mm, and the mark of a missing value as a position."""
+    import h5py
+
+    write_hdf5(tmp_path / "run.h5")
+    packed = np.round((POSITION_MM - 15.0) / 0.004).astype(np.int16)
+    packed[7] = -32768
+    with h5py.File(tmp_path / "run.h5", "a") as file:
+        del file["run 1/PV"]
+        file["run 1/PV"] = packed
+        told = {"units": "mm", "scale_factor": 0.004, "add_offset": [15.0], "_FillValue": np.int16(-32768)}
+        file["run 1/PV"].attrs.update(told)
+    read = read_export(tmp_path / "run.h5", read_mapping(FILES["run.h5"][1]), None).position_m
+    assert np.flatnonzero(np.isnan(read)).tolist() == [7]
+    np.testing.assert_allclose(np.delete(read, 7), 1e-3 * np.delete(POSITION_MM, 7), atol=2.1e-6)
+
+
 def write_runs(path: Path, *commands: str) -> None:
     """Write two groups of the same channels, but for what the second calls the command."""
     from nptdms import ChannelObject, TdmsWriter
