@@ -164,7 +164,7 @@ def step(
     memory = memory.asked(observation.now_s, reference_m)
     reference_m = _asked_m(memory, observation, settings)
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
-        memory = replace(memory, anchor=Anchor(observation.position_m, memory.direction))
+        memory = _broken_loose(memory, observation.position_m, settings)
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
     if memory.excursion and observation.rest is None:
         memory = replace(memory, return_pa=_return_pa(memory, observation.position_m, balance, settings))
@@ -206,6 +206,13 @@ def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: 
     )
 
 
+def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSettings) -> SlideMemory:
+    """Return the memory of the first of two slides where it is sent back: it has slid, though no rest will say so."""
+    s, from_m = memory.direction, memory.anchor.position_m
+    slid = s * (position_m - from_m) > min(CREEP * settings.stroke_m, GAVE_WAY * s * (memory.aim_m - from_m))
+    return replace(memory, held=NONE_HELD if slid else memory.held, anchor=Anchor(position_m, s))
+
+
 def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSettings) -> SlideMemory:
     """Return the memory with first margins: the shortest slide seen, and the longest way before that held."""
     guess_m = FIRST_MARGIN * balance.friction_m
@@ -223,7 +230,8 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
         shortest_m = min(slid_m[s], UNLIKE * slid_m[-s])
         ways_m = (balance.way_m(each) for each in balance.held if each.direction == s)
         held_m = max((way_m for way_m in ways_m if way_m < shortest_m), default=0.0)
-        margins = margins.replaced(s, Margin(max(0.0, held_m), shortest_m), turning=False)
+        guessed = settings.breakaway_pa is None and not any(each.direction == s for each in balance.landings)
+        margins = margins.replaced(s, Margin(max(0.0, held_m), shortest_m, guessed=guessed), turning=False)
     return replace(memory, margins=margins)
 
 
@@ -250,17 +258,22 @@ def _learnt(
     hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
     known = memory.learnt if slid and short else memory.margins
     margin = known.own(s, turning=turning)
-    held = memory.held
+    if not slid:
+        return _after_holding(replace(memory, anchor=anchor), s, way_m)
     if hit and anchor.direction:
         margin = margin.after_breaking(s * (to_m - anchor.position_m))
-    elif not slid:
-        margin = margin.after_holding(way_m)
-    if slid:
-        held = NONE_HELD
-    elif way_m >= memory.learnt.of(s, turning=turning).sure_m:
-        held = held.one_more(memory.margins)
     margins = known.replaced(s, margin, turning=turning)
-    return replace(memory, margins=margins, held=held, anchor=Anchor(to_m, s) if slid else anchor)
+    return replace(memory, margins=margins, held=NONE_HELD, anchor=Anchor(to_m, s))
+
+
+def _after_holding(memory: SlideMemory, direction: int, way_m: float) -> SlideMemory:
+    """Return the memory after a slide meant to go a way, m, that did not break the stem loose."""
+    turning = direction != memory.anchor.direction
+    margin = memory.margins.own(direction, turning=turning).after_holding(way_m)
+    held = memory.held
+    if way_m >= memory.learnt.of(direction, turning=turning).sure_m:
+        held = held.one_more(memory.margins)
+    return replace(memory, margins=memory.margins.replaced(direction, margin, turning=turning), held=held)
 
 
 def _redirected(
@@ -326,8 +339,11 @@ def _next_slide(
     if memory.excursion and s == -memory.direction:  # planned by what may do: it is tried before more is asked for
         way_m = min(way_m, max(memory.margin(s).way_m, LEAST * settings.stroke_m))
     to_m = target_m + _lead_m(memory, observation.now_s, s, way_m, balance, settings)
-    if s * (to_m - anchor.position_m) >= way_m:
-        return _slide(memory, observation.now_s, to_m, s, balance, settings, excursion=False)
+    asked_m = s * (to_m - anchor.position_m)
+    if asked_m >= way_m:
+        if memory.held.stuck or memory.level_pa != balance.slide_pa(anchor.position_m, to_m, s):
+            return _slide(memory, observation.now_s, to_m, s, balance, settings, excursion=False)
+        memory = _after_holding(memory, s, asked_m)  # under that pressure it rests: a redirected slide has no outcome
     if memory.course.takes_back(observation.now_s, error_m, way_m, memory.away_s):
         return _because(memory, InhibitReason.REFERENCE_COMES)
     return _excursion(memory, observation, balance, settings)
@@ -372,7 +388,7 @@ def _barred(
     assert memory.target_m is not None
     held, error_m = memory.held, memory.target_m - rest_m
     s = 1 if error_m > 0 else -1
-    broke_m = held.margins.of(s, turning=s != memory.anchor.direction).sure_m
+    broke_m = held.margins.of(s, turning=s != memory.anchor.direction).seen_m
     if not held.slides or not (held.stuck or held.slides >= STUCK_AFTER or abs(error_m) >= broke_m > 0.0):
         return _because(memory, reason)
     level_pa = min(max(balance.slide_pa(rest_m, memory.target_m, s), settings.minimum_pa), settings.maximum_pa)
@@ -408,8 +424,13 @@ def _beside_m(balance: Balance, settings: SlideSettings) -> float:
 
 
 def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:
-    """Return how far a slide must be sent, m: at first in a move as short as may do, then as surely does."""
-    return max(margin.sure_m if memory.slides >= TRIED else margin.way_m, LEAST * settings.stroke_m)
+    """Return how far a slide must be sent, m: at first in a move as short as may do, then as surely does.
+
+    What surely does may be longer than an excursion may, where none but long ones have been seen: what lies between is
+    tried.
+    """
+    surely = memory.slides >= TRIED and margin.seen_m <= settings.excursion_limit_m
+    return max(margin.sure_m if surely else margin.way_m, LEAST * settings.stroke_m)
 
 
 def _excursion(

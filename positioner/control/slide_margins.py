@@ -37,6 +37,8 @@ class Margin:
     broke_m: float = 0.0
     held_before_m: float | None = None
     """The former before a way held that had broken loose, None if none has: one such may be luck, or a slow I/P's."""
+    guessed: bool = False
+    """Whether no slide has shown `broke_m`: it says what to try first, and nothing of a stem that such a way holds."""
 
     @property
     def way_m(self) -> float:
@@ -53,6 +55,11 @@ class Margin:
         return self.broke_m or self.way_m
 
     @property
+    def seen_m(self) -> float:
+        """The shortest way that has been seen to break loose and has not held since, m; 0: none."""
+        return 0.0 if self.guessed or self.held_before_m is not None else self.broke_m
+
+    @property
     def _believed_m(self) -> float:
         """The longest way that held and had not broken loose before, m."""
         return self.held_m if self.held_before_m is None else self.held_before_m
@@ -62,19 +69,21 @@ class Margin:
         if self.broke_m and way_m > SHORT * self.broke_m:
             return self
         held_m = FADES * self._believed_m if way_m > self._believed_m else way_m / BESIDE
-        return Margin(held_m, min(self.broke_m, way_m) if self.broke_m else way_m)
+        if not self.broke_m:
+            return Margin(held_m, way_m)
+        return Margin(held_m, min(self.broke_m, way_m), guessed=self.guessed and way_m > self.broke_m)
 
     def after_holding(self, way_m: float) -> "Margin":
         """Return the margin after a slide meant to go a way, m, that did not break loose."""
         if way_m <= 0.0:
             return self
         if 0.0 < self.broke_m <= BESIDE * way_m:
-            return Margin(max(self.held_m, way_m), RAISE * way_m, self._believed_m)
-        return Margin(max(self.held_m, way_m), self.broke_m)
+            return Margin(max(self.held_m, way_m), RAISE * way_m, self._believed_m, self.guessed)
+        return Margin(max(self.held_m, way_m), self.broke_m, guessed=self.guessed)
 
     def times(self, factor: float) -> "Margin":
         """Return it so much longer."""
-        return Margin(factor * self.held_m, factor * self.broke_m)
+        return Margin(factor * self.held_m, factor * self.broke_m, guessed=self.guessed)
 
 
 UNTRIED = Margin()
@@ -104,7 +113,7 @@ class Margins:
         for s, t in kin:
             like = self.own(s, turning=t)
             if like.broke_m > own.held_m and (not own.broke_m or CLOSE * like.way_m < own.broke_m):
-                return Margin(max(like.held_m, own.held_m), like.broke_m)
+                return Margin(max(like.held_m, own.held_m), like.broke_m, guessed=like.guessed)
         return own
 
     def replaced(self, direction: int, margin: Margin, *, turning: bool) -> "Margins":

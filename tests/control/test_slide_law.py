@@ -44,6 +44,7 @@ class Loop:
         period_s: float,
         *effects: dict[str, object],
         identify: bool = True,
+        typed: dict[str, float] | None = None,
         stribeck_velocity_m_per_s: float = VALVE.stribeck_velocity_m_per_s,
         **control: object,
     ) -> None:
@@ -54,6 +55,7 @@ class Loop:
             "safety": {"stale_after_s": 4 * period_s},
             "control": {"law": "slides", **control},
             "excitation": {"travel_window": (0.3, 0.9)},
+            "law": typed,
         }
         slave = {
             "clock": {"mode": "lockstep", "period_s": period_s},
@@ -359,6 +361,55 @@ def test_a_stem_held_for_small_moves_is_tried_again_and_lands_where_it_shall() -
     free(loop)
     assert abs(loop.step_to(0.513, cycles=1400)[-1] - 0.513) < 1e-3, "two slides come back a minute"
     assert not loop.decision.inhibit_reason
+
+
+TYPED = {"b_over_c_pa_per_m": -SLOPE_PA_PER_M, "k_over_c_pa": -FRICTION_PA}
+"""A law that says nothing of static friction: the first margin is a guess, 2.7 % of the stroke."""
+
+
+def typed_loop(margin_pu: float) -> Loop:
+    loop = Loop(0.05, identify=False, typed=TYPED)
+    loop.valve.change(static_n=VALVE.coulomb_n + margin_pu * STROKE_M * VALVE.spring_n_per_m)
+    loop.step_to(0.5, cycles=400)
+    return loop
+
+
+@pytest.mark.parametrize(("margin_pu", "seed"), [(0.09, 4), (0.12, 4), (0.15, 1), (0.15, 5)])
+def test_a_healthy_stem_is_not_stuck_where_only_a_guess_says_that_it_should_have_slid(
+    margin_pu: float, seed: int
+) -> None:
+    """Its margin is three to five times the guess, and references come before a move has ended."""
+    loop = typed_loop(margin_pu)
+    rng = np.random.default_rng(seed)
+    why, at = set(), 0.5
+    for step_pu in rng.choice((0.003, 0.02, 0.05, 0.1, 0.3), 14) * rng.choice((-1, 1), 14):
+        at += step_pu if 0.25 < at + step_pu < 0.85 else -step_pu
+        loop.step_to(float(at), cycles=int(rng.choice((60, 400))))
+        why.add(loop.decision.inhibit_reason)
+    assert InhibitReason.STUCK not in why
+
+
+def test_between_what_held_and_a_slide_too_long_for_an_excursion_what_lies_between_is_tried() -> None:
+    """Up it held 5 %, and 60 % broke it loose; an excursion may be 50 %."""
+    margins = replace(KNOWN, turning_up=Margin(0.05 * STROKE_M, 0.6 * STROKE_M))
+    memory = SlideMemory(
+        target_m=0.06, course=STOOD, slides=3, slide_s=9.0, anchor=Anchor(0.055, -1), margins=margins, level_pa=60e3
+    )
+    given = within(0.055, 10.0, True, memory)
+    assert given.excursion
+    assert 0.05 < (given.aim_m - 0.055) / STROKE_M < 0.2
+
+
+def test_a_stem_that_rests_under_the_pressure_of_a_slide_to_its_reference_has_been_held_by_it() -> None:
+    """As after a reference that was followed at once: the slide has no outcome, and a longer one is tried."""
+    margins = replace(KNOWN, turning_up=Margin(0.0, 0.004))
+    level_pa = BALANCE.slide_pa(0.055, 0.06, 1)
+    memory = SlideMemory(
+        target_m=0.06, course=STOOD, slides=1, slide_s=9.0, anchor=Anchor(0.055, -1), margins=margins, level_pa=level_pa
+    )
+    given = within(0.055, 10.0, True, memory)
+    assert given.excursion
+    assert given.margins.turning_up.held_m == pytest.approx(0.005)
 
 
 @pytest.mark.parametrize(("position_m", "given"), [(0.050, False), (0.0505, False), (0.0545, True)])

@@ -35,3 +35,11 @@ def test_ways_that_hold_again_are_believed() -> None:
 
 def test_what_is_far_longer_than_broke_loose_says_nothing() -> None:
     assert KNOWN.after_breaking(10e-3) == KNOWN
+
+
+def test_what_is_guessed_or_has_held_since_has_not_been_seen_to_break_loose() -> None:
+    guess = Margin(broke_m=2.4e-3, guessed=True)
+    assert (guess.seen_m, guess.after_holding(2.5e-3).seen_m, guess.after_holding(1e-3).seen_m) == (0.0, 0.0, 0.0)
+    assert guess.after_breaking(2e-3).seen_m == 2e-3
+    assert guess.after_breaking(3e-3).seen_m == 0.0, "it may be shorter yet"
+    assert (KNOWN.seen_m, KNOWN.after_holding(2.5e-3).seen_m) == (2.4e-3, 0.0)

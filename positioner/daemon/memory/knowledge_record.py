@@ -36,6 +36,7 @@ class _Slide(_Record):
 class _Margin(_Record):
     held_m: float = Field(ge=0.0)
     broke_m: float = Field(ge=0.0)
+    guessed: bool = False
 
 
 class _Push(_Record):
@@ -71,7 +72,7 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "landings": [each._asdict() for each in knowledge.landings[:MOST] if _finite(each)],
         "held": [each._asdict() for each in knowledge.held[:MOST] if _finite(each)],
         "answers": list(knowledge.answers),
-        "margins": _each(None if knowledge.margins is None else knowledge.margins.all, "held_m", "broke_m"),
+        "margins": _each(None if knowledge.margins is None else knowledge.margins.all, "held_m", "broke_m", "guessed"),
         "pushes": _each(knowledge.pushes, "push_m", "moved"),
         "tracked": dict(knowledge.tracked),
     }
@@ -108,7 +109,9 @@ def _each(learnt: Sequence[Margin] | Sequence[LearntPush] | None, *names: str) -
 
 
 def _margins(four: list[_Margin] | None) -> Margins | None:
-    return None if four is None else Margins(*(Margin(each.held_m, each.broke_m) for each in four))
+    if four is None:
+        return None
+    return Margins(*(Margin(each.held_m, each.broke_m, guessed=each.guessed) for each in four))
 
 
 def _pushes(both: list[_Push] | None) -> tuple[LearntPush, LearntPush] | None:

@@ -27,7 +27,7 @@ KNOWLEDGE = ValveKnowledge(
     landings=(SLIDE,),
     held=(SLIDE._replace(moved=False, landing=False, time_s=-3.5),),
     answers=Answers(0.04, 1e-7, 2e4),
-    margins=Margins(Margin(5e-3, 6e-3), turning_down=Margin(0.0, 7e-3)),
+    margins=Margins(Margin(5e-3, 6e-3), turning_down=Margin(0.0, 7e-3, guessed=True)),
     pushes=(LearntPush(1e-3, True), LearntPush(2e-3, False)),
     tracked={"friction_up_n": 1.5e3},
 )
