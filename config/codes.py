@@ -124,6 +124,7 @@ class InhibitReason(Code):
         25,
         "excitation: eta_1 = 0 is from before a fault, or before another mode: write 1, then 0",
     )
+    STAIRCASE_REVERSED = 26, "the staircase of slides: more pressure takes the stem down: one of the two is reversed"
 
 
 class Restored(Code):

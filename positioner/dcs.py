@@ -30,6 +30,7 @@ REFUSALS = (
     InhibitReason.AMPLITUDE_ZERO,
     InhibitReason.STAIRCASE_IN_VAIN,
     InhibitReason.STAIRCASE_UNANSWERED,
+    InhibitReason.STAIRCASE_REVERSED,
     InhibitReason.EXCITATION_FROM_BEFORE,
 )
 """Why an excitation does not begin or has ended; the other reasons concern the law."""

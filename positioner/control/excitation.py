@@ -5,8 +5,8 @@ S3 lasts while eta_1 = 0 in automatic. An excitation that has had its time, or t
 So it is with one that a fault or another mode has ended, and with one that was asked for while there was a fault: who
 acknowledges and chooses automatic again wants the law back, and eta_1 = 0 from before does not excite the valve. Asked
 for in another mode without a fault it begins with automatic: a DCS may write its registers in any order.
-After a staircase whose steps the stem did not answer the law has to wait for that, too: where the stem is nobody knows,
-so the command before S3 is held until somebody asks for something else.
+After a staircase whose steps the stem did not answer, or answered by going the other way, the law has to wait for that,
+too: where the stem is nobody knows, so the command before S3 is held until somebody asks for something else.
 """
 
 from dataclasses import dataclass, replace
@@ -41,8 +41,8 @@ class ActiveExcitation:
 
     @property
     def unanswered(self) -> bool:
-        """Whether it has ended because the stem did not answer."""
-        return self.inhibit_reason is InhibitReason.STAIRCASE_UNANSWERED
+        """Whether it has ended because the stem did not answer, or went the other way."""
+        return self.inhibit_reason in (InhibitReason.STAIRCASE_UNANSWERED, InhibitReason.STAIRCASE_REVERSED)
 
     @property
     def broken_off(self) -> bool:
@@ -152,6 +152,8 @@ def climbed(
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_IN_VAIN)
     if outcome is not None and stairs.unanswered(settings.staircase):
         return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_UNANSWERED)
+    if stairs.is_reversed:
+        return replace(excitation, inhibit_reason=InhibitReason.STAIRCASE_REVERSED)
     if stairs.enough(law_valid, settings.staircase):
         stairs = stairs.turned_to_close()
     return replace(excitation, signal=stairs.stepped(rest.position_m, settings.staircase))

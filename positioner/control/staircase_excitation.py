@@ -23,6 +23,9 @@ all that the pressure went over since the stem last answered, is bounded by what
     after a turn       W <= 1.5 of the most of a turn, for friction differs over the travel, and a first step
     after the first    W <= what spring balances over the whole stroke: friction that is more leaves no valve
     before that        W < all that the pressure limits allow: nothing is known, and what breaks it loose is sought once
+
+A stem that goes down while the pressure rises, or up while it falls, twice in a row, is an air-to-close valve's, or its
+position is wired the other way round: each further step would take it farther out of the window.
 """
 
 from dataclasses import dataclass, replace
@@ -53,6 +56,8 @@ NEARLY_TURNED = 0.8
 MOST_TURNS = 6
 UNANSWERED = 1.5
 """Of the most that a slide has needed: a stem that has not answered by then is not where it is said to be, or stuck."""
+REVERSED_AFTER = 2
+"""Slides in a row against the pressure: one may be a sensor's that was shifted."""
 ANSWER, DEVIATIONS = 1e-3, 3.0
 """Of the window; of a rest: a stem that went farther than both has answered, if only its packing gave way."""
 
@@ -102,6 +107,7 @@ class Staircase:
         slid_pa: level under which the stem last slid; NaN: not known, for it has not yet, or rests at a stop, which
             bears any excess.
         lowest_pa, highest_pa: levels since it last moved visibly at all, or since the staircase began; NaN at a stop.
+        against: slides in a row that went against the pressure.
         most_up_pa, most_down_pa, most_turn_pa: longest way of the level from slide to slide, going on and turning.
     """
 
@@ -126,6 +132,7 @@ class Staircase:
     slid_pa: float = nan
     lowest_pa: float = inf
     highest_pa: float = -inf
+    against: int = 0
     most_up_pa: float = 0.0
     most_down_pa: float = 0.0
     most_turn_pa: float = 0.0
@@ -181,7 +188,16 @@ class Staircase:
 
     def counted(self, outcome: SlideOutcome | None, limits: StaircaseLimits) -> "Staircase":
         """Return it with what the last step did, if that is known now."""
-        return self if outcome is None else self._slid(outcome)._answered(outcome, limits)
+        if outcome is None:
+            return self
+        against = outcome.direction * (outcome.from_m - outcome.position_m) > SHORTEST * limits.window_m
+        against_before = self.against if against or not outcome.moved else 0
+        return replace(self._slid(outcome)._answered(outcome, limits), against=against_before + against)
+
+    @property
+    def is_reversed(self) -> bool:
+        """Whether the stem goes against the pressure."""
+        return self.against >= REVERSED_AFTER
 
     def unanswered(self, limits: StaircaseLimits) -> bool:
         """Return whether the stem has not answered what has always moved it before, or anything."""

@@ -43,10 +43,17 @@ EFFECTS = (
 )
 
 
-class Frozen:
-    """A valve whose sensor freezes a time after S3 began."""
+class Reversed(Spoilt):
+    """A device whose position counts the other way round, as an air-to-close valve's does from its closed end."""
 
-    def __init__(self, period_s: float, after_s: float) -> None:
+    def _measure(self) -> None:
+        self.position_m = STROKE_M - self._device.position_m
+
+
+class Frozen:
+    """A valve whose sensor freezes a time after S3 began, or counts the other way round."""
+
+    def __init__(self, period_s: float, after_s: float, *, is_reversed: bool = False) -> None:
         file = ValveFile.model_validate({"valve": VALVE, "effect": EFFECTS})
         self.valve = Valve.from_file(file, step_s=FINE_STEP_S)
         self.valve.rest_at(0.5 * STROKE_M, START_PA)
@@ -54,7 +61,8 @@ class Frozen:
             "clock": {"mode": "lockstep", "period_s": period_s},
             "sensor": {"noise_std_m": 2e-4 * STROKE_M, "quantum_m": STROKE_M / 4096, "seed": 7},
         }
-        device = Spoilt(Device(self.valve, SlaveFile.model_validate(slave), {}), SensorFault(1.0 + after_s, inf, nan))
+        good = Device(self.valve, SlaveFile.model_validate(slave), {})
+        device = (Reversed if is_reversed else Spoilt)(good, SensorFault(1.0 + after_s, inf, nan))
         daemon = {
             "valve": {"stroke_m": STROKE_M},
             "cycle": {"pace": "device", "period_s": period_s},
@@ -134,3 +142,20 @@ def test_after_it_nothing_moves_until_the_dcs_asks_for_something_else() -> None:
     }
     valve.cycle.requests = replace(valve.cycle.requests, eta=QUIET)
     assert valve.until(valve.cycle.snapshot.sample.now_s + 1.0)[-1][1].state is State.S1_UP
+
+
+@pytest.mark.parametrize("period_s", PERIODS_S)
+def test_a_stem_that_goes_against_the_pressure_is_not_driven_on(period_s: float) -> None:
+    """It went to its stop, and S3 on to the highest pressure, and then said that its landings were too few."""
+    valve = Frozen(period_s, inf, is_reversed=True)
+    asked = replace(valve.cycle.requests, eta=QUIET, mode=Mode.MANUAL, mode_writes=2)
+    valve.cycle.requests = replace(asked, manual_pa=START_PA, manual_writes=1)
+    valve.until(10.0)
+    valve.cycle.requests = replace(valve.cycle.requests, mode=Mode.AUTOMATIC, mode_writes=3, eta=(0, 0, 0))
+    path = valve.until(300.0, s3=True)
+    ended = valve.decision
+    assert (ended.state, ended.command_pa) == (State.S0_START, START_PA), "the command before S3 is held"
+    assert (ended.fault, ended.inhibit_reason) == (Fault.NONE, InhibitReason.STAIRCASE_REVERSED)
+    assert ended.applied.ratios is None
+    assert min(stem for stem, _ in path) > LOW
+    assert max(stem for stem, _ in path) < HIGH
