@@ -50,6 +50,22 @@ def diagnosed(parts: Split, *steps: EffectStep) -> Diagnosis:
     )
 
 
+def test_what_is_bad_in_a_recording_is_said_once(parts: Split) -> None:
+    """Of the fitted two thirds and of the whole it was said in two numbers, one beneath the other."""
+    columns = dict(parts.test.recording.columns)
+    columns["position_m"] = np.where(np.arange(1200) % 100 == 50, np.nan, columns["position_m"])
+    halves = (
+        Recording({name: each[rows] for name, each in columns.items()}) for rows in (slice(600), slice(500, None))
+    )
+    step_of = step(POOR, ip_lag=model_of("ip_lag"))
+    for split_of, counts in ((split([Recording(columns)]), [12]), (split([next(halves)], next(halves)), [6, 7])):
+        said = [each for each in diagnosed(split_of, step_of).blocks() if "position_m is not a number" in str(each)]
+        assert said == [
+            f"recording: position_m is not a number in {count} samples, the first 51: left out of the error"
+            for count in counts
+        ]
+
+
 def test_what_explains_all_is_missing(parts: Split) -> None:
     found = diagnosed(parts, step(POOR, ip_lag=model_of("ip_lag"), sensor_lag=POOR))
     assert (found.verdict, found.missing, found.indistinguishable) == ("missing", ("ip_lag",), ())

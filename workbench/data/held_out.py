@@ -64,6 +64,13 @@ class Split(Brief):
         return float(np.std(self.train.record.position_m[self.train.counted]))
 
     @property
+    def records(self) -> tuple[Record, ...]:
+        """The records that there are: of one whose end is held out, the whole, for what is fitted is its beginning."""
+        begun = len(self.train.record)
+        of_one = len(self.test.record) > begun and not self.test.counted[:begun].any()
+        return (self.test.record,) if of_one else (self.train.record, self.test.record)
+
+    @property
     def early(self) -> Early | None:
         """How much the stem moves before its command, if it does: no verdict rests on such a recording."""
         known = [each.record.early for each in (self.train, self.test) if each.record.early]

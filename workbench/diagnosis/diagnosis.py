@@ -122,9 +122,9 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         said: list[Block] = [self.verdict_line]
         if self.best.fit.by.sentence:
             said.append(self.best.fit.by.sentence)
-        parts = (self.split.train, self.split.test)
-        noted = dict.fromkeys(note for each in parts for note in each.record.notes)
-        in_verdict = {UNKNOWN, *(each.record.early.sentence for each in parts if each.record.early)}
+        records = self.split.records
+        noted = dict.fromkeys(note for each in records for note in each.notes)
+        in_verdict = {UNKNOWN, *(each.early.sentence for each in records if each.early)}
         said += [f"recording: {note}" for note in shortened([note for note in noted if note not in in_verdict])]
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         if self.positioner:
