@@ -160,6 +160,17 @@ def test_what_is_needed_is_what_holds_the_stem(friction: bool, dead_band: bool, 
     assert said in found.sentence
 
 
+@pytest.mark.parametrize("at_floor", [True, False])
+def test_that_either_does_is_said_only_of_what_is_explained(at_floor: bool) -> None:
+    """Another maker's positioner left 0.7 mm of a floor of 0.02, with friction and dead band and with neither."""
+    gains = worth(needed=False), worth(needed=False)
+    held = PositionerOrPacking(
+        "not told", *gains, 1e-3, 8e-4, 2e-4, 3e2, 4e-3, 1e-2, found_twice=True, at_floor=at_floor
+    )
+    assert ("either does without the other" in held.sentence) == at_floor
+    assert ("with both the valve does not explain it" in held.sentence) != at_floor
+
+
 def test_evidence_of_samples_that_hang_together_is_none() -> None:
     """A slip that comes late is off for all samples until the next."""
     late = Gain(500.0, 0.4, 8.0, 0.01)

@@ -67,6 +67,8 @@ class PositionerOrPacking(Brief):
     """Whether a second search came as low."""
     with_friction_m: float | None = None
     """Held-out rms error from the measured pressure; None where none was measured, and all are from the set point."""
+    at_floor: bool = True
+    """Whether the valve with both explains the recording from the set point; so it is taken where no floor is known."""
 
     @property
     def sentence(self) -> str:
@@ -79,6 +81,11 @@ class PositionerOrPacking(Brief):
         friction = f"friction that is worth {1e3 * self.play_m:.3g} mm of the spring ({self.friction_n:.3g} N)"
         band = f"a dead band of {1e3 * self.dead_band_m:.3g} mm"
         besides = "holds the stem besides is not told"
+        neither = (
+            "either does without the other"
+            if self.at_floor
+            else "neither is needed, and with both the valve does not explain it"
+        )
         if self.cause == "not told" and not self.found_twice:
             return "Whether positioner or packing holds the stem is not told: no second search came as low"
         said: dict[Cause, str] = {
@@ -87,9 +94,9 @@ class PositionerOrPacking(Brief):
             "both": f"It is both, packing and positioner: {friction}, and {band}",
             "at least packing": f"It is the packing: {friction}; whether a dead band {besides}",
             "at least positioner": f"It is the positioner: {band}; whether friction {besides}",
-            "not told": "This recording does not tell the positioner's dead band from the packing's friction, either "
-            "does without the other; measured actuator pressure would: a dead band leaves it still, friction lets it "
-            "rise until the stem jumps",
+            "not told": "This recording does not tell the positioner's dead band from the packing's friction, "
+            f"{neither}; measured actuator pressure would: a dead band leaves it still, friction lets it rise until "
+            "the stem jumps",
         }
         return said[self.cause]
 
@@ -181,6 +188,7 @@ def _asked(
         play_m,
         _found_twice(banded),
         friction.with_m if stem.from_pressure else None,
+        band.at_floor,
     )
 
 
@@ -196,11 +204,14 @@ class _Worth(NamedTuple):
     gain: Gain
     with_m: float
     without_m: float
+    at_floor: bool
+    """Whether with it nothing is left that is known to be more than the floor."""
 
 
 def _worth(bare: Fit, full: Fit, split: Split) -> _Worth:
     without, there = block_errors(bare, split), block_errors(full, split)
-    return _Worth(gain(bare, full, without, there), there.test_rmse_m, without.test_rmse_m)
+    at_floor = split.floor_m is None or there.at_floor(split.floor_m)
+    return _Worth(gain(bare, full, without, there), there.test_rmse_m, without.test_rmse_m, at_floor)
 
 
 def cause(friction: Gain, dead_band: Gain) -> Cause:
