@@ -18,6 +18,8 @@ from config.extras import needed
 from config.plain_file import require_moderate
 
 KIND = "MDF"
+OF_TIME = (0, 1)
+"""What MDF says of a master that is a time, or of which it says nothing; 2 is an angle, 3 a distance, 4 an index."""
 
 
 def mdf4_groups(path: Path) -> Groups:
@@ -54,18 +56,25 @@ def _group(path: Path, file: Any, index: int) -> Columns:
     group = file.groups[index]
     require_moderate(path, group.channel_group.cycles_nr, len(group.channels))
     columns: Columns = {}
+    master = file.masters_db.get(index)
+    shared = "time [s]" if master is None else _of_master(group.channels[master])
     for number, channel in enumerate(group.channels):
-        if number == file.masters_db.get(index):
+        if number == master:
             continue
         # By itself asammdf leaves out what is invalid of each channel: its rows would no longer be those of the others.
         signal = file.get(group=index, index=number, ignore_invalidation_bits=True)
         if signal.samples.ndim == 1 and signal.samples.dtype.kind in NUMBERS:
-            columns.setdefault("time [s]", np.asarray(signal.timestamps, dtype=np.float64))
+            columns.setdefault(shared, np.asarray(signal.timestamps, dtype=np.float64))
             values = signal.samples.astype(np.float64)
             if signal.invalidation_bits is not None:
                 values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
             columns[with_unit(channel.name, signal.unit or "")] = values
     return columns
+
+
+def _of_master(channel: Any) -> str:
+    """Return what the channel that all others go by is called: a time is in s, but it may be an angle or a distance."""
+    return "time [s]" if channel.sync_type in OF_TIME else with_unit(channel.name, channel.unit or "")
 
 
 if __name__ == "__main__":

@@ -175,6 +175,19 @@ def test_what_mdf_marks_invalid_is_missing_and_moves_no_other_row(tmp_path: Path
     np.testing.assert_allclose(recording.columns["command_pa"], expected_pa)
 
 
+def test_an_angle_by_which_mdf_goes_is_no_time(tmp_path: Path) -> None:
+    """Degrees of a crank were offered, and read, as seconds."""
+    import asammdf
+
+    angle = ("crank", asammdf.blocks.v4_constants.SYNC_TYPE_ANGLE)
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(POSITION_MM, TIME_S, name="PV", unit="mm", master_metadata=angle)])
+        file.save(tmp_path / "run.mf4", overwrite=True)
+    shown = preview(tmp_path / "run.mf4")
+    assert [each.name for each in shown.columns] == ["crank [deg]", "PV [mm]"]
+    assert not any(word.startswith("time_s") for word in shown.words)
+
+
 @pytest.mark.parametrize(
     "other",
     [
