@@ -7,6 +7,7 @@ Its files:
     sessions             who came in
     theme, ink           light and dark; colours of plots
     telling              errors and sentences, shown
+    page_words           what the commands say, without their options
     units, unit_choice   the units that a person reads in, and where they are chosen
     live_text            a text that changes many times a second
     number_field         where a number is typed

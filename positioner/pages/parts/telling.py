@@ -9,6 +9,7 @@ from typing import TypeVar
 from nicegui import ui
 
 from config.errors import CommandFailed, InputError
+from positioner.pages.parts.page_words import in_page_words
 
 T = TypeVar("T")
 
@@ -26,7 +27,9 @@ def errors_told(names: Mapping[str, str] | None = None) -> Iterator[None]:
 
 def tell_error(said: str) -> None:
     """Say an error; it stays until it is closed."""
-    ui.notification(said, type="negative", timeout=0, close_button="close", multi_line=True, position="top")
+    ui.notification(
+        in_page_words(said), type="negative", timeout=0, close_button="close", multi_line=True, position="top"
+    )
 
 
 async def aside(work: Callable[..., T], *arguments: object) -> T:
@@ -44,7 +47,7 @@ def is_looked_at() -> bool:
 
 def sentences(items: Sequence[str], name: str) -> None:
     """Show sentences as a list."""
-    lines = "".join(f"<li>{escape(each)}</li>" for each in items)
+    lines = "".join(f"<li>{escape(in_page_words(each))}</li>" for each in items)
     ui.html(f'<ul class="said">{lines}</ul>', sanitize=False).props(f'data-testid="{name}"')
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from nicegui import ui
 
+from positioner.pages.parts.page_words import in_page_words
 from positioner.pages.parts.units import Units
 from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch, slip_sentences
@@ -40,11 +41,13 @@ class FindingsPanel:
         self._sentences.clear()
         with self._sentences:
             kind, first = headline(compared)
-            ui.label(first).classes("text-weight-medium").props(f'data-testid="verdict" data-kind="{kind}"')
+            ui.label(in_page_words(first)).classes("text-weight-medium").props(
+                f'data-testid="verdict" data-kind="{kind}"'
+            )
             with ui.element("ul").classes("said").props('data-testid="sentences"'):
                 for text, stretches in zip(compared.sentences, compared.stretches, strict=True):
                     with ui.element("li"):
-                        self._jump(text, stretches, [text] * len(stretches))
+                        self._jump(in_page_words(text), stretches, [text] * len(stretches))
             error = self._units.length_unit().fine(compared.rms_m)
             ui.label(f"error: {error}, {of_stroke(compared.rms_m, self._stroke_m)}").classes("quiet")
         self.jumps.clear()

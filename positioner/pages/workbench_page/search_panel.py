@@ -3,9 +3,12 @@
 from collections.abc import Callable, Sequence
 from math import inf, log10
 
-from nicegui import events, ui
+from nicegui import ui
 
+from config.errors import InputError
 from positioner.pages.parts.figure_view import Figure, FigureView
+from positioner.pages.parts.number_field import NumberField
+from positioner.pages.parts.page_words import in_page_words
 from positioner.pages.parts.telling import aside, errors_told, heading, is_looked_at, look_at, tell_error
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.background import diagnosed, extended, refitted
@@ -23,6 +26,7 @@ from workbench.report.ranking import log_ticks
 from workbench.report.units import OF_VALVE
 
 LOOK_S = 0.2
+LEAST_BUDGET_S = 1.0
 ADDING = """<q-td :props="props"><q-btn flat dense no-caps icon="add" color="primary" :label="props.value"
     :aria-label="`add ${props.value}`" @click="() => $parent.$emit('add', props.row)" /></q-td>"""
 """A candidate's cell: a button, so that a keyboard reaches it."""
@@ -44,9 +48,9 @@ class SearchPanel:
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
-            ui.number("at most, s", min=1, on_change=self._limited, value=_shown(desk.budget_s)).props(
-                'dense clearable data-testid="budget"'
-            ).style("width: 110px").tooltip("after so long it says what is known then")
+            self._budget = NumberField("at most, s", _shown(desk.budget_s), name="at most, s")
+            self._budget.props('dense clearable data-testid="budget"').style("width: 110px")
+            self._budget.on("blur", self._typed).tooltip("after so long it says what is known then")
             names = ui.select(self._tried(), label="effects tried (all)", multiple=True, clearable=True)
             self._names = names.props('use-chips dense data-testid="effects"').style("min-width: 260px")
         with ui.column().classes("w-full") as self._progress:
@@ -64,8 +68,22 @@ class SearchPanel:
         if desk.found is not None:
             self._tell(desk.found)
 
-    def _limited(self, event: events.ValueChangeEventArguments[float | None]) -> None:
-        self._desk.budget_s = event.value or inf
+    def _typed(self) -> None:
+        with errors_told():
+            self._take_budget()
+
+    def _take_budget(self) -> None:
+        """Take how long a search may go on, as it was typed.
+
+        Raises:
+            InputError: it is no time.
+        """
+        budget_s = self._budget.number()
+        if budget_s is not None and budget_s < LEAST_BUDGET_S:
+            raise InputError(
+                "at most, s", f"must be {LEAST_BUDGET_S:g} or more, or nothing, got {self._budget.value!r}"
+            )
+        self._desk.budget_s = inf if budget_s is None else budget_s
 
     def _joined(self) -> None:
         self._names.set_options(self._tried(), value=self._names.value)
@@ -77,16 +95,19 @@ class SearchPanel:
 
     def _diagnose(self) -> None:
         with errors_told():
+            self._take_budget()
             self._desk.begin("diagnose", diagnosed, self._names.value or list(self._tried()))
         self._began()
 
     def _refit(self) -> None:
         with errors_told():
+            self._take_budget()
             self._desk.begin("fit", refitted)
         self._began()
 
     def _extend(self, effects: Sequence[str]) -> None:
         with errors_told():
+            self._take_budget()
             self._desk.begin("extend", extended, tuple(effects), self._desk.diagnosis)
         self._began()
 
@@ -189,7 +210,7 @@ class SearchPanel:
         with self._result:
             plain = self._desk.plain
             ui.label(plain(first)).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
-            ui.label(plain(diagnosis.sentence)).props('data-testid="found-sentence"')
+            ui.label(in_page_words(plain(diagnosis.sentence))).props('data-testid="found-sentence"')
             with ui.row():
                 for effects in diagnosis.choices if may_add else ():
                     named = plain(", ".join(effects))
