@@ -3,7 +3,8 @@
     python -m benchmarks.flow_loop
 
 First the conventional positioner, K and R over a grid, gain margin 2 at the least: what ours is compared with is the
-pair that leaves the least deviation, summed over both periods, among those that wear the valve no more than ours.
+pair that leaves the least deviation, summed over both periods, among those that wore the valve no more than ours when
+ours made two to three times today's strokes; it wears the valve more than ours now.
 Then ours with other dead bands, with a least time between excursions, and under a faster controller. Takes two minutes.
 """
 
