@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -15,6 +15,13 @@ from positioner.estimation.landings.landing_detector import Answers, SlideOutcom
 MOST = 40
 """Landings, and changes that held."""
 Row = tuple[float, float, float]
+Place = Annotated[float, Field(ge=-1e3, le=1e3)]
+"""m; like the other limits far beyond any valve, and near enough that no formula overflows by it."""
+Length = Annotated[float, Field(ge=0.0, le=1e3)]
+"""m."""
+Pressure = Annotated[float, Field(ge=-1e9, le=1e9)]
+"""Pa."""
+Figure = Annotated[float, Field(ge=-1e30, le=1e30)]
 
 
 class _Record(BaseModel):
@@ -24,40 +31,40 @@ class _Record(BaseModel):
 class _Slide(_Record):
     time_s: float = Field(le=0.0)
     direction: int
-    from_m: float
-    command_pa: float
-    position_m: float
-    std_m: float = Field(ge=0.0)
+    from_m: Place
+    command_pa: Pressure
+    position_m: Place
+    std_m: Length
     moved: bool
     landing: bool
-    short_m: float = Field(default=0.0, ge=0.0)
+    short_m: Length = 0.0
 
 
 class _Margin(_Record):
-    held_m: float = Field(ge=0.0)
-    broke_m: float = Field(ge=0.0)
+    held_m: Length
+    broke_m: Length
     guessed: bool = False
 
 
 class _Push(_Record):
-    push_m: float = Field(ge=0.0)
+    push_m: Length
     moved: bool
 
 
 class KnowledgeRecord(_Record):
     """What is kept of a valve; SI units."""
 
-    b_over_c_pa_per_m: float = Field(lt=0.0)
-    k_over_c_pa: float = Field(lt=0.0)
-    offset_pa: float
-    covariance: list[list[float]] = Field(min_length=3, max_length=3)
-    residual_m: float = Field(ge=0.0)
+    b_over_c_pa_per_m: float = Field(ge=-1e12, le=-1.0)
+    k_over_c_pa: float = Field(ge=-1e9, lt=-1e-6)
+    offset_pa: Pressure
+    covariance: list[list[Figure]] = Field(min_length=3, max_length=3)
+    residual_m: Length
     landings: list[_Slide] = Field(max_length=MOST)
     held: list[_Slide] = Field(max_length=MOST)
-    answers: list[float] = Field(min_length=3, max_length=3)
+    answers: list[Annotated[float, Field(ge=0.0, le=1e9)]] = Field(min_length=3, max_length=3)
     margins: list[_Margin] | None = Field(min_length=4, max_length=4)
     pushes: list[_Push] | None = Field(min_length=2, max_length=2)
-    tracked: dict[str, float]
+    tracked: dict[str, Figure]
 
 
 def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:

@@ -146,6 +146,11 @@ def test_another_valves_is_set_aside(path: Path) -> None:
         (replace(KNOWLEDGE, residual_m=-1.0), "knowledge.residual_m: "),
         (replace(KNOWLEDGE, margins=Margins(Margin(-1.0))), "knowledge.margins.0.held_m: "),
         (replace(KNOWLEDGE, landings=(SLIDE._replace(direction=0),)), "knowledge.direction: "),
+        (replace(KNOWLEDGE, ratios=Ratios(-1e300, -22068.2)), "knowledge.b_over_c_pa_per_m: "),
+        (replace(KNOWLEDGE, ratios=Ratios(-1e-300, -22068.2)), "knowledge.b_over_c_pa_per_m: "),
+        (replace(KNOWLEDGE, residual_m=1e308), "knowledge.residual_m: "),
+        (replace(KNOWLEDGE, landings=(SLIDE._replace(position_m=1e9),)), "knowledge.landings.0.position_m: "),
+        (replace(KNOWLEDGE, answers=Answers(-1.0)), "knowledge.answers.0: "),
     ],
 )
 def test_what_cannot_be_true_is_not_taken(path: Path, knowledge: ValveKnowledge, said: str) -> None:
