@@ -13,7 +13,8 @@ y = x - z, p = zeta omega, q^2 = p^2 - omega^2 the motion is, exactly (cos, sin 
 
 and ends where v first comes to zero, tanh(q t) / q = v_0 / (p v_0 + omega^2 y_0), or, if it never does, at z: static
 friction then keeps it. So with z_h far ahead of it the stem slides to z_h, which is the seed's law; with z_h behind it
-the stem is braked, and goes less far than any slide from break-away could.
+the stem is braked, and goes less far than any slide from break-away could. A push that lasts until v comes to zero, at
+t = pi/q of a stem that swings, has brought it to its end, which the hold does not change.
 
 A slow I/P (lag T_p) does not give a pressure that steps: after the push z falls to z_h as z_h + (z_p - z_h) e^(-t/T_p),
 which adds to y the particular solution G (z_p - z_h) e^(-t/T_p), G = omega^2 / (omega^2 - 2 p / T_p + 1 / T_p^2). The
@@ -29,7 +30,7 @@ R the variance of d_measured with what the model leaves out, Q what may change f
 """
 
 from dataclasses import dataclass, replace
-from math import atan2, atanh, cos, exp, inf, log, sin, sqrt
+from math import atan2, atanh, cos, exp, inf, log, pi, sin, sqrt
 from typing import NamedTuple
 
 Theta = tuple[float, float, float, float]
@@ -183,9 +184,13 @@ def _end(theta: Theta, pulse: Pulse, near_m: float) -> PulseEnd:
     push_m, hold_m = pulse.push_m + bias_m, pulse.hold_m + bias_m
     # The critical case has no formula of its own: just beside it the result is the same to rounding.
     overdamped, q = p > omega, max(sqrt(abs(p * p - omega * omega)), NEAR_CRITICAL * omega)
-    y, v = _after(omega, p, q, overdamped, -push_m, 0.0, pulse.duration_s)
-    if push_m <= 0.0 or v <= 0.0:
+    if push_m <= 0.0:
         return PulseEnd(0.0, pulse.duration_s)
+    y, v = _after(omega, p, q, overdamped, -push_m, 0.0, pulse.duration_s)
+    if not overdamped and q * pulse.duration_s >= pi:
+        return PulseEnd(push_m * (1.0 + exp(-p * pi / q)), pulse.duration_s)
+    if v <= 0.0:
+        return PulseEnd(push_m, pulse.duration_s)
     y += push_m - hold_m
     if pulse.lag_s > 0.0:
         return _lagged_end(theta, pulse, hold_m, y, v, near_m)

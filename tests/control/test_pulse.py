@@ -44,8 +44,10 @@ def integrated_m(pulse: Pulse, omega: float, zeta: float, bias_m: float = 0.0) -
         Pulse(PUSH_M, 3e-3, 1e-3, 1),
         Pulse(PUSH_M, -LIMIT_M, 4e-3, 1, 0.05),
         Pulse(PUSH_M, 2e-3, 4e-3, 1, 0.05),
+        Pulse(PUSH_M, PUSH_M, 45e-3, -1),
+        Pulse(PUSH_M, -LIMIT_M, 0.15, 1, 0.05),
     ],
-    ids=["braked", "barely braked", "slide", "slow pressure, braked", "slow pressure"],
+    ids=["braked", "barely braked", "slide", "slow pressure, braked", "slow pressure", "long", "long, slow pressure"],
 )
 def test_the_end_is_where_an_integration_ends(pulse: Pulse, zeta: float) -> None:
     bias_m = 2e-4
@@ -73,6 +75,15 @@ def test_a_pulse_is_aimed_at_a_distance(travel_m: float, lag_s: float) -> None:
     found = response(bias_m=3e-4).end(reaching, NEAR_M).travel_m
     shortest = response(bias_m=3e-4).end(push._replace(hold_m=-LIMIT_M), NEAR_M).travel_m
     assert found == pytest.approx(max(travel_m, shortest), rel=5e-3)
+
+
+@pytest.mark.parametrize("zeta", [0.9, 1.1])
+def test_a_push_that_outlasts_the_motion_takes_the_stem_as_far_as_it_is_asked(zeta: float) -> None:
+    """It was predicted to go nowhere, so that no pulse was given: a healthy valve followed no reference any more."""
+    push = Pulse(PUSH_M, 0.0, 0.5, -1, 0.02)
+    quick = response(8e3, zeta)
+    reaching = quick.reaching(0.3 * LIMIT_M, push, -LIMIT_M)
+    assert quick.end(reaching, NEAR_M).travel_m == pytest.approx(0.3 * LIMIT_M, rel=5e-3)
 
 
 def test_no_hold_is_deeper_than_asked() -> None:
