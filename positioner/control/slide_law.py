@@ -270,9 +270,9 @@ def _after_holding(memory: SlideMemory, direction: int, way_m: float) -> SlideMe
     """Return the memory after a slide meant to go a way, m, that did not break the stem loose."""
     turning = direction != memory.anchor.direction
     margin = memory.margins.own(direction, turning=turning).after_holding(way_m)
-    held = memory.held
-    if way_m >= memory.learnt.of(direction, turning=turning).sure_m:
-        held = held.one_more(memory.margins)
+    held, before = memory.held, memory.learnt.of(direction, turning=turning)
+    if way_m >= before.sure_m:
+        held = held.one_more(memory.margins, surely=0.0 < before.seen_m <= way_m)
     return replace(memory, margins=memory.margins.replaced(direction, margin, turning=turning), held=held)
 
 
@@ -316,14 +316,15 @@ def _next_slide(
     assert rest is not None
     assert target_m is not None
     error_m = target_m - rest.position_m
-    widened = WIDENS ** (max(0, memory.slides - FREE_SLIDES) // 2)
+    landed = memory.slides - memory.held.slides  # those that held have missed nothing
+    widened = WIDENS ** (max(0, landed - FREE_SLIDES) // 2)
     beside_m = _beside_m(balance, settings)
     known_m = max(WITHIN_NOISE * rest.std_m, WITHIN_QUANTUM * observation.quantum_m) + beside_m
     band_m = max(settings.dead_band_m, known_m)
     if abs(error_m) <= band_m:
         return _because(memory, InhibitReason.NOTHING)
     # Another slide would miss as the ones before have: where they scatter by more than they are wanted to, so will it.
-    scatter_m = balance.scatter_m if memory.slides > FREE_SLIDES else 0.0
+    scatter_m = balance.scatter_m if landed > FREE_SLIDES else 0.0
     if abs(error_m) <= max(band_m, scatter_m) * widened or _on_stop(memory, rest.position_m, balance):
         return _because(memory, InhibitReason.TRIM_ENDED)
     if memory.held.stuck and abs(rest.position_m - memory.held.at_m) > CREEP * settings.stroke_m:
@@ -368,9 +369,10 @@ def _on_stop(memory: SlideMemory, rest_m: float, balance: Balance) -> bool:
 def _because(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
     """Return the memory with the reason why nothing is done: the same one, if it says so already, as in most steps.
 
-    Of a stem that nothing has broken loose, and that is not where it is to be, no other reason matters.
+    Of a stem that nothing has broken loose, and that is not where it is to be, no other reason matters. As long as no
+    bound bars a longer slide, slides that only a guess says to be long enough tell nothing.
     """
-    holds = memory.held.stuck or memory.held.slides >= STUCK_AFTER
+    holds = memory.held.stuck or memory.held.surely >= STUCK_AFTER
     reason = InhibitReason.STUCK if holds and reason is not InhibitReason.NOTHING else reason
     return memory if memory.inhibit_reason is reason else replace(memory, inhibit_reason=reason)
 

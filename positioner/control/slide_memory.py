@@ -69,15 +69,18 @@ class Held:
     """Before the first: what slides teach that all held is a friction that no slide has overcome."""
     at_m: float = nan
     """Where the stem was found stuck; nan: it was not. It is until a slide breaks it loose, or it is seen elsewhere."""
+    surely: int = 0
+    """Those of the slides that were as long as has been seen to break it loose; the others, as a guess says."""
 
     @property
     def stuck(self) -> bool:
         """Whether the stem was found stuck, and has not been seen to move since."""
         return not isnan(self.at_m)
 
-    def one_more(self, margins: Margins) -> "Held":
+    def one_more(self, margins: Margins, *, surely: bool) -> "Held":
         """Return the row with one more slide, before which margins were known."""
-        return replace(self, slides=self.slides + 1, margins=self.margins if self.slides else margins)
+        margins = self.margins if self.slides else margins
+        return replace(self, slides=self.slides + 1, surely=self.surely + surely, margins=margins)
 
 
 NOWHERE, NO_COURSE, NONE_HELD = Anchor(), ReferenceCourse(), Held()

@@ -389,6 +389,25 @@ def test_a_healthy_stem_is_not_stuck_where_only_a_guess_says_that_it_should_have
     assert InhibitReason.STUCK not in why
 
 
+def test_nor_is_one_between_whose_references_two_masters_go_to_and_fro() -> None:
+    """Each slide of 3 % is longer than the guess and holds; none longer is given, for the other reference comes."""
+    loop = typed_loop(0.09)
+    why = set()
+    for _ in range(12):
+        for at in (0.5, 0.53):
+            loop.step_to(at, cycles=20)
+            why.add(loop.decision.inhibit_reason)
+    assert InhibitReason.STUCK not in why
+
+
+def test_a_stuck_stem_is_told_where_only_a_guess_is_known_and_the_reference_is_near() -> None:
+    """A band that widened with slides that held would end the move before a bound has shown it."""
+    loop = typed_loop(0.05)
+    given_pa = stuck_at(loop, 0.503, seconds=40.0)
+    assert loop.decision.inhibit_reason is InhibitReason.STUCK
+    assert len(given_pa) < MOST_SLIDES
+
+
 def test_between_what_held_and_a_slide_too_long_for_an_excursion_what_lies_between_is_tried() -> None:
     """Up it held 5 %, and 60 % broke it loose; an excursion may be 50 %."""
     margins = replace(KNOWN, turning_up=Margin(0.05 * STROKE_M, 0.6 * STROKE_M))
