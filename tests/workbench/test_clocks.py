@@ -85,7 +85,8 @@ def test_of_two_clocks_nothing_is_judged() -> None:
     found = diagnose(shifted(STEPS, 3), SEED, effects=["dead_time"])
     assert found.verdict == "unjudged"
     assert found.sentence.startswith("Not judged: the stem turns before its command in ")
-    assert "turns, by 1 to 3 s: their two clocks differ by that or more. Record both by one clock, or" in found.sentence
+    assert "turns, by 1 to 3 s: their two clocks differ by that, and by what the stem is late besides" in found.sentence
+    assert "Record both by one clock" in found.sentence
     assert not any("two clocks" in str(each) for each in found.blocks()[1:])
 
 

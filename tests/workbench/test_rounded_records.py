@@ -6,6 +6,8 @@ import pytest
 from config.recording import Recording
 from config.valve_file import ValveFile
 from sim.composition import Composition
+from tests.workbench.slow_records import once_a_second
+from tests.workbench.valves import SEED
 from workbench.blind.hiding import hide
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import ready
@@ -43,3 +45,12 @@ def test_a_quantum_finer_than_the_noise_shows_is_not_trusted_however_many_search
     assert found.parameters["quantisation.quantum_m"].value < ready(recording).scale_m
     assert found.cost < base.cost / WITHIN, "though it does better than the base"
     assert not found.trusted
+
+
+@pytest.mark.parametrize(("digits", "told"), [(8, False), (5, True)])
+def test_the_digits_of_a_file_are_no_rounding(digits: int, told: bool) -> None:
+    """Of a day with ten digits it said "rounded to 5e-12 m", where nothing finer than 0.3 um is judged."""
+    recording = once_a_second(SEED)
+    position_m = np.round(recording.columns["position_m"], digits)
+    notes = ready(Recording({**recording.columns, "position_m": position_m}, recording.metadata)).notes
+    assert any("is rounded to" in each for each in notes) == told

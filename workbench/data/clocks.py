@@ -47,7 +47,7 @@ class Early:
         by = f"{self.least_s:.3g} to {self.most_s:.3g} s" if self.least_s else f"up to {self.most_s:.3g} s"
         return (
             f"the stem turns before its command in {self.early} of {self.turns} turns, by {by}: their two clocks "
-            "differ by that or more"
+            "differ by that, and by what the stem is late besides"
         )
 
 

@@ -142,7 +142,7 @@ def ready(recording: Recording) -> Record:
             "if something holds small changes back, a dead band or a historian's compression, say how much, --noise-m M"
         )
         noise_m = finest_m
-    if quantum:
+    if quantum > finest_m:
         notes.append(f"position_m is rounded to {quantum:.3g} {unit}")
     if noise_m is None and held_back_m(position_m, quantum):
         notes.append(
