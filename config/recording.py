@@ -235,12 +235,49 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if 1e6 <= abs(value) < 1e12 else f"{value:.6g}"
 
 
+OTHER_FORMATS = frozenset(
+    [
+        ".arrow",
+        ".bz2",
+        ".feather",
+        ".h5",
+        ".hdf5",
+        ".json",
+        ".mat",
+        ".mdf",
+        ".mf4",
+        ".nc",
+        ".npy",
+        ".npz",
+        ".ods",
+        ".tdms",
+        ".xls",
+        ".xlsx",
+        ".xz",
+        ".zip",
+        ".zst",
+    ]
+)
+"""Ends of names that promise another format than those a recording is written in."""
+
+
+def require_recording_name(path: Path) -> None:
+    """Refuse a name that promises another program a format which the file would not have.
+
+    Raises:
+        InputError: says which are written.
+    """
+    if path.suffix.lower() in OTHER_FORMATS:
+        raise InputError(str(path), f"a recording is not written as {path.suffix}; allowed are .csv, .csv.gz, .parquet")
+
+
 def write_recording(path: Path, recording: Recording) -> None:
     """Write a recording as CSV, compressed or as Parquet if the file is named so; numbers keep every bit.
 
     Raises:
-        InputError: Parquet without pyarrow, or the file cannot be written.
+        InputError: it is named as another format, Parquet without pyarrow, or the file cannot be written.
     """
+    require_recording_name(path)
     try:
         if path.suffix == ".parquet":
             _write_parquet(path, recording)

@@ -29,14 +29,14 @@ def run(arguments: argparse.Namespace) -> int:
     from config.exports.plausibility import oddities
     from config.recording import Recording
     from positioner.cli.parts.breaking_off import told_when_broken_off
-    from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import Progress
 
     take_mapping(arguments)
     if arguments.inspect:
         return _inspect(arguments)
     if arguments.out is not None:
-        writable(arguments.out, "-o")
+        recording_writable(arguments.out, "-o")
     if arguments.column:
         progress = Progress()
         with told_when_broken_off("import", lambda: progress.known):

@@ -78,10 +78,10 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.extended_valves import extended_valve_of
     from positioner.cli.parts.model_arguments import read_valve
-    from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import at_work
 
-    writable(arguments.out, "-o")
+    recording_writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
     valve = read_valve(arguments.valve).valve
     time_s, reference_m = read_series(arguments.reference, "reference_m")

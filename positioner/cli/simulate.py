@@ -28,12 +28,12 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.cli.parts.csv_series import read_series
     from positioner.cli.parts.model_arguments import read_valve
     from positioner.cli.parts.naming import naming
-    from positioner.cli.parts.output_files import writable
+    from positioner.cli.parts.output_files import recording_writable
     from positioner.cli.parts.progress import at_work
     from sim.effect import find_effect
     from sim.simulation import simulate
 
-    writable(arguments.out, "-o")
+    recording_writable(arguments.out, "-o")
     path = find_valve(arguments.valve)
     valve = read_valve(arguments.valve)
     by_setpoint = any(find_effect(each.name, str(path)).by_setpoint for each in valve.effect)

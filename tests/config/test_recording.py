@@ -88,3 +88,15 @@ def test_a_recording_named_gz_is_compressed_and_read_again(tmp_path: Path) -> No
     again = read_recording(files[0])
     assert again.metadata["valve"] == "seed"
     assert all((again.columns[name] == column).all() for name, column in recording.columns.items())
+
+
+@pytest.mark.parametrize("name", ["r.xlsx", "r.H5", "r.mf4", "r.csv.zst"])
+def test_a_name_that_promises_another_format_is_refused(name: str, tmp_path: Path) -> None:
+    """It was written as CSV under that name, which no other program opened."""
+    with pytest.raises(
+        InputError, match=r"a recording is not written as \.\w+; allowed are \.csv, \.csv\.gz, \.parquet"
+    ):
+        write_recording(
+            tmp_path / name, Recording({"time_s": np.arange(3.0), "command_pa": np.ones(3), "position_m": np.zeros(3)})
+        )
+    assert not (tmp_path / name).exists()

@@ -70,6 +70,18 @@ def writable(path: Path | None, option: str) -> None:
         raise _unwritable(option, path, OSError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
+def recording_writable(path: Path, option: str) -> None:
+    """Check that a recording can be written where an option says, as what its name promises.
+
+    Raises:
+        InputError: as `writable`, or it is named as another format than a recording is written in.
+    """
+    from config.recording import require_recording_name
+
+    writable(path, option)
+    require_recording_name(path)
+
+
 def write_json(path: Path, values: object, indent: int | None = None) -> None:
     """Write a result, on one line unless it is indented; null for what is no finite number.
 
