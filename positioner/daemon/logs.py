@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from datetime import UTC, datetime
 from logging.handlers import QueueHandler, QueueListener
 from threading import Thread
-from typing import Any
+from typing import Any, TextIO
 
 from config.json_value import json_value
 
@@ -82,6 +82,13 @@ class _Unformatted(QueueHandler):
         return record
 
 
+class _Lines(logging.StreamHandler[TextIO]):
+    """Writes lines. One that finds no room, on a full disk, say, comes later, as far as standard error keeps it."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
+        """Add nothing to the lines that is no line: a traceback of each would stand among them later."""
+
+
 class LogListener(QueueListener):
     """Writes the queue's records; a standard error that nobody reads holds up nobody else."""
 
@@ -100,7 +107,7 @@ class LogListener(QueueListener):
 
 def start_logging(level: str) -> LogListener:
     """Send everything of this level and above to standard error; stop the listener to flush it."""
-    handler = logging.StreamHandler(sys.stderr)
+    handler = _Lines(sys.stderr)
     handler.setFormatter(JsonLines())
     records: queue.SimpleQueue[logging.LogRecord] = queue.SimpleQueue()
     listener = LogListener(records, handler)
