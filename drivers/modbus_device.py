@@ -29,6 +29,9 @@ from fieldbus.modbus.pdu import encoded
 OF_A_GATEWAY = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
 """Exceptions that the device did not send: it may be away, or be restarted meanwhile."""
 
+READ_COUNTS = (1, 2, 3, 4)
+"""Of registers, of reads that make sure that answers are in step with what is asked: none fits another's length."""
+
 
 class ModbusDriver(ABC):
     """Drives a device by the map of its registers.
@@ -72,6 +75,11 @@ class ModbusDriver(ABC):
     @abstractmethod
     def close(self) -> None:
         """Let go of the device; it keeps its last command until its own time-out."""
+
+    def _position_read(self, count: int) -> bytes:
+        """Return a request to read so many registers from the position's on: it moves nothing, whatever answers."""
+        place = self._config.map.position_m
+        return struct.pack(">BHH", 3 if place.table == "holding" else 4, place.address, count)
 
     @property
     def capabilities(self) -> Capabilities:

@@ -11,12 +11,11 @@ two reads instead, of lengths drawn by lot: an answer to an earlier request woul
 """
 
 import random
-import struct
 import time
 
 from config.device import ModbusRtuDevice
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply
-from drivers.modbus_device import ModbusDriver
+from drivers.modbus_device import READ_COUNTS, ModbusDriver
 from fieldbus.modbus.exception_codes import EXCEPTION
 from fieldbus.modbus.rtu import ECHO, framed, is_whole
 from fieldbus.modbus.serial_line import SerialLine
@@ -24,7 +23,6 @@ from fieldbus.modbus.serial_line import SerialLine
 EXCEPTION_FRAME = 5
 READS = (3, 4)
 """Functions whose reply is never the request itself."""
-READ_COUNTS = (1, 2, 3, 4)
 ROUND_FRAME = 3
 """Bytes of a frame round its PDU: unit and check sum."""
 
@@ -87,10 +85,9 @@ class ModbusRtuDriver(ModbusDriver):
 
     def _await_reads(self) -> None:
         """Do the same by reads that move nothing, of a device that does not know the echo."""
-        place = self._config.map.position_m
-        function = 3 if place.table == "holding" else 4
         for count in random.sample(READ_COUNTS, 2):
-            request = struct.pack(">BHH", function, place.address, count)
+            request = self._position_read(count)
+            function = request[0]
             frame = self._answered(framed(self._unit, request), function, 2 + 2 * count + ROUND_FRAME)
             head = bytes((self._unit, function, 2 * count)), bytes((self._unit, function | EXCEPTION))
             if not (frame.startswith(head) and is_whole(frame)):

@@ -7,18 +7,14 @@ commanded. So `open` first asks for two reads of unlike lengths. Whoever is an a
 for the second.
 """
 
-import struct
 from contextlib import suppress
 from itertools import cycle
 
 from config.device import ModbusTcpDevice
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
-from drivers.modbus_device import ModbusDriver
+from drivers.modbus_device import READ_COUNTS, ModbusDriver
 from fieldbus.modbus.client import ModbusClient, NotConnected, ReplyTimeout, UnexpectedReply
 from fieldbus.modbus.exception_codes import exception_code
-
-READ_COUNTS = (1, 2, 3, 4)
-"""Of registers; the first of the two reads takes them in turn: one far behind would not fit for long."""
 
 
 class ModbusTcpDriver(ModbusDriver):
@@ -35,6 +31,7 @@ class ModbusTcpDriver(ModbusDriver):
         super().__init__(config, f"{config.host}:{config.port} unit {config.unit}")
         self._client = ModbusClient(config.host, config.port, config.unit, config.reply_timeout_s, config.tls)
         self._other_counts = cycle(READ_COUNTS)
+        """Lengths in turn: who is far behind would not fit for long."""
 
     def close(self) -> None:
         """Close the connection; the device keeps its last command until its own time-out."""
@@ -52,15 +49,13 @@ class ModbusTcpDriver(ModbusDriver):
 
         The first read may reach beyond the device's registers and be refused; the second is of a value it has.
         """
-        place = self._config.map.position_m
-        words = place.format.words
+        words = self._config.map.position_m.format.words
         with suppress(Refused):
             self._read_words(next(each for each in self._other_counts if each != words))
         self._read_words(words)
 
     def _read_words(self, count: int) -> None:
-        place = self._config.map.position_m
-        request = struct.pack(">BHH", 3 if place.table == "holding" else 4, place.address, count)
+        request = self._position_read(count)
         self._transact(request, bytes((request[0], 2 * count)), 2 + 2 * count)
 
     def _transact(self, request: bytes, head: bytes, length: int) -> bytes:

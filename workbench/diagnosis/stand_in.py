@@ -21,7 +21,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.diagnosis.kept_mass import leaves_something
-from workbench.discover.form_search import searched_forms
+from workbench.discover.form_search import FIRST, searched_forms
 from workbench.discover.found_form import FoundForm
 from workbench.select.block_errors import relative_error_reduction
 from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, bic
@@ -91,7 +91,7 @@ def stand_in(
         valve,
         steps[0].before,
         against=best.fit.cost,
-        likeliest=True,
+        most=FIRST,
         seed=seed,
         workers=workers,
         progress=progress,

@@ -168,7 +168,7 @@ def discover(
         seed=seed,
         workers=threads,
         progress=tell,
-        on_proposal=on_proposal or (lambda _names: None),
+        on_proposal=on_proposal,
     )
     found = searched.found
     outcome: Outcome = "none" if not found else "found" if len(found) == 1 else "one_of"

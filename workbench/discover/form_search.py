@@ -72,8 +72,8 @@ def searched_forms(
     seed: int,
     workers: int,
     progress: Progress,
-    on_proposal: Callable[[tuple[str, ...]], None] = lambda _names: None,
-    likeliest: bool = False,
+    on_proposal: Callable[[tuple[str, ...]], None] | None = None,
+    most: int = MOST,
     against: float = inf,
 ) -> SearchedForms:
     """Search for a form beside a valve that a recording does not explain.
@@ -86,7 +86,7 @@ def searched_forms(
         workers: threads; the result does not depend on it.
         progress: called with what is being done, and the fraction of it done.
         on_proposal: given the forms' names, the likeliest first, as soon as they are there.
-        likeliest: whether the first turn is all.
+        most: forms that are fitted at most, the likeliest.
         against: cost of what they are held against.
     """
     by = sampling(parts.train.record, valve.valve)
@@ -95,8 +95,8 @@ def searched_forms(
         effects = {path: find_effect(path, "forms") for path in written}
         effects = {path: each for path, each in effects.items() if not by.left_out(each)}
         forms = {path: written[path] for path in effects}
-        most = FIRST if likeliest else MOST
-        return FormSearch(parts, valve, forms, effects, seed, workers, progress, most, against).run(base, on_proposal)
+        search = FormSearch(parts, valve, forms, effects, seed, workers, progress, most, against)
+        return search.run(base, on_proposal or (lambda _names: None))
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +112,9 @@ class FormSearch:
     seed: int
     workers: int
     tell: Progress
-    most: int = MOST
+    most: int
     """Forms that are fitted at most."""
-    against: float = inf
+    against: float
     """Cost of what they are held against: a form far above it waits."""
 
     def run(self, base: EvaluatedModel, on_proposal: Callable[[tuple[str, ...]], None]) -> SearchedForms:

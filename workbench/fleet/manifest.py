@@ -18,7 +18,7 @@ from os.path import normpath
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, Strict, TypeAdapter, ValidationError, field_validator
+from pydantic import BeforeValidator, Field, Strict, TypeAdapter, ValidationError
 
 from config.errors import InputError
 from config.loading import FolderName, Many, Schema, read_toml, validated
@@ -27,8 +27,22 @@ from config.plain_file import read_plain
 KEYS = ("valve", "file", "recording", "when")
 
 
-When = Annotated[datetime, Strict(False)] | Annotated[date, Strict(False)]
-WHEN: TypeAdapter[datetime | date] = TypeAdapter(Annotated[When, Field(union_mode="left_to_right")])
+A_TIME = "must be a date or time, 2026-03-01 or 2026-03-01T14:00"
+
+
+def _no_number(value: object) -> object:
+    """Refuse a number, be it a text: it would count as seconds since 1970, and 20260301 be a day of that year."""
+    if isinstance(value, int | float) or (isinstance(value, str) and "-" not in value):
+        raise ValueError(A_TIME)
+    return value
+
+
+When = Annotated[
+    Annotated[datetime, Strict(False)] | Annotated[date, Strict(False)],
+    Field(union_mode="left_to_right"),
+    BeforeValidator(_no_number),
+]
+WHEN: TypeAdapter[datetime | date] = TypeAdapter(When)
 
 
 class Entry(Schema):
@@ -37,15 +51,7 @@ class Entry(Schema):
     valve: FolderName
     file: FolderName
     recording: FolderName
-    when: When = Field(union_mode="left_to_right")
-
-    @field_validator("when", mode="before")
-    @classmethod
-    def _is_no_number(cls, value: object) -> object:
-        """A number would count as seconds since 1970."""
-        if isinstance(value, int | float):
-            raise ValueError("must be a date or time, 2026-03-01 or 2026-03-01T14:00")
-        return value
+    when: When
 
     @property
     def time(self) -> datetime:
@@ -101,16 +107,13 @@ def _rows(path: Path) -> list[dict[str, Any]]:
         rows.append({key: (row[key] or "").strip() for key in KEYS})
         when = rows[-1]["when"]
         if not _is_time(when):
-            wanted = "must be a date or time, 2026-03-01 or 2026-03-01T14:00"
-            raise InputError(str(path), f"line {reader.line_num}: when: {wanted}, got {when or 'nothing'}")
+            raise InputError(str(path), f"line {reader.line_num}: when: {A_TIME}, got {when or 'nothing'}")
     if not rows:
         raise InputError(str(path), "names no recording: under its first line stands a row for each")
     return rows
 
 
 def _is_time(text: str) -> bool:
-    if "-" not in text:  # a bare number would be taken for seconds since 1970: 20260301 for a day of that year
-        return False
     try:
         WHEN.validate_python(text)
     except ValidationError:
