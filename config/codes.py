@@ -125,6 +125,7 @@ class InhibitReason(Code):
         "excitation: eta_1 = 0 is from before a fault, or before another mode: write 1, then 0",
     )
     STAIRCASE_REVERSED = 26, "the staircase of slides: more pressure takes the stem down: one of the two is reversed"
+    CUT_OFF = 27, "the reference is beyond a cut-off, so the stem is pressed onto its stop"
 
 
 class Restored(Code):

@@ -182,6 +182,10 @@ class ControlTable(Schema):
     law: Literal["seed", "moves", "breakaway", "slides", "conventional"] = "seed"
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
+    cutoff_low: Annotated[float, Field(gt=0, le=0.25)] | None = None
+    """Reference below which the stem is pressed onto its lower stop, as a fraction of the stroke; else it never is."""
+    cutoff_high: Annotated[float, Field(ge=0.75, lt=1)] | None = None
+    """Reference above which it is pressed onto its upper stop."""
     push_limit_pa: Positive | None = None
     """The most a pulse may push beyond the balance of the moving stem; F_c / A as identified where nobody says."""
     excursion_limit: Fraction = 0.2

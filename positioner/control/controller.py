@@ -11,6 +11,7 @@ from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode,
 from config.quantities import DeviceStatus
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
+from positioner.control.cutoffs import HIGH, WITHIN
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
@@ -74,6 +75,7 @@ class Controller:
             law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored),
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
             restoration=Restoration.of(restored, settings.valve),
+            cut_off=WITHIN,
         )
 
     @property
@@ -155,18 +157,22 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     )
     state = state_in(situation)
     held_pa = _held_pa(now, state, supervision)
-    law = _law_memory(now, reference, applied.ratios if state in FOLLOWING else None, outcome, restoration)
+    cut_off = settings.cutoffs.after(memory.cut_off, reference.value_m) if state in FOLLOWING else WITHIN
+    follows = state in FOLLOWING and cut_off == WITHIN
+    law = _law_memory(now, reference, applied.ratios if follows else None, outcome, restoration)
 
     asked_pa = _asked_pa(now, consumed, supervision, held_pa)
     if asked_pa is None:
         exciting = experiment if experiment.commands else excitation
-        asked_pa = _pressure_pa(now, state, held_pa, exciting, reference, applied, law)
+        asked_pa = _pressure_pa(now, state, held_pa, exciting, reference, applied, law, cut_off)
     limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
     wanted_pa = settings.delivered_pa(limited_pa)
-    path = _path(now, wanted_pa, lead=not supervision.fault and state in FOLLOWING)
+    path = _path(now, wanted_pa, lead=not supervision.fault and follows)
     command_pa = wanted_pa if path is None else path.command_pa
 
     by_law = NOTHING if law is None else law.inhibit_reason
+    if cut_off != WITHIN:
+        by_law = InhibitReason.CUT_OFF
     inhibit_reason = (
         excitation_inhibit
         or (NOTHING if experiment.commands or excitation is None else excitation.waits_for(now.statics))
@@ -206,6 +212,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         law,
         path,
         restoration,
+        cut_off,
     ), decision
 
 
@@ -313,7 +320,12 @@ def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemo
 def _sent_to_m(memory: ControllerMemory) -> float | None:
     """Return where the law last sent the stem, m; None where it commands nothing."""
     reference = memory.reference
-    if reference.delta_m == 0.0 or memory.state is S3 or memory.supervision.mode is not AUTOMATIC:
+    if (
+        memory.cut_off != WITHIN
+        or reference.delta_m == 0.0
+        or memory.state is S3
+        or memory.supervision.mode is not AUTOMATIC
+    ):
         return None
     return reference.value_m
 
@@ -462,8 +474,11 @@ def _pressure_pa(
     reference: Reference,
     applied: Applied,
     law: LawMemory | None,
+    cut_off: int,
 ) -> float:
     """Return the pressure of a state, Pa."""
+    if cut_off != WITHIN:
+        return now.settings.maximum_pa if cut_off == HIGH else now.settings.minimum_pa
     if state is S3 and exciting is not None:
         return exciting.pressure_pa(now.sample.now_s)
     if state in FOLLOWING and applied.ratios is not None:

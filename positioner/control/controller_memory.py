@@ -48,6 +48,8 @@ class ControllerMemory(NamedTuple):
     path: PathMemory | None
     """None: nothing is known of a pressure that arrives late."""
     restoration: Restoration
+    cut_off: int
+    """The stop onto which the stem is pressed, see `cutoffs`."""
 
 
 class Decision(NamedTuple):

@@ -11,6 +11,7 @@ from config.supervision_table import FaultActionName
 from positioner.control.balance_law import balance_pa
 from positioner.control.breakaway_memory import BreakawaySettings
 from positioner.control.conventional_law import ConventionalSettings
+from positioner.control.cutoffs import HYSTERESIS, Cutoffs
 from positioner.control.law_memory import LawSettings
 from positioner.control.monitors import MonitorSettings
 from positioner.control.move_memory import MoveSettings
@@ -45,6 +46,7 @@ class Settings:
     law: Callable[[float, int, Ratios], float]
     """Without a memory, see `LAWS`; what commands unless `law_with_memory` does."""
     law_with_memory: LawSettings | None
+    cutoffs: Cutoffs
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
     experiment: ExperimentLimits
@@ -105,6 +107,7 @@ class Settings:
             law_with_memory=WITH_MEMORY[file.control.law](_within_supply(file, valve))
             if file.control.law in WITH_MEMORY
             else None,
+            cutoffs=_cutoffs(file),
             staircase=_staircase(file) if file.by_slides else None,
             experiment=_experiment(file),
             delivered_pa=file.device.delivered_pa,
@@ -189,6 +192,15 @@ WITH_MEMORY: dict[str, Callable[[DaemonFile], LawSettings]] = {
     "conventional": _conventional,
 }
 """The laws with a memory, by name, and their settings of a file; `law_memory.py` runs them."""
+
+
+def _cutoffs(file: DaemonFile) -> Cutoffs:
+    low, high, stroke_m = file.control.cutoff_low, file.control.cutoff_high, file.valve.stroke_m
+    return Cutoffs(
+        low_m=-inf if low is None else low * stroke_m,
+        high_m=inf if high is None else high * stroke_m,
+        hysteresis_m=HYSTERESIS * stroke_m,
+    )
 
 
 def _staircase(file: DaemonFile) -> StaircaseLimits:

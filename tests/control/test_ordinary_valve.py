@@ -63,16 +63,17 @@ def mbar(pressure_pa: float) -> float:
     return MBAR_PA * round(pressure_pa / MBAR_PA)
 
 
-def daemon_file() -> DaemonFile:
+def daemon_file(**control: float) -> DaemonFile:
     file = load_daemon(SHIPPED / "profiles" / "daemon_ordinary.toml")
     assert file.cycle.period_s == PERIOD_S
-    return file.model_copy(update={"cycle": CycleTable(pace="device", period_s=PERIOD_S)})
+    table = file.control.model_copy(update=control)
+    return file.model_copy(update={"cycle": CycleTable(pace="device", period_s=PERIOD_S), "control": table})
 
 
 class Loop:
     """The valve, its device, and the daemon's cycle, identified when it is made."""
 
-    def __init__(self, initial: Initial = ON_THE_SEAT, seed: int = 0) -> None:
+    def __init__(self, initial: Initial = ON_THE_SEAT, seed: int = 0, **control: float) -> None:
         file = load_slave(SHIPPED / "profiles" / "slave_ordinary.toml")
         sensor = file.sensor.model_copy(update={"seed": seed})
         clock = SlaveClock(mode="lockstep", period_s=PERIOD_S)
@@ -80,7 +81,7 @@ class Loop:
         self.valve = Valve.from_file(FILE, step_s=FINE_STEP_S)
         self.valve.rest_at(initial.position_m, initial.pressure_pa)
         device = WholeMillibars(Device(self.valve, file, {}))
-        self.cycle: Cycle = virtual_cycle(daemon_file(), device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
+        self.cycle: Cycle = virtual_cycle(daemon_file(**control), device, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
         self.staircase = list(identified(self.cycle, 60.0, wait=False))
 
     @property
@@ -156,3 +157,33 @@ def test_play_knows_it(tmp_path: Path) -> None:
     columns = read_recording(out).columns
     ends = np.searchsorted(columns["time_s"], (2.9, 5.9, 8.9))
     assert np.abs(columns["position_m"][ends] - (0.02, 0.0204, 0.018)).max() < LANDED_M
+
+
+def test_a_reference_below_its_cutoff_shuts_the_valve_tight() -> None:
+    loop = Loop(MIDWAY, cutoff_low=0.01)
+    loop.step_to(0.3 * STROKE_M)
+    known = loop.law
+    shut = loop.step_to(0.008 * STROKE_M)[-1]
+    assert shut.decision.inhibit_reason is InhibitReason.CUT_OFF
+    assert shut.decision.command_pa == daemon_file().pressure.minimum_pa
+    assert loop.valve.position_m < 1e-5, "on its seat"
+    still = loop.step_to(0.013 * STROKE_M)[-1]
+    assert still.decision.command_pa == shut.decision.command_pa, "within the hysteresis"
+    assert loop.law == known, "a stem that is pressed onto a seat tells nothing of its balance"
+    landed = loop.step_to(0.3 * STROKE_M)[-1]
+    assert landed.decision.inhibit_reason is InhibitReason.NOTHING
+    assert abs(loop.valve.position_m - 0.3 * STROKE_M) <= LANDED_M
+
+
+def test_a_reference_above_its_cutoff_opens_it_wide() -> None:
+    loop = Loop(MIDWAY, cutoff_high=0.98)
+    wide = loop.step_to(0.99 * STROKE_M)[-1]
+    assert wide.decision.command_pa == daemon_file().pressure.maximum_pa
+    assert loop.valve.position_m > STROKE_M - 1e-4
+
+
+def test_without_a_cutoff_it_is_positioned_beside_its_seat() -> None:
+    loop = Loop(MIDWAY)
+    beside = loop.step_to(0.008 * STROKE_M)[-1]
+    assert beside.decision.inhibit_reason is not InhibitReason.CUT_OFF
+    assert abs(loop.valve.position_m - 0.008 * STROKE_M) < 0.002 * STROKE_M
