@@ -161,14 +161,14 @@ class Dcs:
         """Have an experiment played; return what became of it once the law has the command back.
 
         However this ends before (Ctrl-C, no answer any more), a veto breaks the experiment off; it is taken back when
-        the command is.
+        the command is. One that somebody else has set stays.
 
         Args:
             points: times, s, from 0 up, and pressures, Pa.
             timeout_s: broken off after this long.
 
         Raises:
-            DcsError: the daemon refuses the sequence, or it took too long.
+            DcsError: the daemon refuses the sequence, or it took too long, or no veto gets to it any more.
         """
         for number, (time_s, pressure_pa) in enumerate(points):
             self.set_all({"experiment_point": number, "experiment_time": time_s, "experiment_pressure": pressure_pa})
@@ -177,11 +177,27 @@ class Dcs:
             if (state := self._played_within(timeout_s)) is None:
                 raise DcsError(f"{self._where}: the experiment took longer than {timeout_s:g} s, broken off")
             return state
-        except BaseException:
-            self.set("experiment_veto", 1)
-            if self._played_within(timeout_s) is not None:
-                self.set("experiment_veto", 0)
+        except BaseException as error:
+            self._break_off(timeout_s, error)
             raise
+
+    def _break_off(self, timeout_s: float, why: BaseException) -> None:
+        """Veto the experiment on a connection of its own: the reply to what was asked last may still be on its way.
+
+        Raises:
+            DcsError: the veto did not get there; says why it was wanted.
+        """
+        try:
+            self._client.open()
+            if self.get("experiment_veto"):
+                return
+            self.set("experiment_veto", 1)
+        except (ClientError, DcsError):
+            said = str(why) or f"{self._where}: broken off"
+            unheard = "no veto got there, so that a daemon which still runs plays the experiment to its end"
+            raise DcsError(f"{said}; {unheard}") from None
+        if self._played_within(timeout_s) is not None:
+            self.set("experiment_veto", 0)
 
     def _played_within(self, timeout_s: float) -> ExperimentState | None:
         """Wait until no experiment commands; return what became of it, None if one still does after so long."""

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import pytest
 from pymodbus.constants import ExcCodes
@@ -29,9 +29,10 @@ LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
 class Panel:
     """Registers of a daemon on a virtual valve, by name."""
 
-    def __init__(self) -> None:
+    def __init__(self, tables: Mapping[str, object] | None = None) -> None:
         daemon = DaemonFile.model_validate(
             {"valve": {"stroke_m": STROKE_M}, "law": LAW, "pressure": {"minimum_pa": 0.0, "maximum_pa": 200e3}}
+            | dict(tables or {})
         )
         slave = SlaveFile.model_validate({"clock": {"mode": "lockstep"}, "initial": {"position_m": 0.02}})
         self.cycle: Cycle = virtual_cycle(daemon, device_of(slave, shipped_valve("seed")), Requests())
