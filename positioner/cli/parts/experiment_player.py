@@ -11,6 +11,7 @@ from config.recording import Recording
 from positioner.cli.parts.daemon_address import connected
 
 if TYPE_CHECKING:
+    from config.codes import ExperimentState
     from config.daemon_file import DaemonFile
     from positioner.dcs import Dcs
     from workbench.discriminate.discrimination import Player
@@ -69,12 +70,21 @@ def player_on(file: "DaemonFile", arguments: argparse.Namespace) -> "Player":
         within_s = 2.0 * file.experiment.limit_s + RECORDED_WITHIN_S
         with _dcs(arguments) as dcs:
             state = dcs.play(points, within_s)
-        if state is not ExperimentState.COMPLETE:
-            return Played(None, state.text)
+            if state is not ExperimentState.COMPLETE:
+                return Played(None, why_not(state, dcs))
         recording = recorded(folder, file.valve.name, points)
-        return Played(recording, "" if recording else f"no recording of it in {folder} within {RECORDED_WITHIN_S:g} s")
+        return Played(recording, "" if recording else f"what is recorded in {folder} is not the whole of it")
 
     return play
+
+
+def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
+    """Say why an experiment was not played to its end; of a fault, which."""
+    from config.codes import ExperimentState, Fault
+
+    fault = Fault(int(dcs.get("fault")))
+    named = state is ExperimentState.FAULT and fault is not Fault.NONE
+    return f"fault: {fault.text}" if named else state.text
 
 
 def recorded(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:
