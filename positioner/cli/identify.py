@@ -54,7 +54,7 @@ def _report(dcs: "Dcs", problem: str | None) -> int:
         print(f"\nnot applied: {problem}; the law keeps what it had")
         return 1
     law = dcs.get_all("b_over_c_applied", "k_over_c_applied", "offset_applied")
-    print("\napplied; to keep it over a restart, write into the daemon's file:")
+    print("\napplied; over a restart [memory] folder in the daemon's file keeps it, or without that:")
     print(f"[law]\nb_over_c_pa_per_m = {law['b_over_c_applied']:.7g}")
     print(f"k_over_c_pa = {law['k_over_c_applied']:.7g}")
     if law["offset_applied"]:
