@@ -139,12 +139,12 @@ class Site:
             self.know()
         kept = read_memory(path, VALVE, self._conditions)
         seen.require(kept.knowledge is not None, "identification")
-        record, problem = read_record(self.kept("health"), VALVE)
-        seen.require(problem is None and record.travel_m >= counted.travel_m, "counters")
+        worn = read_record(self.kept("health"), VALVE, {})
+        seen.require(worn.problem is None and worn.record.travel_m >= counted.travel_m, "counters")
         with HistoryReader(self.kept("history")) as history:
             events = len(history.events(VALVE))
         seen.require(events >= counted.events, "history")
-        return Counts(record.travel_m, events)
+        return Counts(worn.record.travel_m, events)
 
     def recorded_s(self) -> float:
         """Return how long the newest recording is; raises if it does not open, but for want of a first sample."""

@@ -40,7 +40,7 @@ from positioner.daemon.link import Link, LinkSettings
 from positioner.daemon.local_switch import locks_out
 from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
-from positioner.daemon.memory.conditions import conditions_of
+from positioner.daemon.memory.conditions import conditions_of, pressure_scales
 from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
@@ -188,10 +188,10 @@ def _assembled(
     stored = (
         None
         if file.health.folder is None
-        else StoredHealth.in_folder(source.parent / file.health.folder, file.valve.name)
+        else StoredHealth.in_folder(source.parent / file.health.folder, file.valve.name, pressure_scales(file))
     )
     health = Health(
-        HealthSettings.of(file.health, file.valve.stroke_m, file.supervision), stored.record if stored else None
+        HealthSettings.of(file.health, file.valve.stroke_m, file.supervision), stored.kept.record if stored else None
     )
     with logging_valve(file.valve.name):
         happened = history.valve(file, health.settings.fault_classes)

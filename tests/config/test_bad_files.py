@@ -199,8 +199,8 @@ def test_a_health_file_with_a_number_beyond_all_is_put_aside(tmp_path: Path) -> 
     rest = '"reversals": 0, "stiction_index": 0.0, "moves_judged": 0, "baseline_pa": null'
     for number, said in (("1" + "0" * 400, "must be a number from 0 up"), (DIGITS, "is not JSON: Exceeds the limit")):
         path.write_text(f'{{"version": 1, "valve": "a", "travel_m": {number}, {rest}}}')
-        record, problem = read_record(path, "a")
-        assert record == HealthRecord()
-        assert problem is not None
-        assert said in problem
+        kept = read_record(path, "a", {})
+        assert kept.record == HealthRecord()
+        assert kept.problem is not None
+        assert said in kept.problem
         assert (tmp_path / "a.health.json.unreadable").exists()

@@ -103,7 +103,7 @@ def _digest(content: Any) -> str:
 
 def health(data: bytes) -> None:
     """Read a valve's counts."""
-    _, problem = read_record(written("fuzz.health.json", data), "FV-1")
+    problem = read_record(written("fuzz.health.json", data), "FV-1", {"scale": "1.0"}).problem
     require_line(problem)
 
 
@@ -248,7 +248,9 @@ def file_parsers() -> dict[str, Parser]:
     canopen = tuple((SHIPPED / "profiles" / f"{name}_canopen.toml").read_bytes() for name in ("daemon", "slave"))
     parquet, workbook = Later(lambda: _saved(RECORDING.write, "good.parquet")), Later(_workbook)
     kept = _saved(lambda path: write_memory(path, "FV-1", NOW, KNOWLEDGE), "good.json")
-    counts = _saved(lambda path: write_record(path, "FV-1", HealthRecord(1.5, 3, 0.5, 7, 2e3)), "good.json")
+    counts = _saved(
+        lambda path: write_record(path, "FV-1", HealthRecord(1.5, 3, 0.5, 7, 2e3), {"scale": "1.0"}), "good.json"
+    )
     valves = tuple(shipped_valve(name).read_bytes() for name in ("seed", "ordinary"))
     sheets, daemons = (SHIPPED_EDS.read_bytes(), SMALL_SHEET), (profiles["daemon"], profiles["fleet"], canopen[0])
     certificate_pem, revoked = (certificates() / "daemon.pem").read_bytes(), folder() / "revoked.pem"

@@ -2,16 +2,22 @@
 
 A crash leaves the old one or the new one (`config.whole_file`). One
 that cannot be read is never mended: it is put aside as `FILE.unreadable`, the log says why, and the counts start anew.
+The baseline is a pressure: beside it stands by which scales the device's pressures were read, and where one of them is
+another now, it is none.
 """
 
 import json
 import math
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from config.whole_file import replace_whole
 
 VERSION = 1
+SCALES = "scales"
+Scales = Mapping[str, str]
+"""Of the device's pressures: keys of the configuration and their values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +35,23 @@ class _Unreadable(Exception):
     pass
 
 
-def read_record(path: Path, valve: str) -> tuple[HealthRecord, str | None]:
-    """Return what was kept of a valve, a fresh record when nothing was; and why what was there cannot be read.
+@dataclass(frozen=True, slots=True)
+class KeptHealth:
+    """What was kept of a valve; a fresh record where nothing was.
+
+    Attributes:
+        record: of today's scales.
+        problem: why what was there cannot be read.
+        rescaled: which scale is another than that of the baseline, which was dropped, and what it was.
+    """
+
+    record: HealthRecord = HealthRecord()
+    problem: str | None = None
+    rescaled: str | None = None
+
+
+def read_record(path: Path, valve: str, scales: Scales) -> KeptHealth:
+    """Return what was kept of a valve whose pressures are read by these scales.
 
     Raises:
         OSError: the file is there and cannot be opened, or not be put aside.
@@ -38,39 +59,47 @@ def read_record(path: Path, valve: str) -> tuple[HealthRecord, str | None]:
     try:
         text = path.read_bytes()
     except FileNotFoundError:
-        return HealthRecord(), None
+        return KeptHealth()
     try:
-        return _parsed(text, valve), None
+        record, before = _parsed(text, valve)
     except _Unreadable as error:
         path.replace(path.with_name(path.name + ".unreadable"))
-        return HealthRecord(), str(error)
+        return KeptHealth(problem=str(error))
+    others = [f"{key} was {before[key]}, is {now}" for key, now in scales.items() if before.get(key, now) != now]
+    if record.baseline_pa is None or not others:
+        return KeptHealth(record)
+    dropped = f"{others[0]}; it was {record.baseline_pa:.7g} Pa"
+    return KeptHealth(replace(record, baseline_pa=None), rescaled=dropped)
 
 
-def write_record(path: Path, valve: str, record: HealthRecord) -> None:
+def write_record(path: Path, valve: str, record: HealthRecord, scales: Scales) -> None:
     """Replace the file whole.
 
     Raises:
         OSError: it cannot be written.
     """
-    content = {"version": VERSION, "valve": valve, **asdict(record)}
+    content = {"version": VERSION, "valve": valve, **asdict(record), SCALES: dict(scales)}
     replace_whole(path, json.dumps(content, allow_nan=False) + "\n")
 
 
-def _parsed(text: bytes, valve: str) -> HealthRecord:
+def _parsed(text: bytes, valve: str) -> tuple[HealthRecord, Scales]:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise _Unreadable(f"is not JSON: {str(error).partition(';')[0]}") from None
     names = {field.name for field in fields(HealthRecord)}
-    if not isinstance(content, dict) or content.keys() != names | {"version", "valve"}:
-        raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))} and nothing else")
+    if not isinstance(content, dict) or content.keys() - {SCALES} != names | {"version", "valve"}:
+        raise _Unreadable(f"must hold version, valve, {', '.join(sorted(names))}, {SCALES} and nothing else")
     for key, allowed in (("version", VERSION), ("valve", valve)):
         if content[key] != allowed:
             raise _Unreadable(f"{key}: allowed is {allowed!r}, got {content[key]!r}")
     for name in names:
         if problem := _problem(name, content[name]):
             raise _Unreadable(f"{name}: {problem}, got {content[name]!r}")
-    return HealthRecord(**{name: content[name] for name in names})
+    scales = content.get(SCALES, {})  # kept since the second form of the file only
+    if not isinstance(scales, dict) or not all(isinstance(each, str) for each in scales.values()):
+        raise _Unreadable(f"{SCALES}: must be a table of texts, got {scales!r}")
+    return HealthRecord(**{name: content[name] for name in names}), scales
 
 
 def _problem(name: str, value: object) -> str | None:

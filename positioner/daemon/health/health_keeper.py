@@ -14,7 +14,7 @@ from urllib.parse import quote
 from config.codes import Ne107Status
 from config.errors import InputError
 from positioner.control.controller_memory import Decision
-from positioner.daemon.health.health_file import HealthRecord, read_record, write_record
+from positioner.daemon.health.health_file import HealthRecord, KeptHealth, Scales, read_record, write_record
 from positioner.daemon.health.ne107 import Ne107Condition, ne107_condition
 from positioner.daemon.health.valve_health import Health
 from positioner.daemon.logs import log_event, logging_valve
@@ -32,14 +32,14 @@ def health_path(folder: Path, valve: str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class StoredHealth:
-    """A valve's file, and what was in it at the start; `problem` says why that could not be read."""
+    """A valve's file, by which scales its pressures are read, and what was in it at the start."""
 
     path: Path
-    record: HealthRecord
-    problem: str | None
+    scales: Scales
+    kept: KeptHealth
 
     @classmethod
-    def in_folder(cls, folder: Path, valve: str) -> "StoredHealth":
+    def in_folder(cls, folder: Path, valve: str, scales: Scales) -> "StoredHealth":
         """Read what is kept of a valve, and make sure that it can be kept again.
 
         Raises:
@@ -48,11 +48,11 @@ class StoredHealth:
         path = health_path(folder, valve)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            record, problem = read_record(path, valve)
-            write_record(path, valve, record)
+            kept = read_record(path, valve, scales)
+            write_record(path, valve, kept.record, scales)
         except OSError as error:
             raise InputError(str(path), f"the health record cannot be kept there: {error.strerror}") from None
-        return cls(path, record, problem)
+        return cls(path, scales, kept)
 
 
 class HealthKeeper:
@@ -79,11 +79,10 @@ class HealthKeeper:
         self._thread = Thread(target=self._work, name=f"health of {valve}", daemon=True)
 
     def start(self) -> None:
-        """Begin to look; say first if what was kept cannot be read."""
-        if self._file is not None and self._file.problem is not None:
-            fields = {"file": str(self._file.path), "reason": self._file.problem, "put_aside_as": ".unreadable"}
+        """Begin to look; say first if what was kept cannot be read, or its baseline is of other scales."""
+        if self._file is not None:
             with logging_valve(self._valve):
-                log_event(log, logging.WARNING, "health record unreadable, counts start anew", **fields)
+                _say_of(self._file)
         self._thread.start()
 
     def stop(self) -> None:
@@ -112,7 +111,7 @@ class HealthKeeper:
         if self._file is None or record == self._written:
             return
         try:
-            write_record(self._file.path, self._valve, record)
+            write_record(self._file.path, self._valve, record, self._file.scales)
         except OSError as error:
             if not self._failed:
                 fields = {"file": str(self._file.path), "reason": error.strerror}
@@ -126,3 +125,14 @@ class HealthKeeper:
             while not self._stopping.wait(CHECK_EVERY_S):
                 self.check()
             self.store(self._health.record)
+
+
+def _say_of(stored: StoredHealth) -> None:
+    """Log what of a file is not gone on with."""
+    file, kept = str(stored.path), stored.kept
+    if kept.problem is not None:
+        fields = {"file": file, "reason": kept.problem, "put_aside_as": ".unreadable"}
+        log_event(log, logging.WARNING, "health record unreadable, counts start anew", **fields)
+    if kept.rescaled is not None:
+        reason = f"pressures are read by another scale: {kept.rescaled}"
+        log_event(log, logging.WARNING, "friction baseline dropped", file=file, reason=reason)

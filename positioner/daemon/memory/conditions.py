@@ -23,6 +23,9 @@ OF_THE_LINK = frozenset(
 
 EXTENDED = "the file of law.valve, its digest"
 
+PRESSURES = frozenset({"command_pa", "pressure_pa"})
+SCALING = frozenset({"scale", "offset"})
+
 Conditions = Mapping[str, str]
 """Values by key, both as in the file: what is JSON is TOML."""
 
@@ -34,6 +37,15 @@ def conditions_of(file: DaemonFile, extended: ExtendedValve | None = None) -> Co
     if extended is not None:
         flat[EXTENDED] = sha256(repr(astuple(extended)).encode()).hexdigest()
     return {key: value for key, value in sorted(flat.items()) if not _of_the_link(key)}
+
+
+def pressure_scales(file: DaemonFile) -> Conditions:
+    """Return the keys that say what pressure a number of the device is, with their values."""
+    return {key: value for key, value in conditions_of(file).items() if _scales_a_pressure(key.split("."))}
+
+
+def _scales_a_pressure(parts: list[str]) -> bool:
+    return not PRESSURES.isdisjoint(parts) and parts[-1] in SCALING
 
 
 def changed(kept: Conditions, now: Conditions) -> str | None:

@@ -2,6 +2,7 @@
 
 import json
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,21 +10,23 @@ import pytest
 from config.errors import InputError
 from positioner.control.controller_memory import Decision
 from positioner.daemon.health import Health, HealthKeeper, HealthRecord, StoredHealth
-from positioner.daemon.health.health_file import read_record, write_record
+from positioner.daemon.health.health_file import KeptHealth, read_record, write_record
+from positioner.daemon.health.health_keeper import health_path
 
 KEPT = HealthRecord(12.5, 340, 0.25, 17, 22e3)
+SCALES = {"device.map.command_pa.scale": "20.0", "device.map.command_pa.offset": "0.0"}
 
 
 def test_what_was_written_is_read(tmp_path: Path) -> None:
     path = tmp_path / "valve.json"
     for record in (KEPT, HealthRecord()):
-        write_record(path, "FV-1", record)
-        assert read_record(path, "FV-1") == (record, None)
+        write_record(path, "FV-1", record, SCALES)
+        assert read_record(path, "FV-1", SCALES) == KeptHealth(record)
     assert [each.name for each in tmp_path.iterdir()] == ["valve.json"]
 
 
 def test_without_a_file_everything_begins(tmp_path: Path) -> None:
-    assert read_record(tmp_path / "none.json", "FV-1") == (HealthRecord(), None)
+    assert read_record(tmp_path / "none.json", "FV-1", SCALES) == KeptHealth()
 
 
 @pytest.mark.parametrize(
@@ -38,14 +41,16 @@ def test_without_a_file_everything_begins(tmp_path: Path) -> None:
         ({"stiction_index": 1.5}, "stiction_index: must be a number from 0 up to 1, got 1.5"),
         ({"baseline_pa": 0}, "baseline_pa: must be a number above 0, or null, got 0"),
         ({"extra": 1}, "must hold version, valve"),
+        ({"scales": {"a": 1}}, "scales: must be a table of texts, got {'a': 1}"),
     ],
 )
 def test_a_record_that_cannot_be_is_put_aside_and_told(tmp_path: Path, change: dict[str, object], said: str) -> None:
     path = tmp_path / "valve.json"
-    write_record(path, "FV-1", KEPT)
+    write_record(path, "FV-1", KEPT, SCALES)
     spoilt = json.dumps(json.loads(path.read_text()) | change)
     path.write_text(spoilt)
-    record, problem = read_record(path, "FV-1")
+    kept = read_record(path, "FV-1", SCALES)
+    record, problem = kept.record, kept.problem
     assert record == HealthRecord()
     assert problem is not None
     assert problem.startswith(said)
@@ -53,11 +58,44 @@ def test_a_record_that_cannot_be_is_put_aside_and_told(tmp_path: Path, change: d
     assert (tmp_path / "valve.json.unreadable").read_text() == spoilt
 
 
+def test_a_baseline_of_another_scale_is_dropped_and_told_and_the_counts_stay(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = health_path(tmp_path, "FV-1")
+    write_record(path, "FV-1", KEPT, SCALES)
+    stored = StoredHealth.in_folder(tmp_path, "FV-1", SCALES | {"device.map.command_pa.scale": "10.0"})
+    assert stored.kept.record == replace(KEPT, baseline_pa=None)
+    keeper = HealthKeeper(Health.idle(0.1), undecided, "FV-1", stored)
+    with caplog.at_level(logging.WARNING):
+        keeper.start()
+        keeper.stop()
+    assert [record.getMessage() for record in caplog.records] == ["friction baseline dropped"]
+    again = StoredHealth.in_folder(tmp_path, "FV-1", stored.scales)
+    assert (again.kept.record.travel_m, again.kept.rescaled) == (12.5, None), "the new scales stand in the file"
+
+
+@pytest.mark.parametrize("added", ["device.map.pressure_pa.scale", "device.host"])
+def test_what_is_new_in_the_configuration_drops_no_baseline(tmp_path: Path, added: str) -> None:
+    path = tmp_path / "valve.json"
+    write_record(path, "FV-1", KEPT, SCALES)
+    assert read_record(path, "FV-1", SCALES | {added: "1.0"}) == KeptHealth(KEPT)
+
+
+def test_a_file_of_before_scales_were_kept_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "valve.json"
+    write_record(path, "FV-1", KEPT, SCALES)
+    content = json.loads(path.read_text())
+    del content["scales"]
+    path.write_text(json.dumps(content))
+    assert read_record(path, "FV-1", SCALES) == KeptHealth(KEPT)
+
+
 @pytest.mark.parametrize("text", [b"", b"{", b"\xff\x00", b"[1]", b'{"travel_m": NaN}', b"[" * 100_000])
 def test_garbage_is_put_aside_and_told_in_one_line(tmp_path: Path, text: bytes) -> None:
     path = tmp_path / "valve.json"
     path.write_bytes(text)
-    record, problem = read_record(path, "FV-1")
+    kept = read_record(path, "FV-1", SCALES)
+    record, problem = kept.record, kept.problem
     assert record == HealthRecord()
     assert problem is not None
     assert "\n" not in problem
@@ -67,14 +105,14 @@ def test_garbage_is_put_aside_and_told_in_one_line(tmp_path: Path, text: bytes) 
 def test_two_valves_whatever_their_names_have_a_file_each(tmp_path: Path) -> None:
     names = ["a/b", "a-b", "a b", "..", "é"]
     for name in names:
-        StoredHealth.in_folder(tmp_path / "health", name)
+        StoredHealth.in_folder(tmp_path / "health", name, SCALES)
     assert len(list((tmp_path / "health").iterdir())) == len(names)
 
 
 def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="the health record cannot be kept there"):
-        StoredHealth.in_folder(tmp_path / "file", "FV-1")
+        StoredHealth.in_folder(tmp_path / "file", "FV-1", SCALES)
 
 
 def undecided() -> Decision:
@@ -84,10 +122,10 @@ def undecided() -> Decision:
 def test_the_keeper_tells_what_it_could_not_read_and_keeps_the_counts_at_the_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    StoredHealth.in_folder(tmp_path, "FV-1")
+    StoredHealth.in_folder(tmp_path, "FV-1", SCALES)
     (file,) = tmp_path.iterdir()
     file.write_text("{")
-    stored = StoredHealth.in_folder(tmp_path, "FV-1")
+    stored = StoredHealth.in_folder(tmp_path, "FV-1", SCALES)
     health = Health.idle(0.1)
     keeper = HealthKeeper(health, undecided, "FV-1", stored)
     with caplog.at_level(logging.WARNING):
@@ -98,11 +136,11 @@ def test_the_keeper_tells_what_it_could_not_read_and_keeps_the_counts_at_the_end
     assert restarted.record == KEPT
     keeper = HealthKeeper(restarted, undecided, "FV-1", stored)
     keeper.store(HealthRecord(13.0, 341, 0.25, 17, 22e3))
-    assert StoredHealth.in_folder(tmp_path, "FV-1").record.reversals == 341
+    assert StoredHealth.in_folder(tmp_path, "FV-1", SCALES).kept.record.reversals == 341
 
 
 def test_a_disk_that_fails_is_told_once_and_control_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    stored = StoredHealth(tmp_path / "gone" / "valve.json", HealthRecord(), None)
+    stored = StoredHealth(tmp_path / "gone" / "valve.json", SCALES, KeptHealth())
     keeper = HealthKeeper(Health.idle(0.1), undecided, "FV-1", stored)
     with caplog.at_level(logging.ERROR):
         keeper.store(KEPT)

@@ -12,7 +12,7 @@ from config.codes import EventKind, Fault, Mode, Ne107Cause, Ne107Status, Qualit
 from config.daemon_file import DaemonFile
 from config.record_tables import HistoryTable
 from positioner.control.controller_memory import Decision
-from positioner.daemon.health import HealthSettings, StoredHealth
+from positioner.daemon.health import HealthRecord, HealthSettings
 from positioner.daemon.history import HistoryKeeper, history_keeper
 from positioner.daemon.history.decision_events import Happened, events_between
 from positioner.daemon.history.health_hours import HealthLook
@@ -174,7 +174,7 @@ def test_an_identification_is_kept_with_its_deviations(site: Site) -> None:
 
 def test_an_hour_keeps_the_worst_class_and_the_counts_of_its_end(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
     looks = [Ne107Status.GOOD, Ne107Status.FAILURE, Ne107Status.GOOD]
-    record = StoredHealth.in_folder(site.folder, "FV 1").record
+    record = HealthRecord()
     site.valve.look = lambda: HealthLook(looks.pop(0), record, 20e3, 10, 1, 2, 3, 4)
     monkeypatch.setattr(history_keeper, "HEALTH_EVERY_S", 0.0)
     site.keeper._health_due_s = 0.0
