@@ -58,7 +58,11 @@ class ChildProcess:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._in, self._out = self._process.stdin, self._process.stdout
-        self.ready = self._out.readline().strip()
+        try:
+            self.ready = self._out.readline().strip()
+        except BaseException:  # whoever waits for it is broken off, and nobody else can end it
+            self.end()
+            raise
         if not self.ready:
             self.end()
             said = log.read_text().strip().splitlines()
