@@ -38,19 +38,37 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
     """
     position_m, command_pa, kind = recording.position_m, recording.columns.get("command_pa"), recording.kind
     of_valve = kind.name == "valve"
-    said = [*(_of_size(position_m, stroke_m) if of_valve else ()), *_of_rows(recording)]
+    if swapped := of_valve and command_pa is not None and in_each_others_place(position_m, command_pa):
+        of_size = [
+            f"positions go to {_reach(position_m):.4g} m and commands to {_reach(command_pa):.4g} Pa: do their columns "
+            "stand in each other's place?"
+        ]
+    else:
+        of_size = [*_of_size(position_m, stroke_m)] if of_valve else []
+    said = [*of_size, *_of_rows(recording)]
     whole = np.isfinite(position_m)
     if whole.any() and np.ptp(position_m[whole]) == 0.0:
         where = f"{position_m[whole][0]:g} {kind.travel.si}"
         said.append(f"the position is {where} throughout: a stem that never moves says nothing")
-    elif whole.any() and command_pa is not None and of_valve:
+    elif whole.any() and command_pa is not None and of_valve and not swapped:
         said += [*_of_pressure(command_pa), *_of_action(position_m, command_pa), *_of_sampling(recording)]
     return said
 
 
+def in_each_others_place(position_m: Column, command_pa: Column) -> bool:
+    """Whether positions are beyond any unit of a length, as pressures are, and commands change within a stroke."""
+    in_mm_m = 1e-3 * _reach(position_m)
+    low, high = _ends(command_pa)
+    return in_mm_m > LONGEST_STROKE_M >= _reach(command_pa) and high > low
+
+
+def _reach(column: Column) -> float:
+    return max(map(abs, _ends(column)))
+
+
 def _of_size(position_m: Column, stroke_m: float | None) -> Iterator[str]:
     low, high = _ends(position_m)
-    far = max(abs(low), abs(high))
+    far = _reach(position_m)
     if said := _stands_for_none(position_m):
         yield said
     elif far > LONGEST_STROKE_M:

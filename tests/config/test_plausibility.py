@@ -33,6 +33,10 @@ def test_a_sound_recording_is_left_alone() -> None:
     ("columns", "said"),
     [
         ({"position_m": 1e3 * answered(COMMAND)}, "positions go to 3.*: are they in mm, or in %"),
+        (
+            {"position_m": COMMAND, "command_pa": answered(COMMAND)},
+            "positions go to .* m and commands to 0.0.* Pa: do their columns stand in each other's place",
+        ),
         ({"position_m": 2.0 * answered(COMMAND)}, "of a stroke of 40 mm"),
         ({"position_m": 0.01 * answered(COMMAND)}, "positions never pass .* are they shares of 1"),
         ({"position_m": 0.04 - answered(COMMAND)}, "more pressure, less position: air closes this valve"),

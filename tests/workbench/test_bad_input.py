@@ -34,6 +34,11 @@ def sound() -> Columns:
     return dict(record_of(SEED, 3, 600).columns)
 
 
+def swapped() -> Columns:
+    columns = sound()
+    return columns | {"position_m": columns["command_pa"], "command_pa": columns["position_m"]}
+
+
 def scaled(name: str, factor: float) -> Columns:
     columns = sound()
     return columns | {name: factor * columns[name]}
@@ -66,6 +71,7 @@ def without(name: str) -> Columns:
 
 UNUSABLE: dict[str, tuple[Columns, str]] = {
     "per cent": (scaled("position_m", 100.0 / STROKE_M), "it looks like per cent (%) or mm"),
+    "swapped": (swapped(), "they stand in each other's place; change their names"),
     "shares": (scaled("position_m", 1.0 / STROKE_M), "it looks like a share of the stroke"),
     "bar": (scaled("command_pa", 1e-5), "it looks like bar"),
     "psi": (scaled("command_pa", 1.0 / 6894.757), "it looks like psi"),

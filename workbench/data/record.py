@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from config.drive import KINDS, VALVE, KindName
 from config.errors import InputError
+from config.exports.plausibility import in_each_others_place
 from config.noise import frozen, held_back_m, quantum_m
 from config.recording import BEHIND_POSITIONER, CLOCK_STEPS_TOLERATED, REQUIRED, Column, Recording
 from config.results.result import Brief
@@ -244,6 +245,12 @@ def require_units(record: Record, valve: ValveParameters) -> None:
     if valve.kind != "valve":
         _require_drives_units(reached, valve)
         return
+    if not record.by_setpoint and in_each_others_place(position_m, record.command_pa):
+        raise InputError(
+            "recording",
+            f"position_m reaches {reached:.4g} where the stroke is {valve.stroke_m:g} m, and command_pa "
+            f"{np.max(np.abs(record.command_pa)):.4g}: they stand in each other's place; change their names",
+        )
     if reached > 20.0 * valve.stroke_m:
         is_mm = valve.stroke_m < 0.06 < reached < 1.5e3 * valve.stroke_m < 90
         unit, word = ("mm", "mm") if is_mm else ("per cent (%) or mm", "%, or NAME:mm")
