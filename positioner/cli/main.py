@@ -71,7 +71,7 @@ def _done(words: Sequence[str] | None) -> int:
     from config.extras import told
     from positioner.cli.parts.output_files import refuse_own_inputs
 
-    arguments = command_parser().parse_args(words)
+    arguments = _understood(words)
     try:
         refuse_own_inputs(arguments)
         status = int(arguments.run(arguments))
@@ -128,6 +128,14 @@ class OneLine(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End with it, and with the status of bad input."""
         self.exit(2, f"{self.prog}: {message}; `{self.prog} --help` says more\n")
+
+
+def _understood(words: Sequence[str] | None) -> argparse.Namespace:
+    """Return what the words say; of one too many its command tells, whose help lists what it takes."""
+    arguments, unknown = command_parser().parse_known_args(words)
+    if unknown:
+        OneLine(prog=f"positioner {arguments.command}").error(f"unrecognized arguments: {' '.join(unknown)}")
+    return arguments
 
 
 def command_parser() -> argparse.ArgumentParser:

@@ -162,7 +162,7 @@ def test_no_daemon_to_talk_to_is_one_line_and_exit_status_1(free_port: int, caps
         (["valve"], "--stroke-mm, -o/--out; `positioner valve --help` says more"),
         (["demo", "--bus", "x"], "invalid choice: 'x' (choose from 'modbus', 'canopen', 'rtu')"),
         (["events", "daemon.toml", "--since", "noon"], "positioner events: argument --since: allowed are 30m, 2h, 7d"),
-        (["get", "--bogus"], "positioner: unrecognized arguments: --bogus"),
+        (["get", "--bogus"], "positioner get: unrecognized arguments: --bogus; `positioner get --help` says more"),
     ],
 )
 def test_words_that_no_command_takes_are_one_line(
