@@ -58,7 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> None:
     from config.errors import InputError
 
-    if arguments.seed is None or arguments.seed < 0:
+    if arguments.seed is None:
+        raise InputError("--seed", "is needed: a whole number, 0 or more, by which all is drawn")
+    if arguments.seed < 0:
         raise InputError("--seed", f"must be a whole number, 0 or more, got {arguments.seed}")
     if arguments.out is None:
         raise InputError("-o", "must name the folder in which to hide")

@@ -108,7 +108,7 @@ def test_a_changed_file_breaks_the_seal(name: str, folder: Path, tmp_path: Path,
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["-o", "b"], "--seed: must be a whole number, 0 or more, got None"),
+        (["-o", "b"], "--seed: is needed: a whole number, 0 or more"),
         (["--seed", "-1", "-o", "b"], "--seed: must be a whole number, 0 or more, got -1"),
         (["--seed", "1"], "-o: must name the folder"),
         (["--seed", "1", "-o", "b", "--period-s", "2"], "--period-s: must lie between"),
