@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 BLOCK = re.compile(r"^```(?P<kind>toml|sh|python)(?: (?P<name>\S+))?\n(?P<text>.*?)^```\n", re.MULTILINE | re.DOTALL)
-PROGRESS = re.compile(r"^.*: \d+%, \d+ s so far\n", re.MULTILINE)
+PROGRESS = re.compile(r"^.*(?:: \d+%|, \d+ s so far)\n", re.MULTILINE)
 """What a command says while it works, which is another line each time."""
 HOLDS_NOT = 1
 END_WITHIN_S = 20.0

@@ -14,6 +14,9 @@ key = 1
 ```sh
 cat \\
     made.toml
+echo 'fitting 5 forms: 40%'
+echo 'fitting 5 forms: 40%, 60 s so far'
+echo 'at work, 20 s so far'
 false
 yes on &
 ```
@@ -34,6 +37,9 @@ key = 1
 ```sh
 cat \\
     made.toml
+echo 'fitting 5 forms: 40%'
+echo 'fitting 5 forms: 40%, 60 s so far'
+echo 'at work, 20 s so far'
 false
 yes on &
 ```
