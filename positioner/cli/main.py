@@ -7,6 +7,7 @@ Exit status: 0 done, 1 the thing asked about does not hold, 2 bad input, or an o
 import argparse
 import gc
 import importlib
+import io
 import os
 import select
 import sys
@@ -71,6 +72,7 @@ def _done(words: Sequence[str] | None) -> int:
     from config.extras import told
     from positioner.cli.parts.output_files import refuse_own_inputs
 
+    _escape_what_cannot_be_shown()
     arguments = _understood(words)
     try:
         refuse_own_inputs(arguments)
@@ -99,6 +101,12 @@ def _done(words: Sequence[str] | None) -> int:
         _drop_output()
         print(f"positioner {arguments.command}: standard output cannot be written: {error.strerror}", file=sys.stderr)
         return 2
+
+
+def _escape_what_cannot_be_shown() -> None:
+    """Have standard output write as \\xe9 what its encoding lacks, as standard error does: a name, a sign of ours."""
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _unprintable() -> bool:
