@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from config.drive import COLUMNS, KINDS, VALVE, Kind, kind_of_columns
 from config.errors import InputError
@@ -63,6 +63,8 @@ LONGEST_NAMED = 300
 """Characters of the names there are that a message shows."""
 
 Column = NDArray[np.float64]
+NUMBERS = "biufO"
+"""Kinds of arrays that may hold numbers: times and texts do not."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -71,6 +73,9 @@ class Recording(Result):
 
     columns: Mapping[str, Column]
     metadata: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", {name: _numbers(name, given) for name, given in self.columns.items()})
 
     @classmethod
     def of(cls, columns: Mapping[str, Column], metadata: Mapping[str, str]) -> Self:
@@ -191,6 +196,29 @@ class Recording(Result):
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+
+def _numbers(name: str, given: ArrayLike) -> Column:
+    """Return a column as a plain array: a series of a data frame counts by its index, a masked one keeps what it hides.
+
+    Raises:
+        InputError: it is no series of numbers.
+    """
+    if isinstance(given, np.ma.MaskedArray):
+        given = np.ma.filled(given.astype(np.float64), np.nan)
+    values = np.asarray(given)
+    try:
+        if values.ndim == 1 and values.dtype.kind in NUMBERS:
+            return values.astype(np.float64, copy=False)
+    except (TypeError, ValueError):
+        pass
+    raise InputError(
+        "recording", f"{name}: allowed is one number a sample, NaN where none is known, got {_kind(values)}"
+    )
+
+
+def _kind(values: NDArray[Any]) -> str:
+    return f"an array of shape {values.shape}" if values.ndim != 1 else f"values of kind {values.dtype}"
 
 
 def of_kind(kind: Kind) -> dict[str, str]:

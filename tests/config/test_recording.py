@@ -1,6 +1,7 @@
 """The recording format: what is written comes back bit by bit, and faults are named by line."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,3 +101,30 @@ def test_a_name_that_promises_another_format_is_refused(name: str, tmp_path: Pat
             tmp_path / name, Recording({"time_s": np.arange(3.0), "command_pa": np.ones(3), "position_m": np.zeros(3)})
         )
     assert not (tmp_path / name).exists()
+
+
+def test_series_lists_and_masked_arrays_become_plain_columns() -> None:
+    """A data frame's columns ended in "could not broadcast", and what a mask hides was taken for measured."""
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"time_s": [0, 1, 2, 3], "command_pa": [1.0, 2.0, 3.0, 4.0]})[1:]
+    masked = np.ma.masked_array([5.0, 6.0, 7.0], mask=[False, True, False])
+    given: dict[str, Any] = {"time_s": frame.time_s, "command_pa": list(frame.command_pa), "position_m": masked}
+    made = Recording(given)
+    assert all(type(each) is np.ndarray and each.dtype.kind == "f" for each in made.columns.values())
+    assert made.command_pa[0] == 2.0
+    np.testing.assert_array_equal(made.position_m, [5.0, np.nan, 7.0])
+
+
+@pytest.mark.parametrize(
+    ("given", "got"),
+    [
+        (np.zeros((3, 1)), "an array of shape (3, 1)"),
+        (np.array(["1", "2"]), "values of kind <U1"),
+        (np.array(["2026-01-01"], dtype="datetime64[s]"), "values of kind datetime64"),
+        (np.array([1.0, "Bad"], dtype=object), "values of kind object"),
+    ],
+)
+def test_what_is_no_column_of_numbers_is_refused_by_name(given: Any, got: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Recording({"time_s": given})
+    assert f"time_s: allowed is one number a sample, NaN where none is known, got {got}" in str(caught.value)
