@@ -154,6 +154,10 @@ def test_what_acts_rarely_and_leaves_nothing_need_not_show_in_many_blocks() -> N
     assert "more than 3 needed" in replace(rare, bic=100.0).rejection_reason(at_floor=True), "90 independent: chance"
     assert "more than 1 needed" in replace(rare, standard_errors=0.9).rejection_reason(at_floor=True)
     assert "a fall of more than 5 %" in replace(rare, held_out=0.04).rejection_reason(at_floor=True)
+    seen = replace(rare, held_out=0.03, standard_errors=3.1)
+    assert not seen.rejection_reason(at_floor=True), "in one block of twenty, which the mean of all cannot show better"
+    assert "a fall of more than 5 %" in replace(seen, completes=False).rejection_reason(at_floor=True)
+    assert "a fall of more than 5 %" in replace(seen, bic=100.0).rejection_reason(at_floor=True)
 
 
 @pytest.mark.parametrize(

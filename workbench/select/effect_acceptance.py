@@ -3,10 +3,11 @@
     BIC = n log(2 C / n) + k log n             C soft-L1 cost, k free parameters; the evidence is base less candidate
     reduction, in its standard errors          of the held-out block errors (`block_errors`)
 
-A falling held-out error is needed for an effect; it proves none. What acts in k of the held-out blocks makes it fall by
-some sqrt(k) standard errors, however sure: where the evidence leaves no doubt, and what was left above the noise is
-gone, one is enough. The rule is the same for a balance of forces, where the blocks are strokes or readings in place of
-seconds.
+A falling held-out error is needed for an effect; it proves none. What acts in k of n held-out blocks makes it fall by
+some sqrt(k) standard errors, however sure, and by no more than 1 - 2^(-k/n), since none counts for more than a factor
+of 2. Where the evidence leaves no doubt, and what was left above the noise is gone, one standard error is enough, and
+of a fall of more than two it does not matter how small it is. The rule is the same for a balance of forces, where the
+blocks are strokes or readings in place of seconds.
 """
 
 from dataclasses import dataclass
@@ -51,7 +52,9 @@ class Gain:
             at_floor: whether the error of the model before is at the floor, however what is left hangs on the state.
         """
         least = AT_THE_FLOOR if at_floor else LEAST_STANDARD_ERRORS
-        least = COMPLETE if self.completes and self.overwhelming else least
+        complete = self.completes and self.overwhelming
+        least = COMPLETE if complete else least
+        however_small = complete and self.standard_errors > LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
         if at_floor and self.independent_share * self.bic <= LEAST_BIC:
@@ -59,7 +62,7 @@ class Gain:
                 f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
                 f"are independent: {self.independent_share * self.bic:.2g}, more than {LEAST_BIC:g} needed"
             )
-        if self.held_out <= LEAST_REDUCTION:
+        if self.held_out <= LEAST_REDUCTION and not however_small:
             way = "falls" if self.held_out >= 0.0 else "rises"
             changes = f"the held-out error {way} by {100 * abs(self.held_out):.2g} %"
             return f"{changes}, a fall of more than {100 * LEAST_REDUCTION:g} % needed"
