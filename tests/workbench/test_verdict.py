@@ -121,6 +121,15 @@ def test_of_what_is_left_unexplained_what_is_suspected_is_said(parts: Split) -> 
     assert " Suspected, not proved: preload; of preload, the held-out error falls by " in found.sentence
 
 
+def test_what_is_suspected_is_nothing_that_the_library_does_not_have(parts: Split) -> None:
+    """A play in a record of once a second was: the sentence said both."""
+    before = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M, structure=1.0)
+    suspect = model_of("preload", cost=1.1 * AT_FLOOR, error_m=1.1 * FLOOR_M, scatter=0.14)
+    found = diagnosed(parts, step(before, preload=suspect))
+    assert (found.verdict, found.suspected) == ("unexplained", ("preload",))
+    assert found.sentence.startswith("Something is missing that no effect here is proved to explain. The held-out ")
+
+
 def test_of_what_is_left_beside_what_is_missing_what_is_suspected_is_no_explanation(parts: Split) -> None:
     found_first = model_of("sensor_lag", cost=1.4 * AT_FLOOR, error_m=1.4 * FLOOR_M)
     suspect = model_of("sensor_lag", "preload", cost=1.2 * AT_FLOOR, error_m=1.25 * FLOOR_M, scatter=0.3)

@@ -4,7 +4,8 @@ adequate      nothing is missing: no effect is accepted, and the valve explains 
 missing       these effects, and with them all is explained
               Of both, where only the bare valve by another name explains the rest: a parameter that was kept is off
 one_of        as missing, but a set of effects does equally well: the experiment that tells them apart comes with it
-unexplained   something is missing that the library does not have; what lowered the error so far is still named.
+unexplained   something is missing that the library does not have, or of which what it has is only suspected; what
+              lowered the error so far is still named.
               Or slides end elsewhere, so that what explains the rest stands in for it; or the valve scatters so much
               that a tenth of the motion is left, which no model could explain
 unjudged      the floor is unknown, so that nobody can say whether anything is left; what lowered the error is named.

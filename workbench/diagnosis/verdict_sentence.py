@@ -62,7 +62,8 @@ def _said(
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
     begun = f" {names} {part}: {fell}." if names else f" The held-out error is {length.said(best.errors.test_rmse_m)}."
     if verdict == "unexplained":
-        said = f"Something is missing that the library does not have.{begun}"
+        lacked = "no effect here is proved to explain" if suspicion else "the library does not have"
+        said = f"Something is missing that {lacked}.{begun}"
         return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
 
