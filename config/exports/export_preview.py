@@ -226,9 +226,12 @@ def _doubts(columns: Sequence[ColumnPreview], left: Sequence[ColumnPreview], sep
 
 
 def _row_a_value(columns: Sequence[ColumnPreview]) -> str | None:
-    """Return what to say of a table in which a column of few words, in turn, says whose the only number is."""
+    """Return what to say of a table in which a column of few words, in turn, says whose the only number is.
+
+    A quality that is a number says how good it is, and is none.
+    """
     numbers = [each for each in columns if each.numbers and _rank("time_s", each) is None]
-    if len(numbers) != 1:
+    if len([each for each in numbers if not STATUS.search(each.name)]) != 1:
         return None
     for each in columns:
         held = list(dict.fromkeys(map(str, each.cells)))

@@ -612,9 +612,11 @@ def test_the_words_that_read_it_are_proposed(kind: str, tmp_path: Path) -> None:
     assert " ".join(preview(tmp_path / "export.csv").words).removesuffix(" --stroke-m M") == words
 
 
-def test_a_table_with_a_row_a_value_is_told_to_be_turned(tmp_path: Path) -> None:
-    lines = ["Tag;Time;Value", *(f"{tag};{stamp};1.5" for stamp in ISO for tag in ("PV", "OUT"))]
-    (tmp_path / "export.csv").write_bytes(text(lines))
+@pytest.mark.parametrize("quality", ["", ";192", ";Good"])
+def test_a_table_with_a_row_a_value_is_told_to_be_turned(tmp_path: Path, quality: str) -> None:
+    """A historian's has a quality beside, which as a number was taken for a second signal."""
+    rows = (f"{tag};{stamp};1.5{quality}" for stamp in ISO for tag in ("PV", "OUT"))
+    (tmp_path / "export.csv").write_bytes(text([f"Tag;Time;Value{quality and ';Quality'}", *rows]))
     assert any("'Tag' holds PV, OUT: a row a value" in each for each in preview(tmp_path / "export.csv").open)
 
 
