@@ -166,7 +166,9 @@ class Recording(Result):
         if "time_s" not in self.columns or count < 2:
             return f"{count} samples"
         steps = np.diff(self.time_s)
-        return f"{count} samples over {np.sum(steps[steps > 0.0]):.6g} s, {1e3 * float(np.median(steps)):.4g} ms apart"
+        period_s = float(np.median(steps))
+        apart = f"{period_s:.4g} s" if period_s >= 1.0 else f"{1e3 * period_s:.4g} ms"
+        return f"{count} samples over {np.sum(steps[steps > 0.0]):.6g} s, {apart} apart"
 
     def frame_columns(self) -> Mapping[str, Column]:
         """Return the columns."""

@@ -80,6 +80,13 @@ def test_the_span_of_a_time_of_today_is_said_to_the_second() -> None:
     assert "1780000099" in said
 
 
+@pytest.mark.parametrize(("period_s", "said"), [(0.01, "10 ms apart"), (1.0, "1 s apart"), (35.0, "35 s apart")])
+def test_how_far_samples_lie_apart_is_said_in_a_unit_of_its_size(period_s: float, said: str) -> None:
+    """A historian's that keeps changes alone were 3.5e+04 ms apart."""
+    time_s = np.linspace(0.0, 4.0 * period_s, 5)
+    assert said in Recording({"time_s": time_s, "command_pa": time_s, "position_m": time_s}).summary()
+
+
 def test_a_recording_named_gz_is_compressed_and_read_again(tmp_path: Path) -> None:
     recording = Recording({name: np.arange(3.0) for name in ("time_s", "command_pa", "position_m")}, {"valve": "seed"})
     files = [tmp_path / name for name in ("one.csv.gz", "two.csv.gz")]
