@@ -319,15 +319,8 @@ def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemo
 
 def _sent_to_m(memory: ControllerMemory) -> float | None:
     """Return where the law last sent the stem, m; None where it commands nothing."""
-    reference = memory.reference
-    if (
-        memory.cut_off != WITHIN
-        or reference.delta_m == 0.0
-        or memory.state is S3
-        or memory.supervision.mode is not AUTOMATIC
-    ):
-        return None
-    return reference.value_m
+    follows = memory.state is not S3 and memory.supervision.mode is AUTOMATIC and memory.cut_off == WITHIN
+    return memory.reference.value_m if follows and memory.reference.delta_m != 0.0 else None
 
 
 def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
