@@ -1,5 +1,7 @@
 """What was named only stands in for something where a form without a name does better, and acts elsewhere."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,9 +9,11 @@ from config.recording import Recording
 from config.valve_file import ValveFile
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.blind.input_signal import excitation
+from workbench.diagnosis import stand_in
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
 from workbench.discover import form_search
+from workbench.discover.form_search import SearchedForms
 from workbench.discover.grammar import FORMS
 
 FEW = ("scaled_over_direction_sign", "force_constant")
@@ -31,6 +35,13 @@ def test_a_preload_that_imitates_an_asymmetry_which_was_not_tried_is_no_explanat
     lopsided: tuple[Recording, ValveFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording, valve = lopsided
+    asked: list[SearchedForms] = []
+
+    def searched(*args: Any, **settings: Any) -> SearchedForms:
+        asked.append(form_search.searched_forms(*args, **settings))
+        return asked[-1]
+
+    monkeypatch.setattr(stand_in, "searched_forms", searched)
     monkeypatch.setattr(form_search, "FORMS", tuple(each for each in FORMS if each.name in FEW))
     found = diagnose(recording, valve, effects=("preload",))
     assert found.best.complete, "it reaches the floor: by what is left alone it would be called all that is missing"
@@ -40,5 +51,6 @@ def test_a_preload_that_imitates_an_asymmetry_which_was_not_tried_is_no_explanat
     assert found.sentence.endswith(f" {found.stand_in.sentence}.")
     assert "preload only stands in for it" in found.sentence
     assert as_json(found)["stand_in"]["form"] == FEW[0]
+    assert [each.name for each in asked[0].candidates] == [FEW[0]], "a constant force acts where a preload does"
     right = diagnose(recording, valve, effects=("asymmetric_friction",))
     assert (right.verdict, right.missing, right.stand_in) == ("missing", ("asymmetric_friction",), None)

@@ -8,8 +8,9 @@ Where an explained record leaves more than the noise may be off by, the likelies
     the block error, fitted and held out, falls by more than two standard errors
 
 and acts elsewhere if it acts at another place on the path pressure, force, friction, motion, sensor than the one effect
-named, its rivals and what is the same by algebra. At the same place it is the same effect in another shape. One form
-that does better than several effects together makes stand-ins of them, wherever it acts.
+named, its rivals and what is the same by algebra. At the same place it is the same effect in another shape, and is not
+sought: forms of its kind, which come near, too, would leave no room among the likeliest for what it stands in for. One
+form that does better than several effects together makes stand-ins of them, wherever it acts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -85,7 +86,7 @@ def stand_in(
         return None
     named = tuple(step.added.name for step in added if step.added)
     rivals = [each.name for step in added for each in step.indistinguishable]
-    places = {place for name in (*named, *rivals) for place in _places(name, library)}
+    places = {place for name in (*named, *rivals) for place in _places(name, library)} if len(named) == 1 else set()
     found = searched_forms(
         parts,
         valve,
@@ -95,10 +96,9 @@ def stand_in(
         seed=seed,
         workers=workers,
         progress=progress,
+        elsewhere_than=places,
     ).found
-    better = [
-        each for each in found if _better(each, best) and (len(named) > 1 or each.form.place.function not in places)
-    ]
+    better = [each for each in found if _better(each, best)]
     if not better:
         return None
     form, errors = better[0].form, better[0].model.errors

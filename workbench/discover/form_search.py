@@ -7,7 +7,7 @@ of this explains the recordings.
 """
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -75,6 +75,7 @@ def searched_forms(
     on_proposal: Callable[[tuple[str, ...]], None] | None = None,
     most: int = MOST,
     against: float = inf,
+    elsewhere_than: Collection[str] = (),
 ) -> SearchedForms:
     """Search for a form beside a valve that a recording does not explain.
 
@@ -88,12 +89,14 @@ def searched_forms(
         on_proposal: given the forms' names, the likeliest first, as soon as they are there.
         most: forms that are fitted at most, the likeliest.
         against: cost of what they are held against.
+        elsewhere_than: places on the path at which no form is sought.
     """
     by = sampling(parts.train.record, valve.valve)
     with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
         written = write_forms(FORMS, Path(folder))
         effects = {path: find_effect(path, "forms") for path in written}
-        effects = {path: each for path, each in effects.items() if not by.left_out(each)}
+        sought = {path for path, form in written.items() if form.place.function not in elsewhere_than}
+        effects = {path: each for path, each in effects.items() if path in sought and not by.left_out(each)}
         forms = {path: written[path] for path in effects}
         search = FormSearch(parts, valve, forms, effects, seed, workers, progress, most, against)
         return search.run(base, on_proposal or (lambda _names: None))
