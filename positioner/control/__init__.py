@@ -17,6 +17,7 @@ real time.
     slide_margins                               how far a slide must be sent to break the stem loose, as learnt
     slide_inverse                               what the law of slides takes from an extended valve
     pressure_path                               lead against a slow pressure of an extended valve, and its arrival
+    cutoffs                                     beside a stop: the stem is pressed onto it
     conventional_law                            PI on position, to compare the others with
     law_memory                                  the law with a memory that is in force, whichever it is
     pulse, pulse_trial, pulse_following         what a pulse does, which to give and learn from, one in progress

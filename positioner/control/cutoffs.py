@@ -29,7 +29,7 @@ class Cutoffs:
         """Return onto which stop a reference, m, presses the stem, and what it did before.
 
         >>> cutoffs = Cutoffs(low_m=0.0004, hysteresis_m=0.0002)
-        >>> cutoffs.after(WITHIN, 0.0005), cutoffs.after(LOW, 0.0005), cutoffs.after(LOW, 0.0006)
+        >>> cutoffs.after(WITHIN, 0.0005), cutoffs.after(LOW, 0.0005), cutoffs.after(LOW, 0.0007)
         (0, -1, 0)
         """
         if reference_m < self.low_m + self.hysteresis_m * (before == LOW):

@@ -58,14 +58,16 @@ def test_who_plays_on_a_valve_is_ended_as_by_ctrl_c_which_vetoes(
         os.kill(os.getpid(), end)
 
     monkeypatch.setattr("workbench.discriminate.discrimination.discriminate", ended)
-    before = signal.getsignal(end)
-    assert before is signal.SIG_DFL
+    before = signal.signal(end, signal.SIG_DFL)  # of a daemon that ran in this process before
     monkeypatch.chdir(tmp_path)
     Path("site.toml").write_text("[valve]\nstroke_m = 0.1\n")
     write_recording(Path("rec.csv"), Recording({n: np.arange(3.0) for n in ("time_s", "command_pa", "position_m")}))
-    assert main(["discriminate", "site.toml", "--rec", "rec.csv", "--valve", "seed", "--out", "told"]) == 130
+    try:
+        assert main(["discriminate", "site.toml", "--rec", "rec.csv", "--valve", "seed", "--out", "told"]) == 130
+        assert signal.getsignal(end) is signal.SIG_DFL
+    finally:
+        signal.signal(end, before)
     assert "positioner discriminate: broken off; nothing is named" in capsys.readouterr().err
-    assert signal.getsignal(end) is before
 
 
 def test_under_nohup_a_terminal_that_is_gone_ends_nothing() -> None:
