@@ -5,10 +5,12 @@ import hashlib
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from config.errors import InputError
 from config.recording import read_recording
 from config.valve_file import ValveFile, find_valve, load_valve
 from positioner.cli.main import main
@@ -305,3 +307,21 @@ def test_what_the_pressure_path_remembers_from_before_the_record_is_found_in_its
     hidden = hide(seed)
     assert [each.name for each in hidden.truth.effect] == [effect]
     assert error_of(hidden.truth, hidden.fit) < 1.1 * NOISE_M
+
+
+@pytest.mark.parametrize(
+    ("asked", "problem"),
+    [
+        ({"seed": -1}, "seed: must be 0 or more, got -1"),
+        ({"seed": 1, "duration_s": -5.0}, "period_s: must be above 0 and at most duration_s, got 0.01 of -5 s"),
+        (
+            {"seed": 1, "duration_s": float("nan")},
+            "period_s: must be above 0 and at most duration_s, got 0.01 of nan s",
+        ),
+        ({"seed": 1, "period_s": 0.0}, "period_s: must be above 0 and at most duration_s, got 0 of 30 s"),
+    ],
+)
+def test_what_holds_no_sample_is_refused(asked: dict[str, Any], problem: str) -> None:
+    with pytest.raises(InputError) as refused:
+        hide(**asked)
+    assert str(refused.value) == problem

@@ -13,10 +13,12 @@ The same seed draws the same; the bare valve and the commands do not depend on t
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
 
+from config.errors import InputError
 from config.recording import Column, Recording
 from config.results.result import Brief
 from config.slave_file import Sensor
@@ -61,7 +63,14 @@ def hide(
         dirty: see `workbench.blind.trial`.
         duration_s: of each recording.
         period_s: of its samples.
+
+    Raises:
+        InputError: an unknown effect, a negative seed, or a duration that holds no sample.
     """
+    if seed < 0:
+        raise InputError("seed", f"must be 0 or more, got {seed}")
+    if not 0.0 < period_s <= duration_s < inf:
+        raise InputError("period_s", f"must be above 0 and at most duration_s, got {period_s:g} of {duration_s:g} s")
     streams = np.random.SeedSequence(seed).spawn(5)
     for_valve, for_effects, for_fit, for_test, for_salt = map(np.random.default_rng, streams)
     valve = drawn_valve(for_valve)
