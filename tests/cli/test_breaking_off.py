@@ -54,19 +54,16 @@ def test_who_plays_on_a_valve_is_ended_as_by_ctrl_c_which_vetoes(
     monkeypatch.setattr("positioner.cli.parts.experiment_player.player_on", lambda *_: None)
 
     def ended(*_: Any, **__: Any) -> None:
-        assert signal.getsignal(end) is not signal.SIG_DFL, "it would end these tests"
+        assert signal.getsignal(end) is signal.default_int_handler, "it would end these tests"
         os.kill(os.getpid(), end)
 
     monkeypatch.setattr("workbench.discriminate.discrimination.discriminate", ended)
-    before = signal.signal(end, signal.SIG_DFL)  # of a daemon that ran in this process before
+    before = signal.getsignal(end)
     monkeypatch.chdir(tmp_path)
     Path("site.toml").write_text("[valve]\nstroke_m = 0.1\n")
     write_recording(Path("rec.csv"), Recording({n: np.arange(3.0) for n in ("time_s", "command_pa", "position_m")}))
-    try:
-        assert main(["discriminate", "site.toml", "--rec", "rec.csv", "--valve", "seed", "--out", "told"]) == 130
-        assert signal.getsignal(end) is signal.SIG_DFL
-    finally:
-        signal.signal(end, before)
+    assert main(["discriminate", "site.toml", "--rec", "rec.csv", "--valve", "seed", "--out", "told"]) == 130
+    assert signal.getsignal(end) is before
     assert "positioner discriminate: broken off; nothing is named" in capsys.readouterr().err
 
 

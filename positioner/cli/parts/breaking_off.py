@@ -1,9 +1,17 @@
-"""Ctrl-C during long work: how far it came is said. No file of results is written by then, only what was measured."""
+"""Ctrl-C during long work: how far it came is said. No file of results is written by then, only what was measured.
+
+What else ends a command may be taken, too, by whom something would outlive: a valve that is played on, a process.
+"""
 
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from types import FrameType
+
+ENDS = signal.SIGTERM, signal.SIGHUP
+"""What ends a command at once: `kill`, a supervisor's time limit, a terminal that is closed."""
+Handler = Callable[[int, FrameType | None], None]
 
 
 @contextmanager
@@ -26,16 +34,18 @@ def told_when_broken_off(command: str, known: Callable[[], str]) -> Iterator[Non
 
 
 @contextmanager
-def ended_as_by_ctrl_c() -> Iterator[None]:
-    """Take what ends a command, a terminal that is gone among it, for Ctrl-C: who moves a valve lets go of it then.
-
-    What is ignored stays ignored, as under nohup.
-    """
-    ending = [each for each in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(each) is signal.SIG_DFL]
-    for each in ending:
-        signal.signal(each, signal.default_int_handler)
+def ended_by(handler: Handler) -> Iterator[None]:
+    """Have a handler take what ends a command at once, so that what it began ends first. What is ignored stays so."""
+    before = {each: known for each in ENDS if (known := signal.getsignal(each)) is not signal.SIG_IGN}
+    for each in before:
+        signal.signal(each, handler)
     try:
         yield
     finally:
-        for each in ending:
-            signal.signal(each, signal.SIG_DFL)
+        for each, known in before.items():
+            signal.signal(each, known)
+
+
+def ended_as_by_ctrl_c() -> AbstractContextManager[None]:
+    """Take what ends a command for Ctrl-C: who moves a valve lets go of it then. Under nohup it goes on."""
+    return ended_by(signal.default_int_handler)

@@ -1,6 +1,5 @@
 """Other positioner commands as processes of their own, which end with the command that started them."""
 
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,12 +7,10 @@ from types import FrameType
 from typing import NoReturn
 
 from config.errors import InputError
+from positioner.cli.parts.breaking_off import ended_by
 from positioner.testing.child_process import ChildProcess, NotStarted, port_in
 
 __all__ = ["port_in", "running"]
-
-ENDS = signal.SIGTERM, signal.SIGHUP
-"""What ends a command at once: `kill`, a supervisor's time limit, a terminal that is closed."""
 
 
 @contextmanager
@@ -26,7 +23,7 @@ def running(command: str, config: Path, *options: str) -> Iterator[str]:
         InputError: it ended instead of getting ready; says why.
     """
     words = (command, str(config), *options)
-    with _ended_in_order():
+    with ended_by(_end):
         try:
             child = ChildProcess("positioner.cli", *words, log=config.with_suffix(".log"))
         except NotStarted as error:
@@ -37,18 +34,6 @@ def running(command: str, config: Path, *options: str) -> Iterator[str]:
             child.end()
 
 
-@contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """Have what ends a command end its contexts first: a slave and a daemon left alone would run for ever."""
-    before = {each: handler for each in ENDS if (handler := signal.getsignal(each)) is not signal.SIG_IGN}
-    for each in before:
-        signal.signal(each, _end)
-    try:
-        yield
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
-
-
 def _end(number: int, _: FrameType | None) -> NoReturn:
+    """End the command's contexts first: a slave and a daemon left alone would run for ever."""
     raise SystemExit(128 + number)
