@@ -43,6 +43,7 @@ HALF = 0.5
 """Of what is needed: so much of the other must be excluded, where that is not needed."""
 WORTH = 4.0
 """Times what is left, that friction found from a measured pressure must be worth."""
+ROUGH = "But the valve with both does not explain the recording: how much of either there is, these figures do not tell"
 NOTHING = Gain(0.0, 0.0, 0.0, 1.0)
 NO_FRICTION = 1e-3
 """Of the fitted one: what a stem without friction has left, by which it comes to rest."""
@@ -73,7 +74,8 @@ class PositionerOrPacking(Brief):
     @property
     def sentence(self) -> str:
         """Say it."""
-        return f"{self._said} ({self._held})."
+        rough = "" if self.at_floor or self.cause == "not told" else f". {ROUGH}"
+        return f"{self._said}{rough} ({self._held})."
 
     @property
     def _said(self) -> str:
