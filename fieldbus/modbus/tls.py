@@ -57,6 +57,8 @@ class Identity:
 
 
 NOBODY = Identity("nobody", Role.NONE)
+HUNG_UP = ssl.SSLEOFError, ssl.SSLZeroReturnError, ssl.SSLSyscallError
+"""What OpenSSL raises, by the moment, where the other end is gone; the last two give no reason."""
 
 
 def client_context(tls: Tls) -> ssl.SSLContext:
@@ -74,7 +76,7 @@ def failure_reason(error: OSError) -> str:
         return f"its certificate is not accepted: {error.verify_message.rstrip('.')}"
     if isinstance(error, TimeoutError):
         return "no TLS handshake in time"
-    if isinstance(error, ssl.SSLEOFError):
+    if isinstance(error, HUNG_UP):
         return "hung up in the TLS handshake"
     if isinstance(error, ssl.SSLError):
         return f"TLS: {(error.reason or 'failed').lower().replace('_', ' ')}"

@@ -224,6 +224,11 @@ def test_a_secured_driver_at_a_plain_device_is_told_so() -> None:
         driver.close()
 
 
+@pytest.mark.parametrize("gone", [ssl.SSLEOFError, ssl.SSLZeroReturnError, ssl.SSLSyscallError])
+def test_an_end_that_is_gone_in_the_handshake_has_hung_up_whatever_openssl_calls_it(gone: type[ssl.SSLError]) -> None:
+    assert failure_reason(gone(5, "Some I/O error occurred")) == "hung up in the TLS handshake"
+
+
 def test_an_observer_reads_and_moves_nothing(caplog: pytest.LogCaptureFixture) -> None:
     with device_with(guarded()) as (device, server):
         file = ModbusTcpDevice(port=server.port, reply_timeout_s=2.0, tls=tls("observer"))
