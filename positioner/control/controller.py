@@ -11,7 +11,7 @@ from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode,
 from config.quantities import DeviceStatus
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
-from positioner.control.cutoffs import HIGH, WITHIN
+from positioner.control.cutoffs import HIGH, WITHIN, sent_to_m
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
 from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
@@ -195,6 +195,7 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         experiment,
         monitoring.holding,
         supervision.position_m is not None,
+        cut_off,
     )
     return ControllerMemory(
         command_pa,
@@ -226,7 +227,7 @@ def _supervised(now: Now) -> tuple[MonitorMemory, SupervisionMemory]:
         now.sample.now_s,
         now.stem_m,
         memory.command_pa,
-        _sent_to_m(memory),
+        _sent_to_m(now),
         faulty=memory.supervision.fault is not NO_FAULT,
     )
     return monitoring, supervise(
@@ -317,10 +318,12 @@ def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemo
     return None
 
 
-def _sent_to_m(memory: ControllerMemory) -> float | None:
+def _sent_to_m(now: Now) -> float | None:
     """Return where the law last sent the stem, m; None where it commands nothing."""
-    follows = memory.state is not S3 and memory.supervision.mode is AUTOMATIC and memory.cut_off == WITHIN
-    return memory.reference.value_m if follows and memory.reference.delta_m != 0.0 else None
+    memory, reference = now.memory, now.memory.reference
+    if reference.delta_m == 0.0 or memory.state is S3 or memory.supervision.mode is not AUTOMATIC:
+        return None
+    return reference.value_m if now.stem_m is None else sent_to_m(memory.cut_off, reference.value_m, now.stem_m)
 
 
 def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from config.codes import Fault, InhibitReason, Mode, State
+from positioner.control.cutoffs import WITHIN
 from positioner.control.excitation import ActiveExcitation
 from positioner.control.law_memory import LawMemory
 from positioner.control.monitors import MonitorMemory
@@ -72,3 +73,5 @@ class Decision(NamedTuple):
     """Monitors whose condition holds for their delay, be they alarms or faults."""
     measured: bool = True
     """Whether there was a good measurement since the start."""
+    cut_off: int = WITHIN
+    """The stop onto which the stem is pressed."""

@@ -35,3 +35,10 @@ class Cutoffs:
         if reference_m < self.low_m + self.hysteresis_m * (before == LOW):
             return LOW
         return HIGH if reference_m > self.high_m - self.hysteresis_m * (before == HIGH) else WITHIN
+
+
+def sent_to_m(cut_off: int, reference_m: float, stem_m: float) -> float:
+    """Return where a stem is sent to, m: where it is pressed onto a stop, of all places up to that the nearest."""
+    if cut_off == LOW:
+        return min(reference_m, stem_m)
+    return max(reference_m, stem_m) if cut_off == HIGH else reference_m

@@ -9,12 +9,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import inf, isfinite, nan
 
 from config.codes import Fault, Mode, Ne107Status, Quality, State
 from config.daemon_file import HealthTable
 from config.supervision_table import Ne107Letter, SupervisionTable
 from positioner.control.controller_memory import Decision
+from positioner.control.cutoffs import WITHIN, sent_to_m
 from positioner.control.requests import Requests
 from positioner.control.sample import Sample
 from positioner.daemon.health.health_file import HealthRecord
@@ -85,8 +86,10 @@ class Health:
         self._applied: Applied | None = None
         self._friction_pa = nan
         self._requests = Requests()
+        self._pressed_s = inf
+        """Since when the stem is pressed onto a stop."""
         self.away_m = 0.0
-        """From stem to reference, m; 0 where nobody asks."""
+        """From stem to where it is sent, m; 0 where nobody asks, and on its way onto a stop."""
 
     @classmethod
     def idle(cls, stroke_m: float) -> "Health":
@@ -124,12 +127,15 @@ class Health:
         if sample.quality is not Quality.GOOD or not isfinite(sample.position_m):
             return
         self._travel.enter(sample.position_m)
-        if decision.mode is Mode.AUTOMATIC and decision.state is not State.S3_IDENTIFY:
+        follows = decision.mode is Mode.AUTOMATIC and decision.state is not State.S3_IDENTIFY
+        self._pressed_s = inf if decision.cut_off == WITHIN else min(self._pressed_s, sample.now_s)
+        if follows and decision.cut_off == WITHIN:
             self._stiction.enter(sample.now_s, sample.position_m, decision.reference_m)
-            self.away_m = abs(sample.position_m - decision.reference_m)
         else:
             self._stiction.interrupt()
-            self.away_m = 0.0
+        under_way = self._pressed_s <= sample.now_s < self._pressed_s + self.settings.settle_s
+        asked_m = sent_to_m(decision.cut_off, decision.reference_m, sample.position_m)
+        self.away_m = abs(sample.position_m - asked_m) if follows and not under_way else 0.0
 
     def _take(self, applied: Applied) -> None:
         self._applied = applied

@@ -13,6 +13,7 @@ from config.slave_file import SlaveFile
 from config.supervision_table import SupervisionTable
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
+from positioner.control.cutoffs import LOW
 from positioner.control.requests import Requests
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.ne107 import Ne107Condition
@@ -234,6 +235,28 @@ def test_a_move_given_up_away_from_its_reference_is_out_of_specification(
     decision = decision._replace(inhibit_reason=reason, reference_m=sample.position_m + away * STROKE_M)
     panel.health.enter(sample, decision, panel.cycle.requests)
     assert ne107_condition(decision, panel.health).causes == causes
+
+
+@pytest.mark.parametrize(
+    ("passed_s", "stem", "causes"),
+    [
+        (2.0, 0.05, (Ne107Cause.TRAVEL_DEVIATION,)),
+        (0.5, 0.05, ()),
+        (2.0, 0.0, ()),
+    ],
+    ids=["it stays open", "on its way", "on its seat"],
+)
+def test_a_stem_that_does_not_go_onto_its_stop_is_out_of_specification(
+    passed_s: float, stem: float, causes: tuple[Ne107Cause, ...]
+) -> None:
+    panel = Panel(LAW)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(0.01)
+    sample, decision = panel.cycle.snapshot.sample, panel.cycle.snapshot.decision
+    shut = decision._replace(inhibit_reason=InhibitReason.CUT_OFF, reference_m=0.009 * STROKE_M, cut_off=LOW)
+    for now_s in (sample.now_s, sample.now_s + passed_s):
+        panel.health.enter(replace(sample, now_s=now_s, position_m=stem * STROKE_M), shut, panel.cycle.requests)
+    assert ne107_condition(shut, panel.health).causes == causes
 
 
 def test_an_overrun_is_told_as_itself_beyond_the_sixteenth_cause() -> None:
