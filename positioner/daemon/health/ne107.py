@@ -44,8 +44,8 @@ MONITORED = {
 }
 """What the monitors find, as a cause."""
 LEFT_AWAY = frozenset({InhibitReason.TRIM_ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT, InhibitReason.CUT_OFF})
-"""Why the law has given a move up, or presses the stem onto a stop and corrects nothing: out of specification where that
-is farther away than `[health] dead_band`."""
+"""Why the law has given a move up, or presses the stem onto a stop and corrects nothing: out of specification where
+that is farther away than `[health] dead_band`."""
 
 FEWEST_MOVES = 5
 """Moves judged before the stiction index counts."""
