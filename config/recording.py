@@ -166,9 +166,7 @@ class Recording(Result):
         if "time_s" not in self.columns or count < 2:
             return f"{count} samples"
         steps = np.diff(self.time_s)
-        period_s = float(np.median(steps))
-        apart = f"{period_s:.4g} s" if period_s >= 1.0 else f"{1e3 * period_s:.4g} ms"
-        return f"{count} samples over {np.sum(steps[steps > 0.0]):.6g} s, {apart} apart"
+        return f"{count} samples over {np.sum(steps[steps > 0.0]):.6g} s, {period_text(float(np.median(steps)))} apart"
 
     def frame_columns(self) -> Mapping[str, Column]:
         """Return the columns."""
@@ -198,6 +196,15 @@ class Recording(Result):
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+
+def period_text(period_s: float) -> str:
+    """Say how far samples lie apart.
+
+    >>> period_text(0.005), period_text(60.0)
+    ('5 ms', '60 s')
+    """
+    return f"{period_s:.4g} s" if period_s >= 1.0 else f"{1e3 * period_s:.4g} ms"
 
 
 def _numbers(name: str, given: ArrayLike) -> Column:

@@ -93,10 +93,9 @@ def searched_forms(
     """
     by = sampling(parts.train.record, valve.valve)
     with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
-        written = write_forms(FORMS, Path(folder))
+        written = write_forms([each for each in FORMS if each.place.function not in elsewhere_than], Path(folder))
         effects = {path: find_effect(path, "forms") for path in written}
-        sought = {path for path, form in written.items() if form.place.function not in elsewhere_than}
-        effects = {path: each for path, each in effects.items() if path in sought and not by.left_out(each)}
+        effects = {path: each for path, each in effects.items() if not by.left_out(each)}
         forms = {path: written[path] for path in effects}
         search = FormSearch(parts, valve, forms, effects, seed, workers, progress, most, against)
         return search.run(base, on_proposal or (lambda _names: None))

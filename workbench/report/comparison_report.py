@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from config.recording import period_text
 from workbench.compare.comparison import ADEQUATE, Comparison, Phase
 from workbench.compare.comparison_sentences import shortened
 from workbench.report.charts import MEASURED, MODEL, Figure, correlation, profiles, spectrum
@@ -89,7 +90,7 @@ def facts(comparison: Comparison) -> str:
     steps = np.diff(time_s)
     forward = steps[steps > 0.0]
     return (
-        f"{time_s.size} samples, {float(np.sum(forward)):.6g} s, one every {1e3 * float(np.median(forward)):.4g} ms"
+        f"{time_s.size} samples, {float(np.sum(forward)):.6g} s, one every {period_text(float(np.median(forward)))}"
         if forward.size
         else f"{time_s.size} samples"
     )

@@ -82,9 +82,8 @@ def why_not(state: "ExperimentState", dcs: "Dcs") -> str:
     """Say why an experiment was not played to its end; of a fault, which."""
     from config.codes import ExperimentState, Fault
 
-    fault = Fault(int(dcs.get("fault")))
-    named = state is ExperimentState.FAULT and fault is not Fault.NONE
-    return f"fault: {fault.text}" if named else state.text
+    fault = Fault(int(dcs.get("fault"))) if state is ExperimentState.FAULT else Fault.NONE
+    return state.text if fault is Fault.NONE else f"fault: {fault.text}"
 
 
 def recorded(folder: Path, valve: str, points: tuple[tuple[float, float], ...]) -> Recording | None:

@@ -13,8 +13,10 @@ from config.slave_file import SlaveFile
 from config.supervision_table import SupervisionTable
 from config.valve_file import load_valve, shipped_valve
 from fieldbus.modbus.register_answers import RegisterError
+from positioner.control.controller_memory import Decision
 from positioner.control.cutoffs import LOW
 from positioner.control.requests import Requests
+from positioner.control.sample import Sample
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.health.valve_health import HealthSettings
@@ -222,16 +224,21 @@ def test_the_class_of_each_fault(
     assert (now.status, now.cause) == (status, cause)
 
 
+def in_automatic() -> tuple[Panel, Sample, Decision]:
+    """Return a panel of a valve in automatic, its sample and what was decided on it."""
+    panel = Panel(LAW)
+    panel.set("mode", Mode.AUTOMATIC)
+    panel.run(0.01)
+    return panel, panel.cycle.snapshot.sample, panel.cycle.snapshot.decision
+
+
 @pytest.mark.parametrize("reason", [InhibitReason.TRIM_ENDED, InhibitReason.EXCURSION_BEYOND_LIMIT])
 @pytest.mark.parametrize(("away", "causes"), [(0.006, (Ne107Cause.TRAVEL_DEVIATION,)), (0.004, ())])
 def test_a_move_given_up_away_from_its_reference_is_out_of_specification(
     reason: InhibitReason, away: float, causes: tuple[Ne107Cause, ...]
 ) -> None:
     """It was good, with the stem 7 % away."""
-    panel = Panel(LAW)
-    panel.set("mode", Mode.AUTOMATIC)
-    panel.run(0.01)
-    sample, decision = panel.cycle.snapshot.sample, panel.cycle.snapshot.decision
+    panel, sample, decision = in_automatic()
     decision = decision._replace(inhibit_reason=reason, reference_m=sample.position_m + away * STROKE_M)
     panel.health.enter(sample, decision, panel.cycle.requests)
     assert ne107_condition(decision, panel.health).causes == causes
@@ -249,10 +256,7 @@ def test_a_move_given_up_away_from_its_reference_is_out_of_specification(
 def test_a_stem_that_does_not_go_onto_its_stop_is_out_of_specification(
     passed_s: float, stem: float, causes: tuple[Ne107Cause, ...]
 ) -> None:
-    panel = Panel(LAW)
-    panel.set("mode", Mode.AUTOMATIC)
-    panel.run(0.01)
-    sample, decision = panel.cycle.snapshot.sample, panel.cycle.snapshot.decision
+    panel, sample, decision = in_automatic()
     shut = decision._replace(inhibit_reason=InhibitReason.CUT_OFF, reference_m=0.009 * STROKE_M, cut_off=LOW)
     for now_s in (sample.now_s, sample.now_s + passed_s):
         panel.health.enter(replace(sample, now_s=now_s, position_m=stem * STROKE_M), shut, panel.cycle.requests)
