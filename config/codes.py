@@ -126,6 +126,7 @@ class InhibitReason(Code):
     )
     STAIRCASE_REVERSED = 26, "the staircase of slides: more pressure takes the stem down: one of the two is reversed"
     CUT_OFF = 27, "the reference is beyond a cut-off, so the stem is pressed onto its stop"
+    PRESSURE_ELSEWHERE = 28, "a slide waits, for the measured pressure is not the one commanded: the supply may be low"
 
 
 class Restored(Code):
@@ -236,6 +237,7 @@ class Ne107Cause(Code):
     OVERRUN = 17, "cycles or replies too slow"
     COMMAND_RATE = 18, "command changes too fast"
     NOT_AT_REST = 19, "the stem does not come to rest"
+    PRESSURE_ELSEWHERE = 20, "the measured pressure is not the one commanded"
 
 
 class EventKind(Code):

@@ -435,13 +435,17 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
 
 
 def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> Reference:
-    """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is."""
+    """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is.
+
+    So it does over S3 where no move was asked for: afterwards the stem may be elsewhere than a reference already there.
+    """
     memory, requests = now.memory, now.requests
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
-    if mode is not AUTOMATIC or memory.supervision.mode is not mode:
+    over_s3 = memory.state is S3 and start.delta_m == 0.0
+    if mode is not AUTOMATIC or memory.supervision.mode is not mode or over_s3:
         start = Reference(start.value_m if now.stem_m is None else now.stem_m)
-    follows = mode is AUTOMATIC and written and not waits
+    follows = mode is AUTOMATIC and written and not waits and not over_s3
     return start.follow(requests.reference_m) if follows else start
 
 

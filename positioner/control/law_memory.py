@@ -131,6 +131,7 @@ def _observed(seen: LawInput) -> StemObservation:
         quantum_m=detector.quantum_m,
         outcome=seen.outcome,
         unsettled=detector.unsettled,
+        pressure_elsewhere=detector.pressure_elsewhere,
     )
     return observation if seen.valve is None else stem_observed(observation, seen.valve, seen.statics.way)
 

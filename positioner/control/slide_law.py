@@ -302,10 +302,16 @@ def _redirected(
 
 
 def _waiting(memory: SlideMemory, observation: StemObservation, settings: SlideSettings) -> SlideMemory:
-    """Say it if the stem is off its reference and does not come to rest; said once, that stays until it does."""
+    """Say why the stem is off its reference and is not moved: it does not come to rest, or not under what is commanded.
+
+    Said once, that stays until it does.
+    """
     assert memory.target_m is not None
     off = abs(memory.target_m - observation.position_m) > settings.dead_band_m + observation.quantum_m
-    return _because(memory, InhibitReason.NOT_AT_REST) if observation.unsettled and off else memory
+    if not off or not (observation.unsettled or observation.pressure_elsewhere):
+        return memory
+    reason = InhibitReason.PRESSURE_ELSEWHERE if observation.pressure_elsewhere else InhibitReason.NOT_AT_REST
+    return _because(memory, reason)
 
 
 def _next_slide(

@@ -46,6 +46,8 @@ class StemObservation:
     """Of the last change of the command, in the step in which it is known."""
     unsettled: bool = False
     """Whether it should long have come to rest."""
+    pressure_elsewhere: bool = False
+    """Whether it last rested under another pressure than the one commanded."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ CLASS = {
     Ne107Cause.BEYOND_LIMITS: Ne107Status.OUT_OF_SPECIFICATION,
     Ne107Cause.STUCK: Ne107Status.OUT_OF_SPECIFICATION,
     Ne107Cause.NOT_AT_REST: Ne107Status.OUT_OF_SPECIFICATION,
+    Ne107Cause.PRESSURE_ELSEWHERE: Ne107Status.OUT_OF_SPECIFICATION,
     Ne107Cause.FRICTION_HIGH: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.FRICTION_LOW: Ne107Status.MAINTENANCE_REQUIRED,
     Ne107Cause.STICTION: Ne107Status.MAINTENANCE_REQUIRED,
@@ -85,6 +86,7 @@ def ne107_condition(decision: Decision, health: Health) -> Ne107Condition:
         Ne107Cause.BEYOND_LIMITS: decision.inhibit_reason is InhibitReason.LAW_BEYOND_LIMITS,
         Ne107Cause.STUCK: decision.inhibit_reason is InhibitReason.STUCK,
         Ne107Cause.NOT_AT_REST: decision.inhibit_reason is InhibitReason.NOT_AT_REST,
+        Ne107Cause.PRESSURE_ELSEWHERE: decision.inhibit_reason is InhibitReason.PRESSURE_ELSEWHERE,
     }
     of_faults = health.settings.fault_classes
     classes = {

@@ -7,6 +7,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
 
     stem_at_rest, landing_detector    does the stem rest, and where; which rests are landings, sample by sample
     pressure_arrival                  has the measured pressure followed the command, and what a stem takes from then on
+    pressure_delivered                is the pressure measured at a rest the one commanded
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
     extended_balance                  the same of a valve whose effects are known
     swing                             how far past its balance a stem swings and sticks there

@@ -5,7 +5,8 @@ of the moving stem holds where it rests. No landing is
 
 - a rest of a stem that moved against the last step: a braked stem is held by friction, anywhere in its band,
 - a rest at a stop, where the stop bears the rest,
-- a rest under a pressure that still moves (`stem_at_rest`).
+- a rest under a pressure that still moves (`stem_at_rest`), or that is another than the one commanded: of where the
+  stem is then nothing is said, and it is waited for.
 
 How long a stem takes to answer is learnt: a stem that has not moved may yet, so it is waited for as long as the longest
 answer seen, for the size of the step (a rate limit), or, where the pressure is measured, from its arrival on
@@ -13,6 +14,7 @@ answer seen, for the size of the step (a rate limit), or, where the pressure is 
 longest answer has gone by has been set free by something else: that says nothing of how long it takes.
 """
 
+from collections.abc import Callable
 from math import hypot, isnan, nan, sqrt
 from typing import NamedTuple
 
@@ -86,20 +88,37 @@ class Answers(NamedTuple):
     """... from steps like this."""
 
 
+class Supposed(NamedTuple):
+    """A rest that may be one under the command: m, Pa."""
+
+    rest: Rest
+    command_pa: float
+    direction: int
+    """In which the stem has visibly come there, 0: it has not moved, or how is not known."""
+
+
 class LandingDetector:
     """The rests of a stem and how they came about.
 
     Args:
         stroke_m: full travel, m.
         stops_m: positions of the stops, m; by default 0 and the stroke.
+        believed: whether a rest is one under the command in force; by default each is.
 
     Attributes:
         answers: of the stem.
         rest: of the stem under the command in force; None while it moves or may yet move.
         quantum_m: of the position, whose steps are multiples of it; 0 until a sample differed from the one before it.
+        pressure_elsewhere: whether the last rest was not believed to be one under the command.
     """
 
-    def __init__(self, stroke_m: float, stops_m: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        stroke_m: float,
+        stops_m: tuple[float, float] | None = None,
+        believed: Callable[[Supposed], bool] = lambda _rest: True,
+    ) -> None:
+        self._believed = believed
         self._stroke_m, self._finest_m = stroke_m, FINEST_QUANTUM * stroke_m
         self._finer_m = 2 * self._finest_m
         """A divisor of a quantum below this would be finer than the finest."""
@@ -122,6 +141,7 @@ class LandingDetector:
         self._level_s = self._interval_s = self._time_s = 0.0
         self.rest: Rest | None = None
         self.quantum_m = 0.0
+        self.pressure_elsewhere = False
 
     def _patience_s(self, rest: Rest) -> float:
         """Return for how long a stem must have been waited for: longer, if it has not moved after a large step."""
@@ -181,9 +201,7 @@ class LandingDetector:
             if self.rest is not None and rest is not None and not rest.crept_m:
                 self.rest = rest
             return None
-        if rest is None or time_s - self._level_s < self._patience_s(rest):
-            return None
-        if rest.std_m > PRECISE * self._stroke_m and rest.count < LONG:
+        if rest is None or not self._waited_for(time_s, rest) or not self._under_its_command(rest):
             return None
         self.rest, self._away = rest, 0
         self._window.learn_noise(rest)
@@ -191,6 +209,19 @@ class LandingDetector:
         self._answered = self._answered or (outcome is not None and outcome.moved)
         self._known = self._known or self._answered
         return outcome
+
+    def _waited_for(self, time_s: float, rest: Rest) -> bool:
+        """Whether a stem that seems to rest has been waited for long enough."""
+        precise = rest.std_m <= PRECISE * self._stroke_m or rest.count >= LONG
+        return precise and time_s - self._level_s >= self._patience_s(rest)
+
+    def _under_its_command(self, rest: Rest) -> bool:
+        """Whether a rest is one under the command in force; if not, what that did is not known, and is waited for."""
+        slid = not self._known and abs(rest.position_m - self._from_m) > self._visible_m(rest)
+        self.pressure_elsewhere = not self._believed(Supposed(rest, self._level_pa, self._sense if slid else 0))
+        if self.pressure_elsewhere:
+            self.interrupt()
+        return not self.pressure_elsewhere
 
     def interrupt(self) -> None:
         """Take note that something else than the commands may have moved the stem: what they did is not known."""

@@ -2,6 +2,10 @@
 
 The newest landings count, `EACH` in either direction, so that a spring or a packing that changes is followed. What
 others say of b/c and k/c is tested on them: `tested` refuses what lands elsewhere than the stem did.
+
+A rest counts as one under its command if the pressure measured there is what such commands have given
+(`pressure_delivered`), or if the stem is where the law has it under the command all the same: then it is the
+measurement of the pressure that is wrong.
 """
 
 from collections import deque
@@ -14,14 +18,17 @@ from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.estimates import Estimates
 from positioner.estimation.landings import local_balance
 from positioner.estimation.landings.extended_balance import contradicted
-from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome
+from positioner.estimation.landings.landing_detector import Answers, LandingDetector, SlideOutcome, Supposed
 from positioner.estimation.landings.landing_shift import shifted
+from positioner.estimation.landings.pressure_delivered import PressureDelivered
 from positioner.estimation.landings.static_law import StaticLaw, no_static_law, static_law
 from positioner.estimation.landings.swing import balanced
 
 LONGEST_WAY, OFF, LIKE = 0.03, 1e-3, 0.15
 """Of the stroke: a stuck stem gives way no farther; a slide may land so far from where it should, or by a share of its
 way."""
+AS_COMMANDED = 0.02
+"""Of the pressure over the stroke: a stem that rests so near where the law has it has the pressure commanded."""
 IN_A_ROW = 4
 EACH = 20
 """Landings remembered in a direction."""
@@ -58,7 +65,8 @@ class StaticIdentification:
         self.way = 0
         self._each = each
         known_m = None if valve is None else valve.stops_indicated_m
-        self.detector = LandingDetector(stroke_m, stops_m or known_m)
+        self.detector = LandingDetector(stroke_m, stops_m or known_m, self._believed)
+        self._delivered = PressureDelivered()
         self._tested: tuple[Estimates, StaticLaw, Estimates] | None = None
         self.restart()
 
@@ -106,6 +114,29 @@ class StaticIdentification:
         if outcome.landing:
             self._take(outcome)
         return outcome
+
+    def _believed(self, supposed: Supposed) -> bool:
+        """Whether a stem rests under the pressure that is commanded."""
+        pressure_pa, command_pa = supposed.rest.pressure_pa, supposed.command_pa
+        believed = self._delivered.agrees(command_pa, pressure_pa) or self._rests_by_law(supposed)
+        if believed:
+            self._delivered.add(command_pa, pressure_pa)
+        return believed
+
+    def _rests_by_law(self, supposed: Supposed) -> bool:
+        """Whether a stem rests where the law has it: after a slide at its balance, else anywhere in its band."""
+        law, s = self.law, supposed.direction
+        if not law.valid:
+            return False
+        position_m = supposed.rest.position_m
+        if self._valve is not None:
+            position_m = self._valve.stem_m(position_m, s or self.way)
+        down_pa, up_pa = (
+            local_balance.landing_pa(position_m, way, law.ratios, self.balances, self._stroke_m) for way in (-1, 1)
+        )
+        low_pa, high_pa = (up_pa if s > 0 else down_pa), (down_pa if s < 0 else up_pa)
+        near_pa = AS_COMMANDED * -law.ratios.b_over_c * self._stroke_m
+        return low_pa - near_pa <= supposed.command_pa <= high_pa + near_pa
 
     def _of_stem(self, outcome: SlideOutcome, valve: ExtendedValve) -> SlideOutcome:
         """Return an outcome with the positions of the stem in place of those indicated."""

@@ -86,6 +86,8 @@ class Rest:
     """How far short of its balance it may have stuck."""
     crept_m: float = 0.0
     """How far it has crept towards it since a quarter of the time; it goes on."""
+    pressure_pa: float = nan
+    """Measured, a mean; NaN: it is not."""
 
 
 class RestWindow:
@@ -193,6 +195,7 @@ class RestWindow:
             count=late_m.size * self._each,
             came_to_rest_s=float(time_s[first]) if first else 0.0,
             short_m=_short_m(time_s[: first + 1], position_m[: first + 1]),
+            pressure_pa=float(pressure_pa[half:].mean()),
         )
 
     def _creeping(

@@ -1,0 +1,85 @@
+"""An air supply that gives less than is commanded, for a while: what the stem does then is no answer to the command."""
+
+import pytest
+
+from config.codes import InhibitReason, Ne107Cause, Ne107Status
+from positioner.daemon.health import ne107_condition
+from tests.control.pneumatic_valve import AREA_M2, COULOMB_N, GOOD_PA, PRELOAD_N, SPRING_N_PER_M, Loop
+
+
+def assert_true(loop: Loop) -> None:
+    law = loop.cycle.snapshot.decision.static_law
+    for found, true in (
+        (law.slope, SPRING_N_PER_M / AREA_M2),
+        (law.up, (COULOMB_N + PRELOAD_N) / AREA_M2),
+        (law.down, (COULOMB_N - PRELOAD_N) / AREA_M2),
+    ):
+        assert found.std < 5e-3 * abs(true)
+        assert abs(found.value - true) < 3.0 * found.std
+
+
+@pytest.mark.parametrize(("lost_s", "supply_pa"), [(10.0, 0.0), (10.0, 50e3), (25.0, 0.0), (25.0, 50e3), (40.0, 20e3)])
+def test_an_identification_waits_for_the_supply(lost_s: float, supply_pa: float) -> None:
+    loop = Loop()
+    loop.begin()
+    loop.cycles(lost_s)
+    loop.valve.supply_pa = supply_pa
+    loop.cycles(40.0)
+    waited = loop.why
+    loop.valve.supply_pa = GOOD_PA
+    loop.cycles(150.0)
+    loop.end()
+    assert waited is InhibitReason.PRESSURE_ELSEWHERE
+    assert loop.cycle.snapshot.decision.applied.ratios is not None
+    assert_true(loop)
+
+
+@pytest.mark.parametrize(("low_pu", "high_pu"), [(0.3, 0.7), (0.5, 0.51)])
+def test_a_move_waits_for_the_supply_and_lands_when_it_is_back(low_pu: float, high_pu: float) -> None:
+    loop = Loop().identified()
+    assert abs(loop.step_to(low_pu, 60.0)) < 1e-3
+    loop.valve.supply_pa = 20e3
+    loop.step_to(high_pu, 5.0)
+    sent_pa = loop.cycle.snapshot.decision.command_pa
+    loop.cycles(60.0)
+    decision = loop.cycle.snapshot.decision
+    assert decision.command_pa == sent_pa
+    assert decision.inhibit_reason is InhibitReason.PRESSURE_ELSEWHERE
+    condition = ne107_condition(decision, loop.health)
+    assert Ne107Cause.PRESSURE_ELSEWHERE in condition.causes
+    assert condition.status is Ne107Status.OUT_OF_SPECIFICATION
+    loop.valve.supply_pa = GOOD_PA
+    loop.cycles(20.0)
+    assert abs(loop.error_at(high_pu)) < 1e-3
+    assert loop.why is InhibitReason.NOTHING
+    assert_true(loop)
+
+
+def test_a_stem_that_a_lost_supply_takes_away_comes_back_by_itself() -> None:
+    loop = Loop().identified()
+    assert abs(loop.step_to(0.6, 20.0)) < 1e-3
+    loop.valve.supply_pa = 30e3
+    loop.cycles(30.0)
+    assert loop.error_at(0.6) < -0.1
+    assert loop.why is InhibitReason.PRESSURE_ELSEWHERE
+    loop.valve.supply_pa = GOOD_PA
+    loop.cycles(20.0)
+    assert abs(loop.error_at(0.6)) < 1e-3
+    assert abs(loop.step_to(0.4, 20.0)) < 1e-3
+
+
+@pytest.mark.parametrize("scale", [0.1, 14.5])
+def test_a_register_of_another_scale_is_no_lost_supply(scale: float) -> None:
+    loop = Loop(lambda actuator_pa: scale * actuator_pa + 500.0).identified()
+    assert_true(loop)
+    assert abs(loop.step_to(0.3, 20.0)) < 1e-3
+
+
+def test_a_pressure_sensor_that_stands_still_does_not_stop_the_stem() -> None:
+    loop = Loop().identified()
+    assert abs(loop.step_to(0.6, 20.0)) < 1e-3
+    stands_pa = loop.valve.pressure_pa
+    loop.valve.measured = lambda _actuator_pa: stands_pa
+    for reference_pu in (0.3, 0.35, 0.8, 0.79):
+        assert abs(loop.step_to(reference_pu, 20.0)) < 1e-3
+        assert loop.why is InhibitReason.NOTHING
