@@ -435,18 +435,18 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
 
 
 def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> Reference:
-    """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is.
+    """Return the reference in force. Where no move was asked for it follows the stem: delta r counts from where that is.
 
-    So it does over S3 where no move was asked for: afterwards the stem may be elsewhere than a reference already there.
+    Over S3, too, and after it, for the stem may then be elsewhere than a reference already there.
     """
     memory, requests = now.memory, now.requests
+    stands = Reference(memory.reference.value_m if now.stem_m is None else now.stem_m)
+    start = memory.reference if memory.supervision.mode is mode is AUTOMATIC else stands
     written = requests.reference_writes != consumed.reference_writes
-    start = memory.reference
     over_s3 = memory.state is S3 and start.delta_m == 0.0
-    if mode is not AUTOMATIC or memory.supervision.mode is not mode or over_s3:
-        start = Reference(start.value_m if now.stem_m is None else now.stem_m)
     follows = mode is AUTOMATIC and written and not waits and not over_s3
-    return start.follow(requests.reference_m) if follows else start
+    reference = start.follow(requests.reference_m) if follows else start
+    return reference if reference.delta_m != 0.0 else stands
 
 
 def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
