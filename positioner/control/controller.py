@@ -435,18 +435,20 @@ def _consumed(now: Now, supervision: SupervisionMemory) -> ConsumedRequests:
 
 
 def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool) -> Reference:
-    """Return the reference in force. Where no move was asked for it follows the stem: delta r counts from where that is.
+    """Return the reference in force. Outside automatic it follows the stem: delta r counts from where the stem is.
 
-    Over S3, too, and after it, for the stem may then be elsewhere than a reference already there.
+    So it does where what is asked for is in force already and the stem is elsewhere: S3 may have taken it there.
     """
     memory, requests = now.memory, now.requests
-    stands = Reference(memory.reference.value_m if now.stem_m is None else now.stem_m)
-    start = memory.reference if memory.supervision.mode is mode is AUTOMATIC else stands
     written = requests.reference_writes != consumed.reference_writes
-    over_s3 = memory.state is S3 and start.delta_m == 0.0
-    follows = mode is AUTOMATIC and written and not waits and not over_s3
-    reference = start.follow(requests.reference_m) if follows else start
-    return reference if reference.delta_m != 0.0 else stands
+    start = memory.reference
+    stands = Reference(start.value_m if now.stem_m is None else now.stem_m)
+    if mode is not AUTOMATIC or memory.supervision.mode is not mode:
+        start = stands
+    if mode is not AUTOMATIC or not written or waits:
+        return start
+    reference = start.follow(requests.reference_m)
+    return reference if reference.delta_m != 0.0 or memory.state is S3 else stands.follow(requests.reference_m)
 
 
 def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
