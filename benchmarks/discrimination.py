@@ -77,9 +77,9 @@ def player(made: Hidden, dirty: bool, seed: int) -> Player:
 
     def play(chosen: DesignedExperiment) -> Played:
         trial = Trial(chosen.course.sampled(PERIOD_S)[1], PERIOD_S)
-        answer_m = trial.with_disturbances_m(truth, generator) if dirty else trial.answer_m(truth, truth.theta)
+        answer = trial.with_disturbances(truth, generator) if dirty else trial.answer(truth, truth.theta)
         sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
-        whole = trial.recording(answer_m, sensor)
+        whole = trial.recording(answer.indicated_m, sensor, answer.pressure_pa)
         settled = whole.time_s >= REST_S
         return Played(Recording({name: column[settled] for name, column in whole.columns.items()}))
 
@@ -94,7 +94,7 @@ def line(case: Line, how: Sequence[str], workers: int) -> Line:
     began_s = time.perf_counter()
     library = {name: shipped_effect(name, "library") for name in shipped_effects()}
     dirty = case["setting"] == "dirty"
-    made = hide(case["seed"], dirty=dirty)
+    made = hide(case["seed"], dirty=dirty, pressure=True)
     recordings = [made.fit, made.test]
     whole = joined(recordings)
     base = fit(whole, made.base, profile=False, workers=workers)

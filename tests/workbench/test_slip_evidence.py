@@ -36,7 +36,7 @@ def dirty(valve: ValveFile, seed: int) -> Recording:
     """Return a recording of a valve with pressure noise and break-away jitter, by a transmitter of 12 bits."""
     generator = np.random.default_rng(seed)
     trial = Trial(pressures(generator, ROWS), PERIOD_S)
-    answer_m = trial.with_disturbances_m(Composition.from_file(valve), generator)
+    answer_m = trial.with_disturbances(Composition.from_file(valve), generator).indicated_m
     return trial.recording(answer_m, Sensor(noise_std_m=NOISE_M, quantum_m=valve.valve.stroke_m / LEVELS, seed=seed))
 
 

@@ -52,6 +52,7 @@ def hide(
     *,
     effects: int | Sequence[str] = 1,
     dirty: bool = False,
+    pressure: bool = False,
     duration_s: float = 30.0,
     period_s: float = 0.01,
 ) -> Hidden:
@@ -61,6 +62,7 @@ def hide(
         seed: of all that is drawn.
         effects: how many are drawn and hidden, or which: names, or paths of own effects' files.
         dirty: see `workbench.blind.trial`.
+        pressure: whether the pressure in the actuator is measured besides.
         duration_s: of each recording.
         period_s: of its samples.
 
@@ -80,7 +82,7 @@ def hide(
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
     truth, answers = _moving(trials, drawn, valve, known, for_effects)
     fit, test = (
-        _recorded(trial, truth, clean_m, dirty, generator)
+        _recorded(trial, truth, clean_m, generator, dirty=dirty, pressure=pressure)
         for trial, clean_m, generator in zip(trials, answers, (for_fit, for_test), strict=True)
     )
     answer = {
@@ -107,12 +109,16 @@ def _moving(
             return truth, answers
 
 
-def _recorded(trial: Trial, truth: ValveFile, clean_m: Column, dirty: bool, generator: Draw) -> tuple[Recording, float]:
+def _recorded(
+    trial: Trial, truth: ValveFile, clean_m: Column, generator: Draw, *, dirty: bool, pressure: bool
+) -> tuple[Recording, float]:
     """Return the recording and its floor, m."""
+    composition = Composition.from_file(truth)
     quantum_m = truth.valve.stroke_m / LEVELS if dirty else 0.0
     sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
-    answer_m = trial.with_disturbances_m(Composition.from_file(truth), generator) if dirty else clean_m
-    recording = trial.recording(answer_m, sensor)
+    dirt = trial.with_disturbances(composition, generator) if dirty else None
+    answer = dirt or trial.answer(composition, composition.theta)
+    recording = trial.recording(answer.indicated_m, sensor, answer.pressure_pa if pressure else None)
     return recording, float(np.sqrt(np.mean((recording.position_m - clean_m) ** 2)))
 
 

@@ -11,6 +11,7 @@ scipy to the clean answer from the true values: no code is shared with `workbenc
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -20,7 +21,7 @@ from config.slave_file import Sensor
 from config.valve_file import ValveFile
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS, Composition
 from sim.karnopp import TOLERANCE, Vector, read
-from sim.open_loop import INDICATED, PATH_ROWS, STEP_S, at_rest, follow
+from sim.open_loop import INDICATED, PATH_ROWS, PRESSURE, STEP_S, at_rest, follow
 from sim.transmitter import Transmitter
 from workbench.blind.input_signal import lead_in
 
@@ -30,12 +31,21 @@ PRESSURE_NOISE_PA, CORRELATION_S = 300.0, 0.2
 BREAK_AWAY_JITTER = 0.04
 LEVELS = 2**12
 DISTURBED_EVERY_S = 2e-3
+PRESSURE_STEP_PA = 100.0
+"""Of the measured pressure: whole millibars."""
 COARSE_S = 1e-3
 """Step of the refit."""
 SCALES = ((100.0, 1e-3), (30.0, 3e-4), (5.0, 1e-4))
 """Of the soft-L1 loss, in standard deviations of the noise, and of the differences, as the cost is a staircase."""
 MOST_STATIC = 1.6
 """log(F_s / F_c) at most."""
+
+
+class Answer(NamedTuple):
+    """What a valve indicates at the samples, m, (n,), before the transmitter, and the pressure in its actuator, Pa."""
+
+    indicated_m: Column
+    pressure_pa: Column
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +57,18 @@ class Trial:
 
     def answer_m(self, composition: Composition, theta: Vector, step_s: float = STEP_S) -> Column:
         """Return what a clean valve indicates at the samples, m, (n,); theta, (parameters,), as `Composition.names`."""
+        return self.answer(composition, theta, step_s).indicated_m
+
+    def answer(self, composition: Composition, theta: Vector, step_s: float = STEP_S) -> Answer:
+        """Return what a clean valve answers; arguments as of `answer_m`."""
         vector = theta.copy()
         state = self._before(composition, vector)
         follow(composition, vector, state, self.lead_in_pa, self.period_s, step_s)
-        return follow(composition, vector, state, self.command_pa[:-1], self.period_s, step_s).indicated_m
+        response = follow(composition, vector, state, self.command_pa[:-1], self.period_s, step_s)
+        return Answer(response.indicated_m, response.pressure_pa)
 
-    def with_disturbances_m(self, composition: Composition, generator: np.random.Generator) -> Column:
-        """Return what a dirty valve indicates at the samples, m, (n,), before the transmitter."""
+    def with_disturbances(self, composition: Composition, generator: np.random.Generator) -> Answer:
+        """Return what a dirty valve answers."""
         parts = max(1, round(self.period_s / DISTURBED_EVERY_S))
         h = self.period_s / parts
         commands = np.repeat(np.concatenate([self.lead_in_pa, self.command_pa[:-1]]), parts)
@@ -62,7 +77,7 @@ class Trial:
         state = self._before(composition, theta)
         command_pa, path = np.empty(1), np.empty((PATH_ROWS, 2))
         go_on = composition.kernel.respond.bound(theta, state, command_pa, np.array([h]), STEP_S, TOLERANCE, path)
-        indicated_m, moved = [read(state).indicated], True
+        answers, moved = [(read(state).indicated, read(state).p)], True
         for command in commands.tolist():
             rests = read(state).v == 0.0
             if moved and rests:
@@ -71,17 +86,22 @@ class Trial:
             moved = not rests
             command_pa[0] = command
             go_on()
-            indicated_m.append(path[INDICATED, -1])
-        return np.array(indicated_m[self.lead_in_pa.size * parts :: parts])
+            answers.append((path[INDICATED, -1], path[PRESSURE, -1]))
+        return Answer(*np.array(answers[self.lead_in_pa.size * parts :: parts]).T)
 
-    def recording(self, indicated_m: Column, sensor: Sensor) -> Recording:
-        """Return the recording that a transmitter makes of indicated positions, m, (n,)."""
+    def recording(self, indicated_m: Column, sensor: Sensor, pressure_pa: Column | None = None) -> Recording:
+        """Return the recording that a transmitter makes of indicated positions, m, and another of pressures, Pa, (n,).
+
+        None: the pressure is not measured.
+        """
         transmitter = Transmitter(sensor)
         columns = {
             "time_s": np.arange(self.command_pa.size) * self.period_s,
             "command_pa": self.command_pa,
             "position_m": np.array([transmitter.measure(each) for each in indicated_m.tolist()]),
         }
+        if pressure_pa is not None:
+            columns["pressure_pa"] = PRESSURE_STEP_PA * np.round(pressure_pa / PRESSURE_STEP_PA)
         return Recording(columns, {"source": "positioner hide"})
 
     @property

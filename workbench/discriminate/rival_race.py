@@ -252,7 +252,7 @@ class RivalRace:
             others = tuple(each for each in here.valve.effect if each.name != name)
             bare = ValveFile(valve=self.fits[self.best].valve.valve, effect=others)
             how: dict[str, Any] = {"seed": self._seed, "workers": self._workers, "profile": False}
-            base = bases.get(others) or fit(self._whole, bare, **how)
+            base = bases.get(others) or fit(self._whole, bare, from_pressure=here.from_pressure, **how)
             bases[others] = base
             there = fit(self._whole, bare, effects=(name,), base=base, **how)
             found[name] = min(here, there, key=lambda each: each.cost)
@@ -265,7 +265,8 @@ class RivalRace:
         """Return a fit to the whole record, from its own parameters and from those that it shares with the best."""
         composition = Composition.from_file(here.valve)
         parameters = free_parameters(composition, tuple(here.parameters))
-        error = SimulationError(FreeRun(composition, self.record), composition, parameters, composition.theta)
+        run = FreeRun(composition, self.record, from_pressure=here.from_pressure)
+        error = SimulationError(run, composition, parameters, composition.theta)
         own = error.coordinates(composition.theta)
         shared = composition.theta.copy()
         bests = Composition.from_file(best.valve)
@@ -298,7 +299,7 @@ class RivalRace:
 
     def _error_m(self, found: Fit) -> np.ndarray[Any, np.dtype[np.float64]]:
         composition = Composition.from_file(found.valve)
-        position_m = FreeRun(composition, self.record).position_m(composition.theta)
+        position_m = FreeRun(composition, self.record, from_pressure=found.from_pressure).position_m(composition.theta)
         return np.where(self.record.valid, position_m - self.record.position_m, np.nan)
 
     @cached_property

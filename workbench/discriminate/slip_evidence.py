@@ -106,7 +106,7 @@ def needed_m(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
     A stem that creeps, or whose friction rises as it slows down, ends elsewhere: so much its landings do not tell.
     """
     composition = Composition.from_file(fit.valve)
-    simulated_m = FreeRun(composition, record).position_m(composition.theta)
+    simulated_m = FreeRun(composition, record, from_pressure=fit.from_pressure).position_m(composition.theta)
     # What leads to where a recording is judged from is not simulated: the stem was there.
     own = replace(record, position_m=np.where(np.isfinite(simulated_m), simulated_m, record.position_m))
     lands = SlipForces(fit, own, first_rows)
@@ -136,7 +136,8 @@ class SlipForces:
         composition = Composition.from_file(fit.valve)
         theta = composition.theta
         parameters = free_parameters(composition, tuple(fit.parameters))
-        self.error = SimulationError(FreeRun(composition, record), composition, parameters, theta)
+        run = FreeRun(composition, record, from_pressure=fit.from_pressure)
+        self.error = SimulationError(run, composition, parameters, theta)
         self.fitted = self.error.coordinates(theta)
         self.landings = Landings(self.error, rests(record))
         pressure_pa = self.error.run.run(theta).pressure_pa

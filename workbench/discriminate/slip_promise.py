@@ -15,6 +15,7 @@ On a valve that scatters a slow ramp of many slips tells more than a large step:
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,9 @@ def promised_by_slips(
             answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
             if answer is None:
                 return nothing
-            forces = [SlipForces(fit, answer, [0], slips.least_m) for fit, slips in rivals]
+            forces = [
+                SlipForces(replace(fit, from_pressure=False), answer, [0], slips.least_m) for fit, slips in rivals
+            ]
             if forces[i].landings.count < FEWEST:
                 return nothing
             left = [each.left(each.fitted) for each in forces]

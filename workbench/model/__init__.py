@@ -10,5 +10,6 @@ Its files:
     thinning                  fewer rows, for a search that is far from its end
     sampling                  with inertia, without, or landing by landing: by how far apart the samples are
     command_between_samples   whether the command changed between them, by where slides end
+    pressure_between_samples  what the measured pressure is between them
     parameters                the coordinates of a fit
 """

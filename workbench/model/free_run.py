@@ -51,6 +51,7 @@ from workbench.model.initial_state import (
     initial_state,
 )
 from workbench.model.lead import Lead, lead_of
+from workbench.model.pressure_between_samples import mean_between_samples_pa
 from workbench.model.sampling import NO_LANDING, Sampling, sampling
 from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
@@ -375,8 +376,10 @@ def _measured(record: Record, by: Sampling) -> Column:
         raise InputError("recording", "has no measured pressure_pa to simulate from")
     if by.slow:
         return record.pressure_pa
-    following = np.append(record.pressure_pa[1:], record.pressure_pa[-1])
-    return np.asarray(0.5 * (record.pressure_pa + following))
+    if record.by_setpoint:
+        following = np.append(record.pressure_pa[1:], record.pressure_pa[-1])
+        return np.asarray(0.5 * (record.pressure_pa + following))
+    return mean_between_samples_pa(record.period_s, record.command_pa, record.pressure_pa, record.segments)
 
 
 def _require_bare_pressure(composition: Composition) -> None:

@@ -1,0 +1,57 @@
+"""What drives a stem between two samples of its pressure: against a lag by hand, and under a supply's noise."""
+
+import numpy as np
+import pytest
+
+from config.recording import Column
+from sim.composition import Composition
+from workbench.blind.hiding import hide
+from workbench.data.record import ready
+from workbench.model.free_run import FreeRun
+from workbench.model.pressure_between_samples import mean_between_samples_pa
+
+PERIOD_S, FINE = 0.01, 200
+COMMAND_PA = np.repeat([30e3, 60e3, 20e3, 45e3, 80e3, 50e3], 60)
+
+
+def lagging(lag_s: float, noise_pa: Column) -> tuple[Column, Column]:
+    """Return samples of a pressure behind a lag, and its means between them; the noise is a line between samples."""
+    h = PERIOD_S / FINE
+    p, samples_pa, means_pa = COMMAND_PA[0], [], []
+    for u in COMMAND_PA.tolist():
+        samples_pa.append(p)
+        passed = [p := u + (p - u) * np.exp(-h / lag_s) for _ in range(FINE)]
+        means_pa.append(np.mean(passed))
+    return np.array(samples_pa) + noise_pa, np.array(means_pa) + 0.5 * (noise_pa + np.append(noise_pa[1:], 0.0))
+
+
+@pytest.mark.parametrize("lag_s", [1e-4, 5e-3, 0.05, 1.0])
+def test_the_mean_behind_a_lag_that_nobody_told(lag_s: float) -> None:
+    noise_pa = 300.0 * np.convolve(
+        np.random.default_rng(1).normal(size=COMMAND_PA.size + 19), np.ones(20) / 20, "valid"
+    )
+    pressure_pa, mean_pa = lagging(lag_s, noise_pa)
+    found_pa = mean_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, COMMAND_PA.size),))
+    assert np.max(np.abs(found_pa - mean_pa)[:-1]) < 250.0
+    assert np.sqrt(np.mean((found_pa - mean_pa)[:-1] ** 2)) < 40.0
+
+
+def test_stretches_are_no_steps_of_each_other() -> None:
+    pressure_pa, _ = lagging(0.02, np.zeros(COMMAND_PA.size))
+    alone_pa = mean_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, 180), (180, COMMAND_PA.size)))
+    assert alone_pa[179] == pressure_pa[179]
+    assert alone_pa[-1] == pressure_pa[-1]
+
+
+@pytest.mark.parametrize("seed", [32004, 37158])
+def test_by_the_measured_pressure_a_true_valve_leaves_a_third_of_what_a_noisy_supply_makes_of_it(seed: int) -> None:
+    """Steps that arrive within a sample were taken for half of them, and left three times as much."""
+    made = hide(seed, dirty=True, pressure=True)
+    composition = Composition.from_file(made.truth)
+    record = ready(made.fit)
+    left_m = {
+        by: np.abs(FreeRun(composition, record, from_pressure=by).position_m(composition.theta) - record.position_m)
+        for by in (False, True)
+    }
+    assert np.nanmedian(left_m[True]) < np.nanmedian(left_m[False]) / 3.0
+    assert np.nanmean(left_m[True] ** 2) < np.nanmean(left_m[False] ** 2)

@@ -1,0 +1,47 @@
+"""Rivals by the measured pressure, where the recordings have it: then a supply's noise drives no stem unseen.
+
+A rival is refitted, and weighed, from the pressure in the actuator on (`pressure_between_samples`), not from the
+command. Not where one of them acts on the pressure path, which is not seen then. Nor where samples lie too far apart
+for it, nor where the best of them by the pressure leaves more than the best by the command: then the sensor of the
+pressure is the worse witness.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from config.recording import Recording
+from sim.effect import Effect
+from workbench.data.held_out import joined
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import local_fit
+from workbench.fit.threads import on_threads
+
+PATH = "pressure"
+
+
+def by_measured_pressure(
+    fits: Mapping[str, Fit], recordings: Sequence[Recording], library: Mapping[str, Effect], workers: int | None
+) -> Mapping[str, Fit]:
+    """Return the rivals from the measured pressure on; as they are where that tells nothing more.
+
+    Args:
+        fits: by the name of the effect in which they differ.
+        recordings: to which they are fitted.
+        library: the effects by name.
+        workers: threads, by default one a core.
+    """
+    measured = all("pressure_pa" in each.columns and "command_pa" in each.columns for each in recordings)
+    on_path = any(PATH in library[name].functions for name in fits if name in library)
+    if not measured or on_path or any(each.by.slow for each in fits.values()):
+        return fits
+    whole = joined(recordings)
+
+    def refitted(fit: Fit) -> Fit:
+        of_path = {
+            each.name for each in fit.valve.effect if each.name in library and PATH in library[each.name].functions
+        }
+        free = [name for name in fit.parameters if name.partition(".")[0] not in of_path]
+        return local_fit(whole, fit.valve, free=free, from_pressure=True, by=fit.by)
+
+    found = dict(zip(fits, on_threads(refitted, list(fits.values()), workers), strict=True))
+    least_m, before_m = (min(fit.rms_m for fit in each.values()) for each in (found, fits))
+    return found if least_m < before_m else fits
