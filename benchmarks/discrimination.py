@@ -1,12 +1,15 @@
 """Sealed valves whose diagnosis ended `one_of`: do experiments tell the rivals apart, and in how many moves?
 
     python -m benchmarks.discrimination [--family clean dirty] [--cases 20] [--seeds 37157 ...] [--how designed menu]
-                                        [--out FILE]
+                                        [--without-pressure] [--out FILE]
 
 The cases are those of the kept blind campaign (`benchmarks.blind`) whose diagnosis against the whole library ended in
 one set with more than one class, the hidden effect visible: the same seeds make the same valves, and the rivals are the
 set that was named then, fitted anew to both recordings. The valve answers as `workbench.blind.trial` has it, dirty ones
 with pressure noise, break-away jitter and 12 bits; the hidden effect is looked at after the last round.
+
+A positioner's slave serves the pressure in its actuator, and a diagnosis that has it drops what it speaks against: so
+are rivals dropped here. Where one class is left, nothing is played. With `--without-pressure` nothing of it is known.
 
 Each case is played twice: by experiments designed for the rivals, and by whole inputs of the menu, chosen anew in
 every round as a diagnosis chooses. Odds, permissives and the rule that stops are the same; the menu may use
@@ -17,7 +20,7 @@ import argparse
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +34,7 @@ from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from workbench.blind.hiding import Hidden, hide
 from workbench.blind.trial import LEVELS, NOISE_M, Trial
-from workbench.data.held_out import joined
+from workbench.data.held_out import joined, split
 from workbench.data.record import ready
 from workbench.discriminate.discrimination import (
     BUDGET,
@@ -45,7 +48,10 @@ from workbench.discriminate.discrimination import (
 )
 from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms, courses
 from workbench.discriminate.rival_race import RivalRace
+from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
+from workbench.select.effect_candidates import pressure_speaks_against
+from workbench.select.effect_search import evaluated
 from workbench.select.equivalence import algebraic_class, classes
 from workbench.select.experiment import REST_S, experiment
 
@@ -69,8 +75,8 @@ def menu(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
     return DesignedExperiment(course, np.inf)
 
 
-def player(made: Hidden, dirty: bool, seed: int) -> Player:
-    """Return the sealed valve, which answers experiments."""
+def player(made: Hidden, dirty: bool, seed: int, *, pressure: bool) -> Player:
+    """Return the sealed valve, which answers experiments, with the pressure or without."""
     generator = np.random.default_rng(seed)
     truth = Composition.from_file(made.truth)
     quantum_m = made.truth.valve.stroke_m / LEVELS if dirty else 0.0
@@ -79,7 +85,7 @@ def player(made: Hidden, dirty: bool, seed: int) -> Player:
         trial = Trial(chosen.course.sampled(PERIOD_S)[1], PERIOD_S)
         answer = trial.with_disturbances(truth, generator) if dirty else trial.answer(truth, truth.theta)
         sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
-        whole = trial.recording(answer.indicated_m, sensor, answer.pressure_pa)
+        whole = trial.recording(answer.indicated_m, sensor, answer.pressure_pa if pressure else None)
         settled = whole.time_s >= REST_S
         return Played(Recording({name: column[settled] for name, column in whole.columns.items()}))
 
@@ -89,12 +95,21 @@ def player(made: Hidden, dirty: bool, seed: int) -> Player:
 HOW: dict[str, tuple[Designer, int]] = {"designed": (by_run_or_slips, BUDGET), "menu": (menu, MENU_BUDGET)}
 
 
-def line(case: Line, how: Sequence[str], workers: int) -> Line:
+def not_contradicted(fits: Mapping[str, Fit], made: Hidden) -> dict[str, Fit]:
+    """Return the fits that the measured pressure does not speak against."""
+    parts = split([made.fit], made.test)
+    models = {name: evaluated(each, parts) for name, each in fits.items()}
+    return {
+        name: each for name, each in fits.items() if not pressure_speaks_against(models[name], list(models.values()))
+    }
+
+
+def line(case: Line, how: Sequence[str], workers: int, *, pressure: bool) -> Line:
     """Play a case by either or both; return what is kept of it."""
     began_s = time.perf_counter()
     library = {name: shipped_effect(name, "library") for name in shipped_effects()}
     dirty = case["setting"] == "dirty"
-    made = hide(case["seed"], dirty=dirty, pressure=True)
+    made = hide(case["seed"], dirty=dirty, pressure=pressure)
     recordings = [made.fit, made.test]
     whole = joined(recordings)
     base = fit(whole, made.base, profile=False, workers=workers)
@@ -102,6 +117,7 @@ def line(case: Line, how: Sequence[str], workers: int) -> Line:
         name: fit(whole, made.base, effects=(name,), base=base, profile=False, workers=workers)
         for name in case["sets"][0]
     }
+    rivals = not_contradicted(rivals, made)
     commands_pa = ready(whole).command_pa
     stroke_m = made.base.valve.stroke_m
     bounds = Bounds(
@@ -111,7 +127,7 @@ def line(case: Line, how: Sequence[str], workers: int) -> Line:
         name: discriminate(
             rivals,
             recordings,
-            player(made, dirty, case["seed"]),
+            player(made, dirty, case["seed"], pressure=pressure),
             bounds,
             library,
             design=HOW[name][0],
@@ -190,6 +206,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=20, help="at most so many (20)")
     parser.add_argument("--seeds", type=int, nargs="*", help="these cases alone")
     parser.add_argument("--how", nargs="*", choices=HOW, default=list(HOW), help="experiments designed, or of the menu")
+    parser.add_argument("--without-pressure", action="store_true", help="the actuator's pressure is not measured")
     parser.add_argument("--workers", type=int, default=1, help="threads (1)")
     parser.add_argument("--out", type=Path, help="where a line a case is kept; those there are not played again")
     arguments = parser.parse_args()
@@ -198,7 +215,7 @@ def main() -> None:
     for case in cases(arguments.family, arguments.seeds)[: arguments.cases]:
         if case["seed"] in there:
             continue
-        done = line(case, arguments.how, arguments.workers)
+        done = line(case, arguments.how, arguments.workers, pressure=not arguments.without_pressure)
         lines.append(done)
         print(f"{done['seed']}: {done['seconds']:g} s", flush=True)
         if arguments.out is not None:
