@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any, take_mapping
 from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
     from config.valve_file import ValveFile
@@ -47,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--budget-s", type=float, metavar="S", help="end after so many seconds, as Ctrl-C does, with what is known then"
     )
+    add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)
 
@@ -58,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from positioner.cli.parts.model_arguments import read_valve, require_effects
     from positioner.cli.parts.naming import files_named, naming
-    from positioner.cli.parts.next_step import discover_command, extend_commands
+    from positioner.cli.parts.next_step import by_pressure_command, discover_command, extend_commands
     from positioner.cli.parts.progress import Progress
     from workbench.data.imposed_motion import is_imposed
     from workbench.diagnosis.diagnosis import diagnose
@@ -91,12 +93,15 @@ def run(arguments: argparse.Namespace) -> int:
             on_preview=_tell_preview,
             progress=progress,
             over=(lambda: time.monotonic() - began_s > budget_s),
+            from_pressure=arguments.from_pressure,
         )
     commands = extend_commands(diagnosis, arguments)
     print(diagnosis.summary())
     _tell_experiment(diagnosis, arguments.experiment)
     for command in commands:
         print(f"to add it: {command}" if len(commands) == 1 else f"one of: {command}")
+    if diagnosis.by_pressure:
+        print(f"to diagnose the stem by the measured pressure: {by_pressure_command(arguments)}")
     if diagnosis.verdict == "unexplained":
         print(f"to look for a form of what the library lacks: {discover_command(arguments)}")
     if arguments.out is not None:

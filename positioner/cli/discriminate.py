@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.output_files import make_folder, write_json
+from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -28,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
     parser.add_argument("--effects", nargs="+", metavar="NAME", help="what is tried (all that come with the package)")
+    add_pressure_argument(parser)
     parser.add_argument("--budget", type=int, default=60, metavar="MOVES", help="moves allowed in all (60)")
     parser.add_argument("--out", type=Path, default=Path("discriminated"), help="where recordings and verdict go")
     parser.add_argument("--name", help="which of the daemon's valves")
@@ -65,7 +67,13 @@ def run(arguments: argparse.Namespace) -> int:
     named = {"recording": ", ".join(map(str, arguments.rec)), "valve file": arguments.valve}
     with naming(named), Progress() as progress:
         found = diagnose(
-            recordings, valve, test=test, effects=arguments.effects, seed=arguments.seed, progress=progress
+            recordings,
+            valve,
+            test=test,
+            effects=arguments.effects,
+            seed=arguments.seed,
+            progress=progress,
+            from_pressure=arguments.from_pressure,
         )
     print(found.sentence, flush=True)
     fits = rivals_of(found)

@@ -6,6 +6,7 @@ from pathlib import Path
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write the journal, to be read in a browser")
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)
 
@@ -58,7 +60,15 @@ def run(arguments: argparse.Namespace) -> int:
     Journal.beside(path)  # what is none is refused before the work begins
     named = files_named(arguments.fit, arguments.test, arguments.valve)
     with naming(named), at_work("extend") as progress:
-        extension = extend(recordings, valve, arguments.effect, test=test, seed=arguments.seed, progress=progress)
+        extension = extend(
+            recordings,
+            valve,
+            arguments.effect,
+            test=test,
+            seed=arguments.seed,
+            progress=progress,
+            from_pressure=arguments.from_pressure,
+        )
     journal = write_extended(extension, path, arguments.out)
     print(extension.summary())
     worth = "" if extension.falls else "written, though the effect is not worth it: "

@@ -22,6 +22,7 @@ from workbench.diagnosis.judged_landings import judged_landings
 from workbench.diagnosis.kept_mass import KeptMass, kept_mass
 from workbench.diagnosis.measured_pressure import ByMeasuredPressure, by_measured_pressure
 from workbench.diagnosis.moved_parameters import Moved, moved_parameters
+from workbench.diagnosis.own_floor import with_own_floor
 from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.diagnosis.stand_in import StandIn, stand_in
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
@@ -40,6 +41,8 @@ from workbench.select.tangent_preview import TangentScore, preview
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+BEFORE_IT = "acts before the measured pressure, which drives the stem"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -176,6 +179,7 @@ def diagnose(
     progress: Progress | None = None,
     race: Race | None = None,
     over: Callable[[], bool] | None = None,
+    from_pressure: bool = False,
 ) -> Diagnosis:
     """Find the effects that a valve file lacks to explain a recording.
 
@@ -192,6 +196,7 @@ def diagnose(
         progress: called with what is being done, and the fraction of it done.
         race: called with each candidate's error as its search goes on.
         over: asked before each simulation; true breaks the diagnosis off.
+        from_pressure: the stem is driven by its measured pressure, and what acts before that is not tried.
 
     Raises:
         BrokenOff: it is over before the valve as it is was fitted, so that nothing is known.
@@ -203,18 +208,24 @@ def diagnose(
     named = [find_effect(name, "effects") for name in (tried_effects() if effects is None else effects)]
     by = sampling(parts.train.record, valve.valve)
     why = {each.written: by.left_out(each) or unseen_without_spring(each, valve.valve) for each in named}
+    if from_pressure:
+        why |= {each.written: BEFORE_IT for each in named if "pressure" in each.functions}
     unseen = {name: each for name, each in why.items() if each}
     library = {each.written: each for each in named if each.written not in there and each.written not in unseen}
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
-    search = EffectSearch(parts, library, valve.valve, seed=seed, workers=threads, progress=tell, race=race)
-
+    search = EffectSearch(
+        parts, library, valve.valve, seed=seed, workers=threads, progress=tell, race=race, from_pressure=from_pressure
+    )
     with ending(over or (lambda: False)):
         base = search.base(valve)
+        if from_pressure:
+            parts = with_own_floor(parts, base.fit)
+            base = search.judged_by(parts, base)
         scores: tuple[TangentScore, ...] = ()
         held = None
         try:
-            if parts.train.record.by_setpoint and not parts.early:
+            if parts.train.record.by_setpoint and not from_pressure and not parts.early:
                 held = positioner_or_packing(
                     parts, base, seed=seed, workers=threads, progress=lambda done: tell("positioner or packing", done)
                 )

@@ -24,7 +24,6 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import fit, profiled
 from workbench.model.free_run import FreeRun
-from workbench.model.sampling import Sampling
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
 
@@ -124,6 +123,7 @@ def extend(
     seed: int = 0,
     workers: int | None = None,
     progress: Progress | None = None,
+    from_pressure: bool = False,
 ) -> Extension:
     """Add effects to a valve file and refit it.
 
@@ -136,6 +136,7 @@ def extend(
         seed: of the searches.
         workers: threads, by default one a core.
         progress: called with what is being done, and the fraction of it done.
+        from_pressure: the stem is driven by its measured pressure; the diagnosis, if any, says itself whether it is.
 
     Raises:
         InputError: the recording holds too little or other units than SI, an unknown effect or one that is there.
@@ -148,7 +149,14 @@ def extend(
     on = split([recording] if isinstance(recording, Recording) else recording, test)
     train = on.train.recording
     if diagnosis is None:
-        before = fit(train, valve, seed=seed, workers=workers, progress=lambda done: tell("fitting without", done))
+        before = fit(
+            train,
+            valve,
+            seed=seed,
+            workers=workers,
+            from_pressure=from_pressure,
+            progress=lambda done: tell("fitting without", done),
+        )
     else:
         before = diagnosis.base.fit
     after = fit(
@@ -166,8 +174,8 @@ def extend(
     before_errors, after_errors = block_errors(before, on), block_errors(after, on)
     return Extension(
         effects=tuple(effects),
-        given_train_rmse_m=_rmse_m(valve, on.train, before.by),
-        given_test_rmse_m=_rmse_m(valve, on.test, before.by),
+        given_train_rmse_m=_rmse_m(valve, on.train, before),
+        given_test_rmse_m=_rmse_m(valve, on.test, before),
         refitted=before,
         refitted_errors=before_errors,
         extended=after,
@@ -187,8 +195,8 @@ def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
     before, after, on = diagnosis.base, diagnosis.best, diagnosis.split
     return Extension(
         effects=diagnosis.missing,
-        given_train_rmse_m=_rmse_m(valve, on.train, before.fit.by),
-        given_test_rmse_m=_rmse_m(valve, on.test, before.fit.by),
+        given_train_rmse_m=_rmse_m(valve, on.train, before.fit),
+        given_test_rmse_m=_rmse_m(valve, on.test, before.fit),
         refitted=before.fit,
         refitted_errors=before.errors,
         extended=after.fit,
@@ -198,8 +206,10 @@ def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
     )
 
 
-def _rmse_m(valve: ValveFile, part: Part, by: Sampling) -> float:
+def _rmse_m(valve: ValveFile, part: Part, like: Fit) -> float:
+    """Return what a valve as it is leaves, m, simulated as a fit was."""
     composition = Composition.from_file(valve)
-    run = FreeRun(composition, part.record, by=by.of(part.record, valve.valve))
+    by = like.by.of(part.record, valve.valve)
+    run = FreeRun(composition, part.record, from_pressure=like.from_pressure, by=by)
     error_m = residual_m(part, run.require_answer(run.position_m(composition.theta)))
     return float(np.sqrt(np.nanmean(error_m**2)))

@@ -91,8 +91,10 @@ class EffectSearch:
         workers: int,
         progress: Progress,
         race: Race | None = None,
+        from_pressure: bool = False,
     ) -> None:
         self._split = split
+        self._from_pressure = from_pressure
         self._library = library
         self._drawn = known
         self._seed = seed
@@ -115,11 +117,17 @@ class EffectSearch:
             seed=self._seed,
             workers=self._workers,
             by=self._by,
+            from_pressure=self._from_pressure,
             profile=False,
             progress=lambda done: self._progress("fitting the valve as it is", done),
         )
         self._by = found.by
         return self._evaluated(found)
+
+    def judged_by(self, split: Split, base: EvaluatedModel) -> EvaluatedModel:
+        """Judge from here on by another floor of the same record; return the base by it."""
+        self._split = split
+        return self._evaluated(base.fit)
 
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""

@@ -7,7 +7,8 @@ A command imports from here what it needs when it runs.
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
-    noise_argument, model_arguments             `--noise-m`; a valve file and effects, checked before the work begins
+    noise_argument, pressure_argument           `--noise-m`; `--from-pressure`
+    model_arguments                             a valve file and effects, checked before the work begins
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out
     page_address                                where a page listens

@@ -1,4 +1,4 @@
-"""What to type after a diagnosis: the command that adds what is missing, one a rival, or that looks for its form."""
+"""What to type after a diagnosis: the command that adds what is missing, one a rival, seeks its form, or asks anew."""
 
 import argparse
 import shlex
@@ -28,7 +28,11 @@ def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str
     """Return the `positioner extend` command that adds effects to the valve of a diagnosis or a discovery."""
     fitted = ["--fit", *map(str, arguments.recordings)]
     return shlex.join(
-        ["positioner", "extend", arguments.valve, "--effect", *effects, *fitted, *_besides(arguments), "-o", OUT]
+        [
+            *("positioner", "extend", arguments.valve, "--effect", *effects, *fitted, *_besides(arguments)),
+            *_driven(arguments),
+            *("-o", OUT),
+        ]
     )
 
 
@@ -36,6 +40,18 @@ def discover_command(arguments: argparse.Namespace) -> str:
     """Return the `positioner discover` command that looks for the form of what a diagnosis leaves unexplained."""
     recordings = [*map(str, arguments.recordings), "--valve", arguments.valve]
     return shlex.join(["positioner", "discover", *recordings, *_besides(arguments), "-o", FORM])
+
+
+def by_pressure_command(arguments: argparse.Namespace) -> str:
+    """Return the same `positioner diagnose` command, of the stem from its measured pressure on."""
+    recordings = [*map(str, arguments.recordings), "--valve", arguments.valve]
+    tried = ["--effects", *arguments.effects] if arguments.effects else []
+    return shlex.join(["positioner", "diagnose", *recordings, *_besides(arguments), *tried, "--from-pressure"])
+
+
+def _driven(arguments: argparse.Namespace) -> list[str]:
+    """Return how the stem is driven; a discovery knows but the command."""
+    return ["--from-pressure"] if getattr(arguments, "from_pressure", False) else []
 
 
 def _besides(arguments: argparse.Namespace) -> list[str]:
