@@ -7,7 +7,7 @@ Its files:
     judged_landings                               how many landings a verdict rests on, where nothing else is judged
     moved_parameters                              what the file's own effects are by the recording
     kept_mass                                     what another mass than the valve file's would leave
-    measured_pressure, own_floor                  what the stem is from the measured pressure on, and how well it can be
+    measured_pressure                             what the stem is from the measured pressure on
     stand_in                                      whether a form without a name does better than what was named
     positioner_or_packing                         what holds a stem behind its positioner
     extension, extension_json                     adds what was found; the same as JSON

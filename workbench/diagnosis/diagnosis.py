@@ -22,7 +22,6 @@ from workbench.diagnosis.judged_landings import judged_landings
 from workbench.diagnosis.kept_mass import KeptMass, kept_mass
 from workbench.diagnosis.measured_pressure import ByMeasuredPressure, by_measured_pressure
 from workbench.diagnosis.moved_parameters import Moved, moved_parameters
-from workbench.diagnosis.own_floor import with_own_floor
 from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
 from workbench.diagnosis.stand_in import StandIn, stand_in
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
@@ -219,9 +218,6 @@ def diagnose(
     )
     with ending(over or (lambda: False)):
         base = search.base(valve)
-        if from_pressure:
-            parts = with_own_floor(parts, base.fit)
-            base = search.judged_by(parts, base)
         scores: tuple[TangentScore, ...] = ()
         held = None
         try:

@@ -64,6 +64,7 @@ Race = Callable[[int, str, float], None]
 """Told of a candidate that is refitted: step, effect, and the rms error, m, that its search has come to so far."""
 S = TypeVar("S")
 T = TypeVar("T", bound="BegunFit | EvaluatedModel | str")
+MAY_BE_NONE = "its interval holds none, and what is left without it is at the floor"
 
 
 @dataclass(slots=True)
@@ -123,11 +124,6 @@ class EffectSearch:
         )
         self._by = found.by
         return self._evaluated(found)
-
-    def judged_by(self, split: Split, base: EvaluatedModel) -> EvaluatedModel:
-        """Judge from here on by another floor of the same record; return the base by it."""
-        self._split = split
-        return self._evaluated(base.fit)
 
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""
@@ -223,6 +219,7 @@ class EffectSearch:
         The interval of an effect's strength follows the cost with all else given way. Where it holds none, the evidence
         may be another's: beside the effect something was searched anew, and ended lower. So the valve without is
         searched from where it ended beside the effect, and the step is judged anew if that leaves the effect nothing.
+        Where the valve without leaves no more than the floor, evidence alone does not prove what may be none.
         """
         base, best = self.with_intervals((steps[0].before, _best(steps[-1])))
         for _ in range(MOST_ADDED):
@@ -244,10 +241,13 @@ class EffectSearch:
         without = self.base(
             ValveFile(valve=valve.valve, effect=tuple(each for each in valve.effect if each.name != own))
         )
-        if bic(without.fit) - bic(best.fit) > LEAST_BIC:
+        has_evidence = bic(without.fit) - bic(best.fit) > LEAST_BIC
+        if has_evidence and not without.at_floor:
             return None
         self._known = _Known(steps[:i], without)
         models = {each.name: each.model or each.rejection_reason for each in steps[i].candidates}
+        if has_evidence:
+            models[added.name] = MAY_BE_NONE
         fits = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
         behind = [name for name, each in fits.items() if log_likelihood_difference(without.fit, each) > LEFT_BEHIND]
         models |= self._refitted(i + 1, without, behind, landed=False)

@@ -1,0 +1,98 @@
+"""A stem that is diagnosed by its measured pressure, and rivals that are raced by it: under a supply that is not quiet."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.recording import Recording
+from positioner.cli.main import main
+from sim.effect import shipped_effect, shipped_effects
+from workbench.blind.hiding import Hidden, hide
+from workbench.data.held_out import joined
+from workbench.diagnosis.diagnosis import diagnose
+from workbench.diagnosis.extension import extend
+from workbench.discriminate.measured_pressure import by_measured_pressure
+from workbench.fit.fit_result import Fit
+from workbench.fit.fitting import fit
+
+LIBRARY = {name: shipped_effect(name, "library") for name in shipped_effects()}
+RIVALS = ("sensor_nonlinearity", "flow_force")
+
+
+@pytest.fixture(scope="module")
+def bowed() -> Hidden:
+    """A bowed sensor in a dirty valve: by the command a flow force does as well."""
+    return hide(32028, dirty=True, pressure=True)
+
+
+def test_by_its_pressure_one_effect_is_named_of_two(bowed: Hidden) -> None:
+    found = diagnose(bowed.fit, bowed.base, test=bowed.test, effects=(*RIVALS, "ip_lag"), workers=2, from_pressure=True)
+    assert found.missing == ("sensor_nonlinearity",)
+    assert [each.name for each in found.steps[0].indistinguishable] == ["sensor_nonlinearity"]
+    assert found.best.fit.from_pressure
+    assert list(found.unseen) == ["ip_lag"]
+    assert "not tried: ip_lag: it acts before the measured pressure, which drives the stem" in found.summary()
+
+
+@pytest.fixture(scope="module")
+def fits(bowed: Hidden) -> dict[str, Fit]:
+    whole = joined([bowed.fit, bowed.test])
+    base = fit(whole, bowed.base, profile=False)
+    return {name: fit(whole, bowed.base, effects=(name,), base=base, profile=False) for name in RIVALS}
+
+
+def test_rivals_are_raced_by_the_pressure_where_it_was_measured(bowed: Hidden, fits: dict[str, Fit]) -> None:
+    raced = by_measured_pressure(fits, [bowed.fit, bowed.test], LIBRARY, 2)
+    assert all(each.from_pressure for each in raced.values())
+    assert raced["sensor_nonlinearity"].rms_m < 0.7 * fits["sensor_nonlinearity"].rms_m
+
+
+def without(recording: Recording) -> Recording:
+    return Recording({name: column for name, column in recording.columns.items() if name != "pressure_pa"})
+
+
+def worse(recording: Recording) -> Recording:
+    """A pressure measured so roughly that the command says more."""
+    noise_pa = 5e3 * np.random.default_rng(5).standard_normal(len(recording))
+    return Recording({**recording.columns, "pressure_pa": recording.columns["pressure_pa"] + noise_pa})
+
+
+@pytest.mark.parametrize("made", [without, worse])
+def test_else_by_the_command(bowed: Hidden, fits: dict[str, Fit], made: Callable[[Recording], Recording]) -> None:
+    assert by_measured_pressure(fits, [made(bowed.fit), bowed.test], LIBRARY, 2) is fits
+
+
+def test_nor_where_one_acts_before_it(bowed: Hidden, fits: dict[str, Fit]) -> None:
+    assert by_measured_pressure({**fits, "ip_lag": fits["flow_force"]}, [bowed.fit, bowed.test], LIBRARY, 2).keys() == {
+        *RIVALS,
+        "ip_lag",
+    }
+    assert not fits["flow_force"].from_pressure
+
+
+def test_what_was_found_by_the_pressure_is_added_by_it(bowed: Hidden) -> None:
+    extension = extend(bowed.fit, bowed.base, ["sensor_nonlinearity"], test=bowed.test, from_pressure=True)
+    assert extension.extended.from_pressure
+    assert extension.extended_errors.test_rmse_m < 0.6 * extension.refitted_errors.test_rmse_m
+
+
+def test_a_recording_without_a_pressure_is_refused_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], bowed: Hidden
+) -> None:
+    without(bowed.fit).write(tmp_path / "rec.csv")
+    assert main(["diagnose", str(tmp_path / "rec.csv"), "--valve", "seed", "--from-pressure"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "rec.csv: has no measured pressure_pa to simulate from" in said
+
+
+def test_what_is_printed_next_keeps_to_the_pressure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], bowed: Hidden
+) -> None:
+    bowed.fit.write(tmp_path / "rec.csv")
+    files = [str(tmp_path / "rec.csv"), "--valve", "seed", "--effects", "sensor_nonlinearity", "--from-pressure"]
+    main(["diagnose", *files])
+    assert "--effect sensor_nonlinearity" in (out := capsys.readouterr().out)
+    assert "--from-pressure -o better.toml" in out
