@@ -2,9 +2,9 @@
 
     python -m benchmarks.measured_pressure [--cases 24] [--seeds 72007 ...] [--nothing] [--out FILE]
 
-The kept campaign has diagnosed them by the command (`benchmarks.blind`, families dirty and nothing). The same seeds make
-the same valves here, whose actuator's pressure is measured besides, to whole millibars, and the stem is diagnosed by
-it: what acts before it is left out. A line of JSON is kept a case, so that a run can be taken up again.
+The kept campaign has diagnosed them by the command (`benchmarks.blind`, families dirty and nothing). The same seeds
+make the same valves here, whose actuator's pressure is measured besides, to whole millibars, and the stem is diagnosed
+by it: what acts before it is left out. A line of JSON is kept a case, so that a run can be taken up again.
 
     alone      the hidden effect, or what is one with it by algebra, is all that is named
     in a set   it is named among others

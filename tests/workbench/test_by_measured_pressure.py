@@ -1,5 +1,6 @@
-"""A stem that is diagnosed by its measured pressure, and rivals that are raced by it: under a supply that is not quiet."""
+"""A stem that is diagnosed by its measured pressure, and rivals that are raced by it, under a supply with noise."""
 
+import argparse
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,7 +8,9 @@ import numpy as np
 import pytest
 
 from config.recording import Recording
+from positioner.cli.diagnose import add_arguments
 from positioner.cli.main import main
+from positioner.cli.parts.next_step import by_pressure_command, extend_command
 from sim.effect import shipped_effect, shipped_effects
 from workbench.blind.hiding import Hidden, hide
 from workbench.data.held_out import joined
@@ -24,7 +27,7 @@ RIVALS = ("sensor_nonlinearity", "flow_force")
 @pytest.fixture(scope="module")
 def bowed() -> Hidden:
     """A bowed sensor in a dirty valve: by the command a flow force does as well."""
-    return hide(32028, dirty=True, pressure=True)
+    return hide(32028, dirty=True, pressure=True, duration_s=20.0)
 
 
 def test_by_its_pressure_one_effect_is_named_of_two(bowed: Hidden) -> None:
@@ -88,11 +91,9 @@ def test_a_recording_without_a_pressure_is_refused_in_a_line(
     assert "rec.csv: has no measured pressure_pa to simulate from" in said
 
 
-def test_what_is_printed_next_keeps_to_the_pressure(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], bowed: Hidden
-) -> None:
-    bowed.fit.write(tmp_path / "rec.csv")
-    files = [str(tmp_path / "rec.csv"), "--valve", "seed", "--effects", "sensor_nonlinearity", "--from-pressure"]
-    main(["diagnose", *files])
-    assert "--effect sensor_nonlinearity" in (out := capsys.readouterr().out)
-    assert "--from-pressure -o better.toml" in out
+def test_what_is_typed_next_keeps_to_the_pressure() -> None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    arguments = parser.parse_args(["rec.csv", "--valve", "seed", "--effects", "preload", "--from-pressure"])
+    assert "--fit rec.csv --from-pressure -o better.toml" in extend_command(["preload"], arguments)
+    assert by_pressure_command(arguments).endswith("rec.csv --valve seed --effects preload --from-pressure")
