@@ -8,7 +8,7 @@ from sim.composition import Composition
 from workbench.blind.hiding import hide
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
-from workbench.model.pressure_between_samples import mean_between_samples_pa
+from workbench.model.pressure_between_samples import means_between_samples_pa
 
 PERIOD_S, FINE = 0.01, 200
 COMMAND_PA = np.repeat([30e3, 60e3, 20e3, 45e3, 80e3, 50e3], 60)
@@ -31,14 +31,14 @@ def test_the_mean_behind_a_lag_that_nobody_told(lag_s: float) -> None:
         np.random.default_rng(1).normal(size=COMMAND_PA.size + 19), np.ones(20) / 20, "valid"
     )
     pressure_pa, mean_pa = lagging(lag_s, noise_pa)
-    found_pa = mean_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, COMMAND_PA.size),))
+    found_pa = means_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, COMMAND_PA.size),), 1)[:, 0]
     assert np.max(np.abs(found_pa - mean_pa)[:-1]) < 250.0
     assert np.sqrt(np.mean((found_pa - mean_pa)[:-1] ** 2)) < 40.0
 
 
 def test_stretches_are_no_steps_of_each_other() -> None:
     pressure_pa, _ = lagging(0.02, np.zeros(COMMAND_PA.size))
-    alone_pa = mean_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, 180), (180, COMMAND_PA.size)))
+    alone_pa = means_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, 180), (180, COMMAND_PA.size)), 1)[:, 0]
     assert alone_pa[179] == pressure_pa[179]
     assert alone_pa[-1] == pressure_pa[-1]
 

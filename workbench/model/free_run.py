@@ -13,14 +13,15 @@ begins with the recording and follows them, with the stem held where it comes to
 
 Behind a positioner no command is a pressure: it begins at rest, with what the record tells of it (`initial_state`).
 
-Simulated from measured pressure, the pressure path's effects are left out, and the pressure of a period is the mean
-of the measurements at its ends. A measured load acts as the pressure load / A besides.
+Simulated from measured pressure, the pressure path's effects are left out, and what the pressure is between its samples
+`pressure_between_samples` says. A measured load acts as the pressure load / A besides.
 
 Where samples lie farther apart than slides last (`sampling`), the stem has no inertia (`slow_segments`).
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +52,7 @@ from workbench.model.initial_state import (
     initial_state,
 )
 from workbench.model.lead import Lead, lead_of
-from workbench.model.pressure_between_samples import mean_between_samples_pa
+from workbench.model.pressure_between_samples import means_between_samples_pa
 from workbench.model.sampling import NO_LANDING, Sampling, sampling
 from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
@@ -74,6 +75,8 @@ ROUGH = Accuracy(2.0, 1e-3)
 """Within 50 um. A wider tolerance hides from the finite differences what a little viscous friction does."""
 SCOUTING = Accuracy(10.0, 1e-3)
 """Behind a positioner, where a quarter of the step moves a stem that hunts by as much as ten of them do."""
+PART_S, MOST_PARTS = 2e-3, 8
+"""Parts of a sample over which a measured pressure is held: about as long, at most so many."""
 BEYOND_PA = 1e12
 """More than holds any stem: nearest to it is what breaks it loose."""
 
@@ -99,15 +102,17 @@ class Segment(NamedTuple):
     lead: Lead | None
     """Where a pressure path that remembers was commanded before."""
     drive_pa: Vector
-    """Held from each of its samples to the next, Pa."""
+    """Held over each part of the time from one of its samples to the next, Pa."""
     load_n: Vector | None
     """The same of a measured load, N."""
     periods_s: Vector
-    """Between its samples, s."""
+    """How long each part is, s."""
+    parts: int
+    """From sample to sample."""
     step_s: float
     """Longest of the integration, s."""
     shots: Vector
-    """Periods before which the stem is put back, and to where it is shown then, m, (shots, 2)."""
+    """Parts before which the stem is put back, and to where it is shown then, m, (shots, 2)."""
 
 
 class FreeRun:
@@ -135,7 +140,7 @@ class FreeRun:
         self._composition, self._kept = _behind_pressure(composition) if from_pressure else everything
         if not from_pressure:
             _require_same_input(self._composition, record)
-        drive_pa = _measured(record, self.by) if from_pressure else record.command_pa
+        drive_pa = _measured(record) if from_pressure else record.command_pa
         if record.load_n is not None:
             _require_bare_pressure(self._composition)
         leads = [lead_of(record, self._composition, drive_pa, segment) for segment in range(len(record.segments))]
@@ -147,8 +152,9 @@ class FreeRun:
             return
         longest_s = accuracy.steps * self._composition.step_s
         by_setpoint = self._composition.by_setpoint
+        parts_pa = _measured_in_parts(record) if from_pressure else drive_pa[:, None]
         self._segments = [
-            _segment(record, drive_pa, rows, longest_s, lead, by_setpoint=by_setpoint)
+            _segment(record, parts_pa, rows, longest_s, lead, by_setpoint=by_setpoint)
             for rows, lead in zip(record.segments, leads, strict=True)
         ]
 
@@ -219,10 +225,15 @@ class FreeRun:
         for each in self._segments:
             drive_pa, state = self._started(vector, each)
             rows = slice(each.first, each.end)
+            seen_m, apart = measured_m[rows], errors[rows]
+            if each.parts > 1:
+                seen_m, apart = np.full(each.periods_s.size + 1, np.nan), np.empty(each.periods_s.size + 1)
+                seen_m[:: each.parts] = measured_m[rows]
             self._composition.kernel.misfit(
                 *(vector, state, drive_pa, each.periods_s, each.step_s, self._tolerance),
-                *(each.shots, path, measured_m[rows], by, errors[rows], cost),
+                *(each.shots, path, seen_m, by, apart, cost),
             )
+            errors[rows] = apart[:: each.parts]
             if cost[0] >= judge.limit:
                 break
         return errors, float(cost[0])
@@ -251,7 +262,8 @@ class FreeRun:
                 self._composition.kernel.respond(
                     vector, state, drive_pa[held], each.periods_s[held], each.step_s, self._tolerance, path
                 )
-                yield each.first + at + known, each.first + over + 1, path[:, known:]
+                rows = each.first + at // each.parts + known, each.first + over // each.parts + 1
+                yield *rows, path[:, known * each.parts :: each.parts]
                 at, known = over, 1
 
     def _started(self, theta: Vector, segment: Segment | SlowSegment) -> tuple[Vector, Vector]:
@@ -334,16 +346,18 @@ class FreeRun:
 
 
 def _segment(
-    record: Record, drive_pa: Column, rows: tuple[int, int], longest_s: float, lead: Lead | None, *, by_setpoint: bool
+    record: Record, drive_pa: Vector, rows: tuple[int, int], longest_s: float, lead: Lead | None, *, by_setpoint: bool
 ) -> Segment:
+    """Return a segment; drive_pa, Pa, (n, parts)."""
     first, end = rows
-    held_pa = checked_commands(drive_pa[first : end - 1])
-    load_n = None if record.load_n is None else checked_commands(record.load_n[first : end - 1])
-    periods_s = checked_periods(np.diff(record.time_s[first:end]), held_pa)
+    parts = drive_pa.shape[1]
+    held_pa = checked_commands(drive_pa[first : end - 1].ravel())
+    load_n = None if record.load_n is None else checked_commands(np.repeat(record.load_n[first : end - 1], parts))
+    periods_s = checked_periods(np.repeat(np.diff(record.time_s[first:end]) / parts, parts), held_pa)
     step_s = checked_step(min(float(periods_s.max()), longest_s))
     begin = initial_state(record, first, end, moving=not by_setpoint)
     before = before_start(record, first, end, begin.position_m) if by_setpoint else None
-    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, step_s, np.empty((0, 2)))
+    return Segment(first, end, begin, before, lead, held_pa, load_n, periods_s, parts, step_s, np.empty((0, 2)))
 
 
 def _behind_pressure(composition: Composition) -> tuple[Composition, list[int]]:
@@ -371,15 +385,24 @@ def _require_same_input(composition: Composition, record: Record) -> None:
         )
 
 
-def _measured(record: Record, by: Sampling) -> Column:
+def _measured(record: Record) -> Column:
+    """Return the measured pressure at the samples, Pa, (n,).
+
+    Raises:
+        InputError: there is none.
+    """
     if record.pressure_pa is None:
         raise InputError("recording", "has no measured pressure_pa to simulate from")
-    if by.slow:
-        return record.pressure_pa
-    if record.by_setpoint:
-        following = np.append(record.pressure_pa[1:], record.pressure_pa[-1])
-        return np.asarray(0.5 * (record.pressure_pa + following))
-    return mean_between_samples_pa(record.period_s, record.command_pa, record.pressure_pa, record.segments)
+    return record.pressure_pa
+
+
+def _measured_in_parts(record: Record) -> Vector:
+    """Return its means over the parts from each sample to the next, Pa, (n, parts)."""
+    pressure_pa, period_s = _measured(record), record.period_s
+    # A set point is no pressure that another one follows.
+    command_pa = np.zeros_like(pressure_pa) if record.by_setpoint else record.command_pa
+    parts = min(MOST_PARTS, ceil(period_s / PART_S))
+    return means_between_samples_pa(period_s, command_pa, pressure_pa, record.segments, parts)
 
 
 def _require_bare_pressure(composition: Composition) -> None:

@@ -42,7 +42,9 @@ class MultipleShooting(FreeRun):
         part: int | None = None,
     ) -> None:
         super().__init__(composition, record, from_pressure=from_pressure, accuracy=accuracy, by=by)
-        self._segments = [each._replace(shots=_shots(record, each.first, each.end)) for each in self._segments]
+        self._segments = [
+            each._replace(shots=_shots(record, each.first, each.end) * [each.parts, 1.0]) for each in self._segments
+        ]
         self._part = part
 
     @property
@@ -52,7 +54,7 @@ class MultipleShooting(FreeRun):
         if self._part is not None:
             begins = np.zeros(rows.size, np.int64)
             for each in self._segments:
-                begins[each.first + 1 + each.shots[:, 0].astype(np.int64)] = 1
+                begins[each.first + 1 + each.shots[:, 0].astype(np.int64) // each.parts] = 1
             rows &= np.cumsum(begins) % 2 == self._part
         return rows
 

@@ -1,15 +1,17 @@
-"""The measured pressure between its samples: what a stem is driven by while a sample is held.
+"""The measured pressure between its samples: what a stem is driven by.
 
-The command u_i is in force from sample i to the next, h_i later. A pressure that follows it with a lag T is
+The command u_i is in force from sample i to the next, h later. A pressure that follows it with a lag T is
 
-    m_{i+1} = u_i + (m_i - u_i) e_i,   e_i = exp(-h_i / T),   mean over h_i   u_i + (m_i - u_i) (1 - e_i) T / h_i
+    m(t) = u_i + (m_i - u_i) exp(-t / T)     a time t after sample i;  m_{i+1} = m(h)
 
 What was measured beyond that, d_i = p_i - m_i, is taken for a straight line from sample to sample: noise of a supply,
 hysteresis, whatever else is between the two. T is the one that leaves the least, mean |d - median d|; of those that do
-so but for a hundredth the fastest, for of a lag far below a sample nothing shows.
+so but for a hundredth the fastest, for of a lag far below a sample nothing shows. The stem is driven by the means of
+m + d over the parts of a sample.
 
-So a step that an I/P answers within a sample is one, and not halved over it; and of a pressure that is slow against its
-samples the mean is the middle of two, as it is of one without a command.
+So a step that an I/P answers within a sample is one, and not halved over it. And a stem that the noise breaks loose
+leaves when it does, not with the next sample: taken so, all slips would be mistimed by up to a sample, which an effect
+that makes them slower would seem to explain.
 """
 
 from math import exp, log
@@ -25,16 +27,19 @@ FASTEST, SLOWEST = 1.0 / 300.0, 3e3
 NO_MORE = 1.01
 
 
-def mean_between_samples_pa(
-    period_s: float, command_pa: Column, pressure_pa: Column, segments: tuple[tuple[int, int], ...]
+def means_between_samples_pa(
+    period_s: float, command_pa: Column, pressure_pa: Column, segments: tuple[tuple[int, int], ...], parts: int
 ) -> Column:
-    """Return the mean pressure from each sample to the next, Pa, (n,); of a segment's last one what is measured then.
+    """Return the mean pressures over the parts from each sample to the next, Pa, (n, parts).
+
+    After a segment's last sample it is what was measured then, as it is at rows of none.
 
     Args:
         period_s: of the samples, h; where theirs differ, the line takes what that makes of m.
         command_pa: held from its sample on, (n,).
         pressure_pa: measured, (n,).
-        segments: half-open ranges of rows that follow each other; rows of none are given as measured.
+        segments: half-open ranges of rows that follow each other.
+        parts: of a sample, equal ones.
     """
     rows = [slice(*each) for each in segments]
 
@@ -47,14 +52,17 @@ def mean_between_samples_pa(
     found = minimize_scalar(left_pa, bounds=(log(FASTEST), log(SLOWEST)), method="bounded")
     fast = left_pa(log(FASTEST)) <= NO_MORE * float(found.fun)
     T = period_s * (FASTEST if fast else exp(float(found.x)))
-    mean_pa = pressure_pa.copy()
+    ends_s = np.linspace(0.0, period_s, parts + 1)
+    left = -np.diff(np.exp(-ends_s / T)) * T / np.diff(ends_s)
+    middles = 0.5 * (ends_s[:-1] + ends_s[1:]) / period_s
+    means_pa = np.repeat(pressure_pa[:, None], parts, axis=1)
     for each in rows:
         u, p = command_pa[each], pressure_pa[each]
         m = _followed_pa(period_s, T, u, p)
         d = p - m
-        followed_pa = u + (m - u) * -np.expm1(-period_s / T) * T / period_s
-        mean_pa[each.start : each.stop - 1] = followed_pa[:-1] + 0.5 * (d[:-1] + d[1:])
-    return mean_pa
+        followed_pa = u[:-1, None] + np.outer(m[:-1] - u[:-1], left)
+        means_pa[each.start : each.stop - 1] = followed_pa + d[:-1, None] + np.outer(np.diff(d), middles)
+    return means_pa
 
 
 def _followed_pa(period_s: float, T: float, u: Column, p: Column) -> Column:
