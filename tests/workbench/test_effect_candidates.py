@@ -184,6 +184,12 @@ def test_what_nothing_proves_beside_a_valve_that_explains_all_is_suspected_and_n
     assert judged(EXPLAINED, spring_hardening=off_by(3.1, EXPLAINED, "spring_hardening", 1.1 * AT_FLOOR)).added
 
 
+@pytest.mark.parametrize(("floors", "explained"), [(1.0, False), (0.25, True)])
+def test_what_hangs_on_the_state_far_below_the_floor_is_no_matter(floors: float, explained: bool) -> None:
+    """Of a stem by its measured pressure: its floor is what the supply's noise makes of it by the command."""
+    assert model_of(error_m=floors * FLOOR_M, structure=0.9).explained == explained
+
+
 def test_an_error_at_the_floor_asks_for_the_same_proof_where_what_is_left_hangs_on_the_state() -> None:
     structured = model_of(cost=1.2 * AT_FLOOR, error_m=1.2 * FLOOR_M, structure=0.9)
     assert structured.at_floor

@@ -299,8 +299,13 @@ def test_an_optimisers_failure_does_not_look_like_physics(searched: Callable[...
 
 @pytest.mark.parametrize(
     ("lower", "alone", "named"),
-    [(-0.1, 1.0, ["ip_lag"]), (-0.1, 2.0, ["ip_lag", "flow_force"]), (0.1, 1.0, ["ip_lag", "flow_force"])],
-    ids=["none, and needless", "none, but needed", "some"],
+    [
+        (-0.1, 1.0, ["ip_lag"]),
+        (-0.1, 1.1, ["ip_lag"]),
+        (-0.1, 2.0, ["ip_lag", "flow_force"]),
+        (0.1, 1.0, ["ip_lag", "flow_force"]),
+    ],
+    ids=["none, and needless", "none, and without it at the floor", "none, but needed", "some"],
 )
 def test_an_effect_whose_evidence_is_anothers_is_not_named(
     searched: Callable[..., tuple[EffectStep, ...]], lower: float, alone: float, named: list[str]
