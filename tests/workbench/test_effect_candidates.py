@@ -3,6 +3,8 @@
 from dataclasses import replace
 from math import log
 
+import pytest
+
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, fitted, model_of
 from workbench.select.effect_acceptance import AT_THE_FLOOR, LEAST_STANDARD_ERRORS
 from workbench.select.effect_candidates import EffectStep, EvaluatedModel, judged_step
