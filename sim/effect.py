@@ -283,6 +283,17 @@ def _shipped(name: str) -> Effect:
     return read_effect(SHIPPED / f"{name}.py")
 
 
+def find_effects(names: Sequence[str], source: str) -> list[Effect]:
+    """Return the effects that a person named.
+
+    Raises:
+        InputError: as `find_effect`, or one name where a list of them is asked for: its letters are none.
+    """
+    if isinstance(names, str):
+        raise InputError(source, f'must be a list of names, got the text "{names}"; one effect is ["{names}"]')
+    return [find_effect(each, source) for each in names]
+
+
 def find_effect(text: str, source: str) -> Effect:
     """Return the effect that a person named: the path of its file, which ends in .py, or a shipped one's name.
 

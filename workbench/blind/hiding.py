@@ -24,7 +24,7 @@ from config.results.result import Brief
 from config.slave_file import Sensor
 from config.valve_file import EffectTable, ValveFile, ValveParameters, find_valve, load_valve
 from sim.composition import Composition
-from sim.effect import Effect, find_effect, first_effects, shipped_effect
+from sim.effect import Effect, find_effects, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
 from workbench.blind.trial import LEVELS, NOISE_M, Trial, refitted_rmse_m
 
@@ -77,7 +77,7 @@ def hide(
     for_valve, for_effects, for_fit, for_test, for_salt = map(np.random.default_rng, streams)
     valve = drawn_valve(for_valve)
     known = known_valve(valve, for_valve)
-    drawn = drawn_effects(for_effects, effects) if isinstance(effects, int) else _named(effects)
+    drawn = drawn_effects(for_effects, effects) if isinstance(effects, int) else find_effects(effects, "effects")
     count = round(duration_s / period_s) + 1
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
     truth, answers = _moving(trials, drawn, valve, known, for_effects)
@@ -167,10 +167,6 @@ def drawn_effects(generator: Draw, count: int) -> list[Effect]:
         if len(chosen) < count and all(_distinguishable(effect, other) for other in chosen):
             chosen.append(effect)
     return chosen
-
-
-def _named(names: Sequence[str]) -> list[Effect]:
-    return [find_effect(name, "effects") for name in names]
 
 
 def _distinguishable(one: Effect, other: Effect) -> bool:

@@ -14,7 +14,7 @@ from config.recording import Recording
 from config.results.block import Block
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.effect import Effect, find_effect, tried_effects
+from sim.effect import Effect, find_effect, find_effects, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
@@ -204,7 +204,7 @@ def diagnose(
     """
     parts = split([recording] if isinstance(recording, Recording) else recording, test)
     there = {each.name for each in valve.effect}
-    named = [find_effect(name, "effects") for name in (tried_effects() if effects is None else effects)]
+    named = find_effects(tried_effects() if effects is None else effects, "effects")
     by = sampling(parts.train.record, valve.valve)
     why = {each.written: by.left_out(each) or unseen_without_spring(each, valve.valve) for each in named}
     if from_pressure:

@@ -17,7 +17,7 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from config.valve_file import ValveFile
 from sim.composition import Composition
-from sim.effect import find_effect
+from sim.effect import find_effect, find_effects
 from workbench.data.held_out import Part, Split, residual_m, split
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.fit.fit_result import Fit
@@ -142,8 +142,8 @@ def extend(
         InputError: the recording holds too little or other units than SI, an unknown effect or one that is there.
     """
     there = {find_effect(each.name, "valve file").name for each in valve.effect}
-    for name in effects:
-        if find_effect(name, "effects").name in there:
+    for name, found in zip(effects, find_effects(effects, "effects"), strict=True):
+        if found.name in there:
             raise InputError("valve file", f"effect {name} is there already")
     tell = progress or (lambda _what, _done: None)
     on = split([recording] if isinstance(recording, Recording) else recording, test)

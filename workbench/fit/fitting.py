@@ -21,7 +21,7 @@ from config.errors import InputError
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import BASE, SPRING, STATIC, Composition
-from sim.effect import Effect, find_effect
+from sim.effect import Effect, find_effects
 from workbench.data.motion import slips
 from workbench.data.record import Record, ready, require_few_samples, require_units
 from workbench.data.stretches import informative
@@ -254,7 +254,8 @@ def _extended(valve: ValveFile, effects: Sequence[str], known: ValveParameters) 
     for name in effects:
         if name in there:
             raise InputError("valve file", f"effect {name} is there already")
-    tables = [_switched_off(find_effect(name, "effects"), name, known) for name in effects]
+    found = find_effects(effects, "effects")
+    tables = [_switched_off(effect, name, known) for effect, name in zip(found, effects, strict=True)]
     return Composition.from_file(ValveFile(valve=valve.valve, effect=(*valve.effect, *tables)))
 
 
@@ -293,7 +294,7 @@ def _begun(
     composition = _extended(base.valve, effects, valve.valve)
     _require_shown(composition.effects[len(base.valve.effect) :], base.by)
     error = _error(composition, record, free, base.from_pressure, base.by, _scale(base, valve.valve))
-    names = {find_effect(name, "effects").name for name in effects}
+    names = {each.name for each in find_effects(effects, "effects")}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
