@@ -56,13 +56,18 @@ def without(recording: Recording) -> Recording:
     return Recording({name: column for name, column in recording.columns.items() if name != "pressure_pa"})
 
 
+def unmeasured(recording: Recording) -> Recording:
+    """A device whose register of the pressure holds no number."""
+    return Recording({**recording.columns, "pressure_pa": np.full(len(recording), np.nan)})
+
+
 def worse(recording: Recording) -> Recording:
     """A pressure measured so roughly that the command says more."""
     noise_pa = 5e3 * np.random.default_rng(5).standard_normal(len(recording))
     return Recording({**recording.columns, "pressure_pa": recording.columns["pressure_pa"] + noise_pa})
 
 
-@pytest.mark.parametrize("made", [without, worse])
+@pytest.mark.parametrize("made", [without, unmeasured, worse])
 def test_else_by_the_command(bowed: Hidden, fits: dict[str, Fit], made: Callable[[Recording], Recording]) -> None:
     assert by_measured_pressure(fits, [made(bowed.fit), bowed.test], LIBRARY, 2) is fits
 

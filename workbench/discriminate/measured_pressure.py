@@ -8,6 +8,8 @@ pressure is the worse witness.
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from config.recording import Recording
 from sim.effect import Effect
 from workbench.data.held_out import joined
@@ -16,6 +18,8 @@ from workbench.fit.fitting import local_fit
 from workbench.fit.threads import on_threads
 
 PATH = "pressure"
+MOSTLY = 0.9
+"""Of the samples."""
 
 
 def by_measured_pressure(
@@ -29,9 +33,8 @@ def by_measured_pressure(
         library: the effects by name.
         workers: threads, by default one a core.
     """
-    measured = all("pressure_pa" in each.columns and "command_pa" in each.columns for each in recordings)
     on_path = any(PATH in library[name].functions for name in fits if name in library)
-    if not measured or on_path or any(each.by.slow for each in fits.values()):
+    if on_path or any(each.by.slow for each in fits.values()) or not all(map(_is_measured, recordings)):
         return fits
     whole = joined(recordings)
 
@@ -45,3 +48,10 @@ def by_measured_pressure(
     found = dict(zip(fits, on_threads(refitted, list(fits.values()), workers), strict=True))
     least_m, before_m = (min(fit.rms_m for fit in each.values()) for each in (found, fits))
     return found if least_m < before_m else fits
+
+
+def _is_measured(recording: Recording) -> bool:
+    """Whether a recording has the pressure beside the command, and mostly numbers: a device may not measure it."""
+    if not {"pressure_pa", "command_pa"} <= recording.columns.keys():
+        return False
+    return float(np.mean(np.isfinite(recording.columns["pressure_pa"]))) > MOSTLY
