@@ -41,6 +41,7 @@ from workbench.select.tangent_preview import TangentScore, preview
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+OF_COMMAND = "the floor is how well the valve repeats itself by its command: by the measured pressure less may be left"
 BEFORE_IT = "acts before the measured pressure, which drives the stem"
 
 
@@ -129,6 +130,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         in_verdict = {UNKNOWN, *(each.early.sentence for each in records if each.early)}
         said += [f"recording: {note}" for note in shortened([note for note in noted if note not in in_verdict])]
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
+        if self.best.fit.from_pressure:
+            said.append(OF_COMMAND)
         if self.positioner:
             said.append(self.positioner.sentence)
         length = self.kind.length

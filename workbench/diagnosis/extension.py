@@ -77,7 +77,7 @@ class Extension(Result):
             for what, (train_m, test_m) in self.stages.items()
         ]
         floor = "unknown" if self.split.floor_m is None else length.number(self.split.floor_m, ".4g")
-        rows.append(("floor: what no model undercuts", floor, floor))
+        rows.append(("floor: what no model undercuts" + BY_COMMAND * self.extended.from_pressure, floor, floor))
         return [
             f"with {', '.join(self.effects)} the held-out error {falls} {length.number(before_m, '.4g')} to "
             f"{length.said(after_m, '.4g')} rms",
@@ -111,6 +111,10 @@ class Extension(Result):
         axes.set_ylabel(f"error on held-out data, {length.unit}")
         legend(axes)
         return figure
+
+
+BY_COMMAND = " by the command"
+"""Of a floor: a measured pressure tells why the valve does not repeat itself."""
 
 
 def extend(
