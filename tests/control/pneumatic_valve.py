@@ -1,14 +1,9 @@
 """A pneumatic valve of these tests' own under the daemon's law: behind an I/P, whose supply may fall."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
-from config.codes import InhibitReason, Mode
 from config.daemon_file import DaemonFile
-from positioner.control.requests import QUIET, Requests
-from positioner.daemon.health import Health
-from positioner.daemon.health.valve_health import HealthSettings
-from positioner.virtual.virtual_cycle import virtual_cycle
+from tests.control.virtual_loop import VirtualLoop
 
 STROKE_M, AREA_M2, SPRING_N_PER_M, PRELOAD_N, COULOMB_N, STATIC_N = 0.04, 0.07, 140e3, 1400.0, 400.0, 480.0
 LAG_S, VISCOUS_NS_PER_M, PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.05, 2100.0, 0.1, 1e-3, 2.5e-6
@@ -47,8 +42,8 @@ class PneumaticValve:
         self.pressure_pa = self.measured(self.actuator_pa)
 
 
-class Loop:
-    """The valve under the daemon's own law, in virtual time."""
+class Loop(VirtualLoop):
+    """The valve under the daemon's own law."""
 
     def __init__(self, measured: Callable[[float], float] = lambda actuator_pa: actuator_pa) -> None:
         file = DaemonFile.model_validate(
@@ -61,39 +56,19 @@ class Loop:
             }
         )
         self.valve = PneumaticValve(measured)
-        self.cycle = virtual_cycle(file, self.valve, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-        self.health = Health(HealthSettings.of(file.health, STROKE_M))
-
-    def cycles(self, for_s: float) -> None:
-        for _ in range(round(for_s / PERIOD_S)):
-            self.cycle.once()
-
-    def begin(self) -> None:
-        self.cycle.requests = replace(self.cycle.requests, eta=(0, 0, 0))
-
-    def end(self) -> None:
-        self.cycle.requests = replace(self.cycle.requests, eta=QUIET)
-        self.cycles(PERIOD_S)
+        super().__init__(file, self.valve)
 
     def identified(self) -> "Loop":
         self.begin()
         self.cycles(200.0)
         self.end()
-        assert self.cycle.snapshot.decision.applied.ratios is not None
+        assert self.decision.applied.ratios is not None
         return self
 
     def step_to(self, reference_pu: float, for_s: float) -> float:
         """Return the error in the end, as a share of the stroke."""
-        before = self.cycle.requests
-        self.cycle.requests = replace(
-            before, reference_m=reference_pu * STROKE_M, reference_writes=before.reference_writes + 1
-        )
-        self.cycles(for_s)
+        self.refer_to(reference_pu, for_s)
         return self.error_at(reference_pu)
 
     def error_at(self, reference_pu: float) -> float:
         return self.valve.stem_m / STROKE_M - reference_pu
-
-    @property
-    def why(self) -> InhibitReason:
-        return self.cycle.snapshot.decision.inhibit_reason

@@ -1,16 +1,12 @@
 """A stem that never rests: below break-away its packing flows, as soft ones do, so that it creeps on under its load."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from config.codes import InhibitReason, Mode, Ne107Cause, Ne107Status, State
+from config.codes import InhibitReason, Ne107Cause, Ne107Status, State
 from config.daemon_file import DaemonFile
-from positioner.control.requests import QUIET, Requests
-from positioner.daemon.health import Health, ne107_condition
-from positioner.daemon.health.valve_health import HealthSettings
+from positioner.daemon.health import ne107_condition
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
-from positioner.virtual.virtual_cycle import virtual_cycle
+from tests.control.virtual_loop import VirtualLoop
 
 STROKE_M, AREA_M2, SPRING_N_PER_M, PRELOAD_N, COULOMB_N, VISCOUS_NS_PER_M = 0.04, 0.07, 140e3, 1400.0, 400.0, 2100.0
 PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.1, 1e-3, 2.5e-6
@@ -45,7 +41,7 @@ class CreepingValve:
         self.position_m = QUANTUM_M * round(self.stem_m / QUANTUM_M)
 
 
-class Loop:
+class Loop(VirtualLoop):
     """The valve under the law of slides, which knows its static law."""
 
     def __init__(self, flow_ns_per_m: float) -> None:
@@ -61,33 +57,22 @@ class Loop:
                 "offset_pa": PRELOAD_N / AREA_M2,
             },
         }
-        file = DaemonFile.model_validate(daemon)
         self.valve = CreepingValve(flow_ns_per_m)
-        self.cycle = virtual_cycle(file, self.valve, Requests(mode=Mode.AUTOMATIC, mode_writes=1))
-        self.health = Health(HealthSettings.of(file.health, STROKE_M))
-
-    def cycles(self, for_s: float) -> None:
-        for _ in range(round(for_s / PERIOD_S)):
-            self.cycle.once()
+        super().__init__(DaemonFile.model_validate(daemon), self.valve)
 
     def step_to(self, reference_pu: float, for_s: float) -> float:
         """Return the error in the end, as a share of the stroke."""
-        before = self.cycle.requests
-        self.cycle.requests = replace(
-            before, reference_m=reference_pu * STROKE_M, reference_writes=before.reference_writes + 1
-        )
-        self.cycles(for_s)
+        self.refer_to(reference_pu, for_s)
         return self.valve.stem_m / STROKE_M - reference_pu
 
 
 def test_a_valve_that_creeps_after_each_slide_is_identified() -> None:
     loop = Loop(SLOW)
-    loop.cycle.requests = replace(loop.cycle.requests, eta=(0, 0, 0))
+    loop.begin()
     loop.cycles(100.0)
-    law = loop.cycle.snapshot.decision.static_law
-    loop.cycle.requests = replace(loop.cycle.requests, eta=QUIET)
-    loop.cycles(PERIOD_S)
-    assert loop.cycle.snapshot.decision.applied.ratios == law.ratios
+    law = loop.decision.static_law
+    loop.end()
+    assert loop.decision.applied.ratios == law.ratios
     for found, true in (
         (law.slope, SPRING_N_PER_M / AREA_M2),
         (law.up, (COULOMB_N + PRELOAD_N) / AREA_M2),
@@ -100,7 +85,7 @@ def test_a_valve_that_creeps_after_each_slide_is_identified() -> None:
 def test_a_stem_that_does_not_come_to_rest_off_its_reference_is_said() -> None:
     loop = Loop(FAST)
     error = loop.step_to(0.6, 60.0)
-    decision = loop.cycle.snapshot.decision
+    decision = loop.decision
     assert abs(error) > 0.03
     assert decision.inhibit_reason is InhibitReason.NOT_AT_REST
     condition = ne107_condition(decision, loop.health)
@@ -112,14 +97,14 @@ def test_it_is_said_no_more_once_the_stem_rests() -> None:
     loop.step_to(0.6, 60.0)
     loop.valve.flow_ns_per_m = 1e12
     assert abs(loop.step_to(0.5, 20.0)) < 1e-3
-    assert loop.cycle.snapshot.decision.inhibit_reason is InhibitReason.NOTHING
+    assert loop.decision.inhibit_reason is InhibitReason.NOTHING
 
 
 def test_a_staircase_says_what_it_waits_for() -> None:
     loop = Loop(FAST)
-    loop.cycle.requests = replace(loop.cycle.requests, eta=(0, 0, 0))
+    loop.begin()
     loop.cycles(30.0)
-    decision = loop.cycle.snapshot.decision
+    decision = loop.decision
     assert (decision.state, decision.inhibit_reason) == (State.S3_IDENTIFY, InhibitReason.NOT_AT_REST)
 
 

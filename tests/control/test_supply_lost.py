@@ -8,7 +8,7 @@ from tests.control.pneumatic_valve import AREA_M2, COULOMB_N, GOOD_PA, PRELOAD_N
 
 
 def assert_true(loop: Loop) -> None:
-    law = loop.cycle.snapshot.decision.static_law
+    law = loop.decision.static_law
     for found, true in (
         (law.slope, SPRING_N_PER_M / AREA_M2),
         (law.up, (COULOMB_N + PRELOAD_N) / AREA_M2),
@@ -30,7 +30,7 @@ def test_an_identification_waits_for_the_supply(lost_s: float, supply_pa: float)
     loop.cycles(150.0)
     loop.end()
     assert waited is InhibitReason.PRESSURE_ELSEWHERE
-    assert loop.cycle.snapshot.decision.applied.ratios is not None
+    assert loop.decision.applied.ratios is not None
     assert_true(loop)
 
 
@@ -40,9 +40,9 @@ def test_a_move_waits_for_the_supply_and_lands_when_it_is_back(low_pu: float, hi
     assert abs(loop.step_to(low_pu, 60.0)) < 1e-3
     loop.valve.supply_pa = 20e3
     loop.step_to(high_pu, 5.0)
-    sent_pa = loop.cycle.snapshot.decision.command_pa
+    sent_pa = loop.decision.command_pa
     loop.cycles(60.0)
-    decision = loop.cycle.snapshot.decision
+    decision = loop.decision
     assert decision.command_pa == sent_pa
     assert decision.inhibit_reason is InhibitReason.PRESSURE_ELSEWHERE
     condition = ne107_condition(decision, loop.health)
