@@ -15,6 +15,10 @@ pressure that approaches its end as behind a lag, p is a straight line over p', 
 
     p_l = p_0 + (p_1 - p_0) (p'_0 - p'_l) / (p'_0 - p'_1),    p'_l = v_l / (dx/dp)
 
+A stem that breaks away under a slower one leaps D ahead, and goes on with the pressure meanwhile, at u = p' dx/dp,
+
+    v(t) = u + (D / T - u) exp(-t / T),   T = F_v / k_s,   until v = v_l: for T log((D / T - u) / (v_l - u))
+
 Behind a positioner the stem feeds back on the pressure. There a period is cut into steps so short that the pressure is
 a straight line over each, p'_0 = p'_1, and a jump, which no sample sees under way, is over at once.
 
@@ -193,13 +197,29 @@ def landed(
     return x, indicated
 
 
-def lands_at(way: Way, p_b: float, v0: float, v1: float, mean: float, v_l: float) -> float:
-    """Return the pressure, Pa, of the landing of a stem that slides from p_b on; speeds in the slide's direction."""
+def lands_at(
+    way: Way, p_b: float, v0: float, v1: float, mean: float, leap: float, v_l: float, sliding_s: float
+) -> float:
+    """Return the pressure, Pa, of the landing of a stem that slides from p_b on.
+
+    Speeds, and the way that it leaps ahead, in the slide's direction; sliding_s is T.
+    """
     if v0 > v_l and v1 > GONE * v0:
         p_l = way.p0 + (way.p1 - way.p0) * (v0 - v_l) / (v0 - v1)
-        return min(max(p_l, min(p_b, way.p1)), max(p_b, way.p1))
+        if (p_l - p_b) * (way.p1 - p_b) > 0.0:
+            return min(max(p_l, min(p_b, way.p1)), max(p_b, way.p1))
+    elif v0 > v_l:
+        return way.p1
     jumps = way.rate0 == 0.0 and way.rate1 == 0.0
-    return way.p1 if v0 > v_l or mean > v_l or jumps else p_b
+    if mean > v_l or jumps:
+        return way.p1
+    share = (p_b - way.p0) / (way.p1 - way.p0)
+    u, ahead = v0 + (v1 - v0) * share, leap / sliding_s if sliding_s > 0.0 else 0.0
+    if u >= v_l or ahead <= v_l:
+        return p_b
+    rate = way.rate0 + (way.rate1 - way.rate0) * share
+    p_l = p_b + rate * sliding_s * log((ahead - u) / (v_l - u))
+    return min(max(p_l, min(p_b, way.p1)), max(p_b, way.p1))
 
 
 def unfinished(valve: Karnopp, age: float) -> tuple[float, float]:
@@ -305,7 +325,8 @@ def slid(
         at_end = balanced(valve, sigma, v_l, t + h, at_p, way.p1, q, z)
         slope = (at_end - at_p) / (way.p1 - p)
         v0, v1 = sigma * way.rate0 * slope, sigma * way.rate1 * slope
-        p_l = lands_at(way, p, v0, v1, sigma * (at_end - at_p) / max(h - tau, GONE * h), v_l)
+        mean, leap = sigma * (at_end - at_p) / max(h - tau, GONE * h), sigma * (at_p - x)
+        p_l = lands_at(way, p, v0, v1, mean, leap, v_l, slide_s / SLIDING_TIMES)
     if v1 > v_l or abs(behind) > SEEN_M:
         speed = max(v1, v_l)
         behind -= sigma * speed * less_s
