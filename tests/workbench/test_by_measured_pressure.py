@@ -26,8 +26,8 @@ RIVALS = ("sensor_nonlinearity", "flow_force")
 
 @pytest.fixture(scope="module")
 def bowed() -> Hidden:
-    """A bowed sensor in a dirty valve: by the command a flow force does as well."""
-    return hide(32028, dirty=True, pressure=True, duration_s=20.0)
+    """A bowed sensor in a dirty valve."""
+    return hide(32028, dirty=True, pressure=True, duration_s=12.0)
 
 
 def test_by_its_pressure_one_effect_is_named_of_two(bowed: Hidden) -> None:
@@ -80,6 +80,7 @@ def test_nor_where_one_acts_before_it(bowed: Hidden, fits: dict[str, Fit]) -> No
     assert not fits["flow_force"].from_pressure
 
 
+@pytest.mark.long
 def test_what_was_found_by_the_pressure_is_added_by_it(bowed: Hidden) -> None:
     extension = extend(bowed.fit, bowed.base, ["sensor_nonlinearity"], test=bowed.test, from_pressure=True)
     assert extension.extended.from_pressure
