@@ -92,6 +92,15 @@ def test_what_a_slip_has_spoilt_counts_once_however_long_it_lasts() -> None:
     assert _independent_share([np.array([1.0, 100.0])] * 1450) == 1.0
 
 
+def test_a_few_slips_that_luck_mistimed_name_nothing(fits: dict[str, Fit]) -> None:
+    """By the pressure all else is at the noise, and they are the cost: an asymmetry was called a preload by four."""
+    best, rival = weighed(fits["ip_lag"], 500.0, [0.0] * 40), weighed(fits["ip_lag"], 600.0, apart(0.15) * 2)
+    slip, costs = np.arange(40), np.full(40, 5.0)
+    by_two, by_all = (replace(rival, costs=costs + each) for each in (60.0 * (slip < 2), 2.0 + slip % 3))
+    best = replace(best, costs=costs)
+    assert log_odds(best, by_two) < log(15.0) < log_odds(best, by_all)
+
+
 def test_a_better_rival_is_not_spoken_against(fits: dict[str, Fit]) -> None:
     one = fits["ip_lag"]
     assert log_odds(weighed(one, 500.0, [0.0] * 20), weighed(one, 400.0, apart(-0.15))) == 0.0

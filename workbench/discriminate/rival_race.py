@@ -10,7 +10,8 @@ until the next, however long that is, and counts once. Besides, lambda_i is at m
 
     log (Phi(z_i) / Phi(-z_i))                          log odds that the better by z_i standard errors is the better
 
-where the errors of the two, slip by slip, differ by z_i standard errors (`block_errors`).
+where the errors of the two, slip by slip, differ by z_i standard errors (`block_errors`), or their costs by fewer: a
+few slips that luck has mistimed for one of them make much of the cost, where all else is at the noise.
 
 Where the best leaves nothing but the sensor's noise in any of B stretches, luck has mistimed no slip of it, and every
 stretch tells what it tells; but a mistimed slip, which spoils two of them at most, no more than an accident that has
@@ -87,6 +88,8 @@ class Weighed:
     """C_b, (stretches,)."""
     steady: bool = False
     """Whether it leaves no more than the sensor's noise in any of them."""
+    costs: Vector = field(default_factory=lambda: np.empty(0))
+    """Slip by slip, as `logs`."""
 
 
 def log_odds(best: Weighed, rival: Weighed) -> float:
@@ -99,6 +102,8 @@ def log_odds(best: Weighed, rival: Weighed) -> float:
         return max(0.0, float(np.clip(told, -most, most).sum()) + price)
     ratio = log(max(rival.fit.cost, TINY) / max(best.fit.cost, TINY))
     _, z = relative_error_reduction(rival.logs, best.logs)
+    if best.costs.size:
+        z = min(z, _standard_errors(rival.costs - best.costs))
     return max(0.0, min(0.5 * n * ratio + price, agreed(max(0.0, z))))
 
 
@@ -108,9 +113,14 @@ def slip_odds(one: Weighed, other: Weighed) -> float:
         return 0.0
     price = 0.5 * (len(other.fit.parameters) - len(one.fit.parameters)) * log(one.slips.count)
     told = one.slips.log_likelihood - other.slips.log_likelihood + price
-    d = one.slips.logs - other.slips.logs
-    z = float(d.sum() / max(d.size**0.5 * float(np.std(d)), TINY))
+    z = _standard_errors(one.slips.logs - other.slips.logs)
     return copysign(min(abs(told), agreed(abs(z))), told) if z * told > 0.0 else 0.0
+
+
+def _standard_errors(d: Vector) -> float:
+    """Return the sum of what differs from slip to slip in its standard errors (Vuong)."""
+    total, scatter = float(d.sum()), d.size**0.5 * float(np.std(d))
+    return total / scatter if scatter > TINY else copysign(inf, total) if total else 0.0
 
 
 def agreed(z: float) -> float:
@@ -322,6 +332,7 @@ class RivalRace:
             _independent_share([cost[each] for each in self._parts]),
             slips(found, self.record, self._first_rows, least_m),
             np.array([np.nansum(each) for each in stretches]),
+            costs=np.array([np.nansum(cost[each]) for each in self._parts if np.isfinite(error_m[each]).any()]),
             steady=self.record.noise_m is not None
             and all(self._is_noise(each) for each in _stretches(error_m, self.record.period_s)),
         )
