@@ -17,7 +17,6 @@ every round as a diagnosis chooses. Odds, permissives and the rule that stops ar
 """
 
 import argparse
-import json
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.blind import FOLDER, KEPT
-from benchmarks.kept_lines import Line, kept
+from benchmarks.kept_lines import Line, keep, kept
 from config.recording import Recording
 from config.slave_file import Sensor
 from sim.composition import Composition
@@ -218,9 +217,7 @@ def main() -> None:
         done = line(case, arguments.how, arguments.workers, pressure=not arguments.without_pressure)
         lines.append(done)
         print(f"{done['seed']}: {done['seconds']:g} s", flush=True)
-        if arguments.out is not None:
-            with arguments.out.open("a", encoding="utf-8") as file:
-                print(json.dumps(done), file=file, flush=True)
+        keep(arguments.out, done)
     print(*report(lines), sep="\n")
 
 

@@ -15,6 +15,13 @@ def kept(file: Path) -> list[Line]:
     return [json.loads(each) for each in file.read_text().splitlines()] if file.is_file() else []
 
 
+def keep(file: Path | None, line: Line) -> None:
+    """Keep another one; without a file, none."""
+    if file is not None:
+        with file.open("a", encoding="utf-8") as lines:
+            print(json.dumps(line), file=lines, flush=True)
+
+
 def run(file: Path, case: Callable[..., Line], todo: Sequence[tuple[Any, ...]], workers: int | None) -> Iterator[Line]:
     """Run cases in processes of their own, each of which gives a line; keep and yield a line as soon as it is there.
 

@@ -13,20 +13,18 @@ by it: what acts before it is left out. A line of JSON is kept a case, so that a
 """
 
 import argparse
-import json
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from benchmarks.blind import FOLDER, KEPT
-from benchmarks.kept_lines import Line, kept
+from benchmarks.kept_lines import Line, keep, kept
 from sim.effect import shipped_effect, tried_effects
 from workbench.blind.hiding import hide
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.select.equivalence import algebraic_class
 
-PATH = "pressure"
 HOW = ("by the command", "by the pressure")
 
 
@@ -39,7 +37,7 @@ def cases(family: str, seeds: Sequence[int] | None) -> list[Line]:
         if each["family"] == family
         and each["setting"] == "dirty"
         and (each["visible"] or not each["hidden"])
-        and not any(PATH in library[name].functions for name in each["hidden"])
+        and not any("pressure" in library[name].functions for name in each["hidden"])
         and (seeds is None or each["seed"] in seeds)
     ]
 
@@ -97,9 +95,7 @@ def main() -> None:
     todo = cases("nothing" if arguments.nothing else "dirty", arguments.seeds)[: arguments.cases]
     for case in (each for each in todo if each["seed"] not in there):
         lines.append(line(case))
-        if arguments.out is not None:
-            with arguments.out.open("a", encoding="utf-8") as file:
-                print(json.dumps(lines[-1]), file=file, flush=True)
+        keep(arguments.out, lines[-1])
     print(*report(lines), sep="\n")
 
 

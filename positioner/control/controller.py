@@ -442,13 +442,15 @@ def _reference(now: Now, mode: Mode, consumed: ConsumedRequests, *, waits: bool)
     memory, requests = now.memory, now.requests
     written = requests.reference_writes != consumed.reference_writes
     start = memory.reference
-    stands = Reference(start.value_m if now.stem_m is None else now.stem_m)
+    stands_m = start.value_m if now.stem_m is None else now.stem_m
     if mode is not AUTOMATIC or memory.supervision.mode is not mode:
-        start = stands
+        start = Reference(stands_m)
     if mode is not AUTOMATIC or not written or waits:
         return start
     reference = start.follow(requests.reference_m)
-    return reference if reference.delta_m != 0.0 or memory.state is S3 else stands.follow(requests.reference_m)
+    if reference.delta_m != 0.0 or memory.state is S3:
+        return reference
+    return Reference(stands_m).follow(requests.reference_m)
 
 
 def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:

@@ -56,11 +56,7 @@ class ActiveExcitation:
 
     def waits_for(self, statics: StaticIdentification) -> InhibitReason:
         """Return why the next step of a staircase waits longer than any stem takes that comes to rest."""
-        if not self.by_slides or self.ended:
-            return NOTHING
-        if statics.detector.pressure_elsewhere:
-            return InhibitReason.PRESSURE_ELSEWHERE
-        return InhibitReason.NOT_AT_REST if statics.detector.unsettled else NOTHING
+        return statics.detector.waits_for if self.by_slides and not self.ended else NOTHING
 
     def pressure_pa(self, now_s: float) -> float:
         """Return the pressure at a time, Pa."""

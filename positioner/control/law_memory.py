@@ -130,8 +130,7 @@ def _observed(seen: LawInput) -> StemObservation:
         rest=detector.rest,
         quantum_m=detector.quantum_m,
         outcome=seen.outcome,
-        unsettled=detector.unsettled,
-        pressure_elsewhere=detector.pressure_elsewhere,
+        waits_for=detector.waits_for,
     )
     return observation if seen.valve is None else stem_observed(observation, seen.valve, seen.statics.way)
 

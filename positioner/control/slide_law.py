@@ -308,10 +308,7 @@ def _waiting(memory: SlideMemory, observation: StemObservation, settings: SlideS
     """
     assert memory.target_m is not None
     off = abs(memory.target_m - observation.position_m) > settings.dead_band_m + observation.quantum_m
-    if not off or not (observation.unsettled or observation.pressure_elsewhere):
-        return memory
-    reason = InhibitReason.PRESSURE_ELSEWHERE if observation.pressure_elsewhere else InhibitReason.NOT_AT_REST
-    return _because(memory, reason)
+    return _because(memory, observation.waits_for) if off and observation.waits_for else memory
 
 
 def _next_slide(

@@ -44,10 +44,8 @@ class StemObservation:
     quantum_m: float
     outcome: SlideOutcome | None
     """Of the last change of the command, in the step in which it is known."""
-    unsettled: bool = False
-    """Whether it should long have come to rest."""
-    pressure_elsewhere: bool = False
-    """Whether it last rested under another pressure than the one commanded."""
+    waits_for: InhibitReason = InhibitReason.NOTHING
+    """Why it should long have come to rest, and no rest counts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from config.codes import InhibitReason, Ne107Cause, Ne107Status, State
 from config.daemon_file import DaemonFile
 from positioner.daemon.health import ne107_condition
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
-from tests.control.virtual_loop import VirtualLoop
+from tests.control.virtual_loop import VirtualLoop, assert_static_law
 
 STROKE_M, AREA_M2, SPRING_N_PER_M, PRELOAD_N, COULOMB_N, VISCOUS_NS_PER_M = 0.04, 0.07, 140e3, 1400.0, 400.0, 2100.0
 PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.1, 1e-3, 2.5e-6
@@ -73,13 +73,8 @@ def test_a_valve_that_creeps_after_each_slide_is_identified() -> None:
     law = loop.decision.static_law
     loop.end()
     assert loop.decision.applied.ratios == law.ratios
-    for found, true in (
-        (law.slope, SPRING_N_PER_M / AREA_M2),
-        (law.up, (COULOMB_N + PRELOAD_N) / AREA_M2),
-        (law.down, (COULOMB_N - PRELOAD_N) / AREA_M2),
-    ):
-        assert found.std < 5e-3 * abs(true)
-        assert abs(found.value - true) < 3.0 * found.std
+    up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
+    assert_static_law(law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
 
 
 def test_a_stem_that_does_not_come_to_rest_off_its_reference_is_said() -> None:

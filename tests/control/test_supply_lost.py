@@ -5,17 +5,12 @@ import pytest
 from config.codes import InhibitReason, Ne107Cause, Ne107Status
 from positioner.daemon.health import ne107_condition
 from tests.control.pneumatic_valve import AREA_M2, COULOMB_N, GOOD_PA, PRELOAD_N, SPRING_N_PER_M, Loop
+from tests.control.virtual_loop import assert_static_law
 
 
 def assert_true(loop: Loop) -> None:
-    law = loop.decision.static_law
-    for found, true in (
-        (law.slope, SPRING_N_PER_M / AREA_M2),
-        (law.up, (COULOMB_N + PRELOAD_N) / AREA_M2),
-        (law.down, (COULOMB_N - PRELOAD_N) / AREA_M2),
-    ):
-        assert found.std < 5e-3 * abs(true)
-        assert abs(found.value - true) < 3.0 * found.std
+    up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
+    assert_static_law(loop.decision.static_law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
 
 
 @pytest.mark.parametrize(("lost_s", "supply_pa"), [(10.0, 0.0), (10.0, 50e3), (25.0, 0.0), (25.0, 50e3), (40.0, 20e3)])

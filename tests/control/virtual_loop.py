@@ -9,7 +9,15 @@ from positioner.control.controller_memory import Decision
 from positioner.control.requests import QUIET, Requests
 from positioner.daemon.health import Health
 from positioner.daemon.health.valve_health import HealthSettings
+from positioner.estimation.landings.static_law import StaticLaw
 from positioner.virtual.virtual_cycle import virtual_cycle
+
+
+def assert_static_law(law: StaticLaw, slope_pa_per_m: float, up_pa: float, down_pa: float) -> None:
+    """Assert that what was found is the truth, by its own deviations, and that these are small."""
+    for found, true in ((law.slope, slope_pa_per_m), (law.up, up_pa), (law.down, down_pa)):
+        assert found.std < 5e-3 * abs(true)
+        assert abs(found.value - true) < 3.0 * found.std
 
 
 class VirtualLoop:

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
-from config.recording import Column, Recording
+from config.recording import Recording
 from config.results.result import Brief
 from config.slave_file import Sensor
 from config.valve_file import EffectTable, ValveFile, ValveParameters, find_valve, load_valve
 from sim.composition import Composition
 from sim.effect import Effect, find_effects, first_effects, shipped_effect
 from workbench.blind.input_signal import excitation
-from workbench.blind.trial import LEVELS, NOISE_M, Trial, refitted_rmse_m
+from workbench.blind.trial import LEVELS, NOISE_M, Answer, Trial, refitted_rmse_m
 
 VISIBLE = 0.5
 LEAST_TRAVEL = 0.1
@@ -82,8 +82,8 @@ def hide(
     trials = [Trial(excitation(known, each, count), period_s) for each in (for_fit, for_test)]
     truth, answers = _moving(trials, drawn, valve, known, for_effects)
     fit, test = (
-        _recorded(trial, truth, clean_m, generator, dirty=dirty, pressure=pressure)
-        for trial, clean_m, generator in zip(trials, answers, (for_fit, for_test), strict=True)
+        _recorded(trial, truth, clean, generator, dirty=dirty, pressure=pressure)
+        for trial, clean, generator in zip(trials, answers, (for_fit, for_test), strict=True)
     )
     answer = {
         "salt": for_salt.bytes(16).hex(),
@@ -99,34 +99,33 @@ def hide(
 
 def _moving(
     trials: Sequence[Trial], drawn: Sequence[Effect], valve: ValveParameters, known: ValveParameters, generator: Draw
-) -> tuple[ValveFile, list[Column]]:
-    """Draw strengths until the stem moves in every trial; return the valve, and what it answers when clean, m."""
+) -> tuple[ValveFile, list[Answer]]:
+    """Draw strengths until the stem moves in every trial; return the valve, and what it answers when clean."""
     while True:
         truth = ValveFile(valve=valve, effect=tuple(strength(each, valve, known, generator) for each in drawn))
         composition = Composition.from_file(truth)
-        answers = [trial.answer_m(composition, composition.theta) for trial in trials]
-        if all(np.ptp(each) > LEAST_TRAVEL * valve.stroke_m for each in answers):
+        answers = [trial.answer(composition, composition.theta) for trial in trials]
+        if all(np.ptp(each.indicated_m) > LEAST_TRAVEL * valve.stroke_m for each in answers):
             return truth, answers
 
 
 def _recorded(
-    trial: Trial, truth: ValveFile, clean_m: Column, generator: Draw, *, dirty: bool, pressure: bool
+    trial: Trial, truth: ValveFile, clean: Answer, generator: Draw, *, dirty: bool, pressure: bool
 ) -> tuple[Recording, float]:
     """Return the recording and its floor, m."""
-    composition = Composition.from_file(truth)
     quantum_m = truth.valve.stroke_m / LEVELS if dirty else 0.0
     sensor = Sensor(noise_std_m=NOISE_M, quantum_m=quantum_m, seed=int(generator.integers(2**32)))
-    dirt = trial.with_disturbances(composition, generator) if dirty else None
-    answer = dirt or trial.answer(composition, composition.theta)
+    answer = trial.with_disturbances(Composition.from_file(truth), generator) if dirty else clean
     recording = trial.recording(answer.indicated_m, sensor, answer.pressure_pa if pressure else None)
-    return recording, float(np.sqrt(np.mean((recording.position_m - clean_m) ** 2)))
+    return recording, float(np.sqrt(np.mean((recording.position_m - clean.indicated_m) ** 2)))
 
 
 def _visible(
-    trials: Sequence[Trial], answers: Sequence[Column], truth: ValveFile, effect: EffectTable, floor_m: float
+    trials: Sequence[Trial], answers: Sequence[Answer], truth: ValveFile, effect: EffectTable, floor_m: float
 ) -> dict[str, Any]:
     others = tuple(each for each in truth.effect if each is not effect)
-    fit_m, test_m = refitted_rmse_m(trials, answers, ValveFile(valve=truth.valve, effect=others))
+    clean_m = [each.indicated_m for each in answers]
+    fit_m, test_m = refitted_rmse_m(trials, clean_m, ValveFile(valve=truth.valve, effect=others))
     return {"fit_m": fit_m, "test_m": test_m, "is_visible": fit_m > VISIBLE * floor_m}
 
 

@@ -25,7 +25,7 @@ from config.results.result import Result
 from sim.effect import Effect
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms
-from workbench.discriminate.measured_pressure import by_measured_pressure
+from workbench.discriminate.measured_pressure import raced_by_pressure
 from workbench.discriminate.rival_race import ODDS, RivalRace
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameters_json
@@ -224,7 +224,7 @@ def discriminate(
     """
     gathered = tuple(tuple(sorted(each, key=list(fits).index)) for each in classes(fits, library))
     if len(gathered) > 1:
-        fits = by_measured_pressure(fits, recordings, library, workers)
+        fits = raced_by_pressure(fits, recordings, library, workers)
     race = RivalRace({each[0]: fits[each[0]] for each in gathered}, tuple(recordings), seed, workers)
     rounds: list[Round] = []
     experiments: list[Recording] = []

@@ -17,12 +17,11 @@ from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import local_fit
 from workbench.fit.threads import on_threads
 
-PATH = "pressure"
 MOSTLY = 0.9
 """Of the samples."""
 
 
-def by_measured_pressure(
+def raced_by_pressure(
     fits: Mapping[str, Fit], recordings: Sequence[Recording], library: Mapping[str, Effect], workers: int | None
 ) -> Mapping[str, Fit]:
     """Return the rivals from the measured pressure on; as they are where that tells nothing more.
@@ -33,16 +32,13 @@ def by_measured_pressure(
         library: the effects by name.
         workers: threads, by default one a core.
     """
-    on_path = any(PATH in library[name].functions for name in fits if name in library)
-    if on_path or any(each.by.slow for each in fits.values()) or not all(map(_is_measured, recordings)):
+    on_path = {name for name, each in library.items() if "pressure" in each.functions}
+    if on_path & fits.keys() or any(each.by.slow for each in fits.values()) or not all(map(_is_measured, recordings)):
         return fits
     whole = joined(recordings)
 
     def refitted(fit: Fit) -> Fit:
-        of_path = {
-            each.name for each in fit.valve.effect if each.name in library and PATH in library[each.name].functions
-        }
-        free = [name for name in fit.parameters if name.partition(".")[0] not in of_path]
+        free = [name for name in fit.parameters if name.partition(".")[0] not in on_path]
         return local_fit(whole, fit.valve, free=free, from_pressure=True, by=fit.by)
 
     found = dict(zip(fits, on_threads(refitted, list(fits.values()), workers), strict=True))

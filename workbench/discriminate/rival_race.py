@@ -325,14 +325,14 @@ class RivalRace:
         cost = softs(error_m / self._sigma_m, FINAL)
         recordings = [slice(*each) for each in pairwise([*self._first_rows, len(self.record.time_s)])]
         stretches = [part for each in recordings for part in _stretches(cost[each], self.record.period_s)]
-        by_slips = [part for each in self._parts if np.isfinite(part := error_m[each]).any()]
+        by_slips = [each for each in self._parts if np.isfinite(error_m[each]).any()]
         return Weighed(
             found,
-            np.log([np.hypot(np.sqrt(np.nanmean(part**2)), negligible_m) for part in by_slips]),
+            np.log([np.hypot(np.sqrt(np.nanmean(error_m[each] ** 2)), negligible_m) for each in by_slips]),
             _independent_share([cost[each] for each in self._parts]),
             slips(found, self.record, self._first_rows, least_m),
             np.array([np.nansum(each) for each in stretches]),
-            costs=np.array([np.nansum(cost[each]) for each in self._parts if np.isfinite(error_m[each]).any()]),
+            costs=np.array([np.nansum(cost[each]) for each in by_slips]),
             steady=self.record.noise_m is not None
             and all(self._is_noise(each) for each in _stretches(error_m, self.record.period_s)),
         )

@@ -26,32 +26,28 @@ def extend_commands(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> li
 
 def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str:
     """Return the `positioner extend` command that adds effects to the valve of a diagnosis or a discovery."""
-    fitted = ["--fit", *map(str, arguments.recordings)]
-    return shlex.join(
-        [
-            *("positioner", "extend", arguments.valve, "--effect", *effects, *fitted, *_besides(arguments)),
-            *_driven(arguments),
-            *("-o", OUT),
-        ]
-    )
+    fitted = ["--fit", *map(str, arguments.recordings), *_besides(arguments), *_driven(arguments)]
+    return shlex.join(["positioner", "extend", arguments.valve, "--effect", *effects, *fitted, "-o", OUT])
 
 
 def discover_command(arguments: argparse.Namespace) -> str:
     """Return the `positioner discover` command that looks for the form of what a diagnosis leaves unexplained."""
-    recordings = [*map(str, arguments.recordings), "--valve", arguments.valve]
-    return shlex.join(["positioner", "discover", *recordings, *_besides(arguments), "-o", FORM])
+    return shlex.join(["positioner", "discover", *_asked_of(arguments), "-o", FORM])
 
 
 def by_pressure_command(arguments: argparse.Namespace) -> str:
     """Return the same `positioner diagnose` command, of the stem from its measured pressure on."""
-    recordings = [*map(str, arguments.recordings), "--valve", arguments.valve]
     tried = ["--effects", *arguments.effects] if arguments.effects else []
-    return shlex.join(["positioner", "diagnose", *recordings, *_besides(arguments), *tried, "--from-pressure"])
+    return shlex.join(["positioner", "diagnose", *_asked_of(arguments), *tried, "--from-pressure"])
 
 
 def _driven(arguments: argparse.Namespace) -> list[str]:
     """Return how the stem is driven; a discovery knows but the command."""
     return ["--from-pressure"] if getattr(arguments, "from_pressure", False) else []
+
+
+def _asked_of(arguments: argparse.Namespace) -> list[str]:
+    return [*map(str, arguments.recordings), "--valve", arguments.valve, *_besides(arguments)]
 
 
 def _besides(arguments: argparse.Namespace) -> list[str]:

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from math import hypot, isnan, nan, sqrt
 from typing import NamedTuple
 
+from config.codes import InhibitReason
 from positioner.estimation.landings.pressure_arrival import PressureArrival
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 
@@ -168,9 +169,12 @@ class LandingDetector:
         return CREEPS_PER_S * self._stroke_m if self._late else 0.0
 
     @property
-    def unsettled(self) -> bool:
-        """Whether the stem, by the time it should long have answered, neither rests nor creeps slowly and evenly."""
-        return self.rest is None and self._late
+    def waits_for(self) -> InhibitReason:
+        """Why no rest is known for longer than any stem takes to come to one: it does not, or not by its command."""
+        if self.pressure_elsewhere:
+            return InhibitReason.PRESSURE_ELSEWHERE
+        unsettled = self.rest is None and self._late
+        return InhibitReason.NOT_AT_REST if unsettled else InhibitReason.NOTHING
 
     def _visible_m(self, rest: Rest) -> float:
         noise_m, least_m = VISIBLE_NOISES * rest.noise_m, VISIBLE * self._stroke_m

@@ -10,7 +10,6 @@ that does not rise with the command is none of the actuator's, and tells nothing
 """
 
 from collections import deque
-from itertools import combinations
 from math import isnan
 
 import numpy as np
@@ -36,8 +35,10 @@ class PressureDelivered:
         if isnan(pressure_pa) or len(self._pairs_pa) < FEWEST:
             return True
         u, p = np.array(self._pairs_pa).T
-        slopes = [(p_2 - p_1) / (u_2 - u_1) for (u_1, p_1), (u_2, p_2) in combinations(self._pairs_pa, 2) if u_1 != u_2]
-        m = float(np.median(slopes)) if slopes else 0.0
+        one, other = np.triu_indices(u.size, 1)
+        apart = u[one] != u[other]
+        slopes = (p[other] - p[one])[apart] / (u[other] - u[one])[apart]
+        m = float(np.median(slopes)) if slopes.size else 0.0
         if m <= 0.0:
             return True
         left_pa = p - m * u
