@@ -22,7 +22,8 @@ STRIBECK_M_PER_S = 5e-4
 DEADZONE = 0.5
 ALLOWED = {"area_cm2": 1e5, "stroke_mm": 1500.0, "friction_percent": 90.0, "breakaway_ratio": 10.0, "mass_kg": 1e4}
 """The most of each."""
-HIGHEST_BAR = 20.0
+HIGHEST_BAR = 10.0
+"""Instrument air gives no more; a range of 3 15 is one of psi."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,8 @@ class DataSheet:
         if not 0.0 <= closed < open_ <= HIGHEST_BAR:
             raise InputError(
                 "range_bar",
-                f"must be two gauge pressures, the lower first, up to {HIGHEST_BAR:g} bar; it is {closed:g} {open_:g}",
+                f"must be two gauge pressures, the lower first, up to {HIGHEST_BAR:g} bar (3 to 15 psi are 0.207 to "
+                f"1.034); it is {closed:g} {open_:g}",
             )
 
 

@@ -318,5 +318,7 @@ def register_named(name: str) -> Register:
     """
     if name in BY_NAME:
         return BY_NAME[name]
+    if name.endswith(".toml"):
+        raise InputError(name, "no register, but a file; the daemon's is given as --config FILE")
     near = [each for each in BY_NAME if name.lower() in each or each in name.lower()]
     raise InputError(name, f"no register of that name; allowed: {', '.join(near or BY_NAME)}")

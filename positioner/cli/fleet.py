@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--diagnoses", f"must be 0 or more, got {arguments.diagnoses}")
     if arguments.report is not None and arguments.diagnoses:
         require_plotly(arguments.report)
-    since = at(arguments.since) if arguments.since else None
+    since = at(arguments.since, "--since") if arguments.since else None
     if arguments.workers is not None and arguments.workers < 1:
         raise InputError("--workers", f"must be 1 or more, got {arguments.workers}")
     if not arguments.time_limit_s > 0.0:

@@ -194,6 +194,12 @@ def test_words_that_no_command_takes_are_one_line(
     ("words", "said"),
     [
         (["get", "positio"], "positio: no register of that name; allowed: position"),
+        (["get", "daemon.toml"], "daemon.toml: no register, but a file; the daemon's is given as --config FILE"),
+        (["fleet", "plant.csv", "--since", "noon"], "--since: must be a date YYYY-MM-DD, or with a time, got 'noon'"),
+        (
+            ["valve", "--area-cm2", "700", "--range-bar", "3", "15", "--stroke-mm", "40", "-o", "none.toml"],
+            "--range-bar: must be two gauge pressures, the lower first, up to 10 bar (3 to 15 psi are 0.207 to 1.034)",
+        ),
         (["map", "--config", "none.toml"], "--config: goes with --format telegraf, modbus-exporter, home-assistant"),
         (["compare", "none.csv", "--valve", ""], "valve file: must be its path or the name of a shipped one, got ''"),
         (["set", "reference", "half"], "reference: allowed is a number, got 'half'"),

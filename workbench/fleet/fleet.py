@@ -227,8 +227,8 @@ def _said(course: ValveCourse) -> str:
     return course.gravest[1].sentence if course.gravest else ""
 
 
-def at(text: str) -> datetime:
-    """Read a date or time that a person gave.
+def at(text: str, key: str) -> datetime:
+    """Read a date or time that a person gave under that key.
 
     Raises:
         InputError: it is none.
@@ -236,4 +236,4 @@ def at(text: str) -> datetime:
     try:
         return datetime.fromisoformat(text)
     except ValueError:
-        raise InputError(text, "is no date or time: allowed is YYYY-MM-DD, or with a time") from None
+        raise InputError(key, f"must be a date YYYY-MM-DD, or with a time, got {text!r}") from None
