@@ -12,6 +12,7 @@ STROKE_M, AREA_M2, SPRING_N_PER_M, PRELOAD_N, COULOMB_N, VISCOUS_NS_PER_M = 0.04
 PERIOD_S, SUBSTEP_S, QUANTUM_M = 0.1, 1e-3, 2.5e-6
 SLOW, FAST = 2e7, 2e6
 """N s/m: creeps of 20 and 200 um/s under the friction that a slide leaves, 3 % and 30 % of the stroke a minute."""
+GOOD_PA = 140e3
 MIDDLE_PA = (SPRING_N_PER_M * 0.5 * STROKE_M + PRELOAD_N) / AREA_M2
 
 
@@ -22,7 +23,7 @@ class CreepingValve:
     status = 0
 
     def __init__(self, flow_ns_per_m: float) -> None:
-        self.flow_ns_per_m = flow_ns_per_m
+        self.flow_ns_per_m, self.supply_pa = flow_ns_per_m, GOOD_PA
         self.stem_m = self.position_m = 0.5 * STROKE_M
         self.command_pa = self.pressure_pa = MIDDLE_PA
 
@@ -31,10 +32,10 @@ class CreepingValve:
         return round(1e6 * PERIOD_S * self.sample_counter)
 
     def tick(self, command_pa: float) -> None:
-        self.command_pa = self.pressure_pa = command_pa
+        self.command_pa, self.pressure_pa = command_pa, min(command_pa, self.supply_pa)
         self.sample_counter += 1
         for _ in range(round(PERIOD_S / SUBSTEP_S)):
-            force_n = AREA_M2 * command_pa - PRELOAD_N - SPRING_N_PER_M * self.stem_m
+            force_n = AREA_M2 * self.pressure_pa - PRELOAD_N - SPRING_N_PER_M * self.stem_m
             held_n = min(max(force_n, -COULOMB_N), COULOMB_N)
             speed = (force_n - held_n) / VISCOUS_NS_PER_M + held_n / self.flow_ns_per_m
             self.stem_m = min(max(self.stem_m + speed * SUBSTEP_S, 0.0), STROKE_M)
@@ -75,6 +76,21 @@ def test_a_valve_that_creeps_after_each_slide_is_identified() -> None:
     assert loop.decision.applied.ratios == law.ratios
     up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
     assert_static_law(law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
+
+
+def test_an_identification_waits_for_the_supply() -> None:
+    loop = Loop(SLOW)
+    loop.begin()
+    loop.cycles(25.0)
+    loop.valve.supply_pa = 50e3
+    loop.cycles(60.0)
+    waited = loop.why
+    loop.valve.supply_pa = GOOD_PA
+    loop.cycles(200.0)
+    loop.end()
+    assert waited is InhibitReason.PRESSURE_ELSEWHERE
+    up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
+    assert_static_law(loop.decision.static_law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
 
 
 def test_a_stem_that_does_not_come_to_rest_off_its_reference_is_said() -> None:

@@ -32,7 +32,7 @@ nothing is short. A creep of which no sample was seen cannot be judged.
 """
 
 from array import array
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan, log, nan, sqrt
 
 import numpy as np
@@ -182,8 +182,10 @@ class RestWindow:
         mean_m = float(late_m.mean())
         if np.isfinite(pressure_pa).all() and not _flat(pressure_pa[half:], PRESSURE_LEFT * float(np.ptp(pressure_pa))):
             return None
+        late_pa = float(pressure_pa[half:].mean())
         if np.abs(late_m - mean_m).max() > within_m or not _flat(late_m, 0.5 * max(self._tolerance_m, self.quantum_m)):
-            return self._creeping(time_s, position_m, half, noise_m, within_m, no_answer_m_per_s)
+            creeping = self._creeping(time_s, position_m, half, noise_m, within_m, no_answer_m_per_s)
+            return creeping and replace(creeping, pressure_pa=late_pa)
         elsewhere = np.flatnonzero(np.abs(position_m - mean_m) > within_m)
         first = int(elsewhere[-1]) + 1 if elsewhere.size else 0
         if elsewhere.size and 0.5 * time_s[-1] < self._creep_ends_s(time_s[first], position_m - mean_m, within_m):
@@ -195,7 +197,7 @@ class RestWindow:
             count=late_m.size * self._each,
             came_to_rest_s=float(time_s[first]) if first else 0.0,
             short_m=_short_m(time_s[: first + 1], position_m[: first + 1]),
-            pressure_pa=float(pressure_pa[half:].mean()),
+            pressure_pa=late_pa,
         )
 
     def _creeping(
