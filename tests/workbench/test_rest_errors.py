@@ -9,7 +9,7 @@ from config.recording import Column, Recording
 from workbench.blind.hiding import hide
 from workbench.data.held_out import Split, split
 from workbench.diagnosis.diagnosis import diagnose
-from workbench.select.rest_errors import Missed, RestErrors, by_place, off_m, rest_errors
+from workbench.select.rest_errors import Missed, RestErrors, by_place, off_m, rest_errors, told_m
 
 NOISE_M = 5e-5
 PERIOD_S, RESTS, SAMPLES = 0.01, 60, 30
@@ -89,6 +89,16 @@ def test_what_place_and_direction_tell_is_a_balance_that_the_model_lacks(parts: 
     assert found.elsewhere
 
 
+def test_what_time_tells_is_a_zero_that_drifts_or_forces_that_change(parts: Split) -> None:
+    found = off(parts, lambda place, _direction, _draw: 3.0 * MISSED * np.linspace(-1.0, 1.0, place.size))
+    assert found.off_m > 0.4 * NOISE_M
+    assert found.unsteady_m < 0.3 * found.off_m
+    assert (found.wander, found.elsewhere) == (True, False)
+    assert not off(parts, by_chance).wander
+    by_friction = off(parts, friction_over_travel)
+    assert by_friction.scatter_m < by_friction.unsteady_m
+
+
 def test_little_is_left_to_be_little(parts: Split) -> None:
     found = off(parts, lambda *each: 0.2 * friction_over_travel(*each))
     assert 0.0 < found.off_m < 0.4 * NOISE_M
@@ -117,8 +127,9 @@ def test_of_few_rests_nothing_is_said(parts: Split) -> None:
 
 def test_rests_that_are_all_at_one_place_follow_from_direction_alone() -> None:
     means_m: Column = np.asarray(1e-5 * np.where(np.arange(60) % 2, 1.0, -1.0))
-    missed = Missed(means_m, np.full(60, 1e-12), np.full(60, 0.05), np.sign(means_m))
-    assert np.allclose(by_place(missed, 1e-5), means_m, atol=1e-7)
+    nothing: Column = np.zeros(60)
+    missed = Missed(means_m, np.full(60, 1e-12), np.full(60, 0.05), np.sign(means_m), nothing, nothing)
+    assert np.allclose(told_m(missed, 1e-5, by_place(missed)), means_m, atol=1e-7)
 
 
 @pytest.mark.long

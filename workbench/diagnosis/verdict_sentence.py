@@ -166,15 +166,17 @@ def _of(candidate: EffectCandidate) -> PressureErrors | None:
 
 
 def _elsewhere(best: EvaluatedModel, names: str, length: Scale) -> str:
-    """Say that slides end elsewhere, with a leading space, where all else is at the floor."""
+    """Say what tells where slides end elsewhere, with a leading space; empty where nothing does."""
     rests = best.errors.rests
-    if rests is None or not rests.elsewhere:
+    if rests is None or not (rests.elsewhere or rests.wander):
         return ""
     stands_in = f", for which {names} may stand in" if names else ""
-    return (
-        f" Where the stem rests the model is off by {length.said(rests.off_m)}, besides noise; place and direction "
-        f"tell all of it but {length.said(rests.scatter_m)}: a balance of forces that it lacks{stands_in}."
-    )
+    off = f" Where the stem rests the model is off by {length.said(rests.off_m)}, besides noise;"
+    if rests.wander and rests.unsteady_m < rests.scatter_m:
+        left = length.said(rests.unsteady_m)
+        return f"{off} time tells all of it but {left}: a zero that drifts, or forces that change meanwhile{stands_in}."
+    left = length.said(rests.scatter_m)
+    return f"{off} place and direction tell all of it but {left}: a balance of forces that it lacks{stands_in}."
 
 
 def _suspicion(suspected: Sequence[EffectCandidate]) -> str:

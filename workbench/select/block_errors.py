@@ -74,7 +74,7 @@ class BlockErrors(Brief):
     test_rest_rmse_m: float
     """The rms error held out without these."""
     rests: RestErrors | None = None
-    """How far rests are off, where all else is at the floor and yet something may be left."""
+    """How far rests are off, where something may be left."""
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -131,11 +131,12 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         test_rest_rmse_m=test_rmse_m,
     )
     floor_m = split.floor_m
-    if floor_m is None or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
+    if floor_m is None:
         return found
     if found.floors_left(floor_m) > NOTHING_LEFT:
         found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
-    if test_rmse_m <= NOISE_KNOWN_TO * floor_m:
+    at_floor = replace(found, test_rest_rmse_m=0.0).at_floor(floor_m)
+    if not at_floor or test_rmse_m <= NOISE_KNOWN_TO * floor_m:
         return found
     edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
     if not edges:
