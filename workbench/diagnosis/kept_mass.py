@@ -74,6 +74,12 @@ def kept_mass(best: EvaluatedModel, parts: Split, progress: Progress) -> KeptMas
 
 
 def leaves_something(best: EvaluatedModel) -> bool:
-    """Whether a model leaves more than the noise may be off by, be all explained or not."""
-    known = best.floor_m is not None and best.errors.floors_left(best.floor_m) <= NOISE_KNOWN_TO
-    return not (best.explained and known)
+    """Whether a model leaves room for another to do better, be all explained or not.
+
+    It must leave more than the floor of what was fitted, where evidence is counted: else what is left is a held-out
+    slip; and where all is explained more than the noise may be off by.
+    """
+    if best.floor_m is None:
+        return True
+    nothing = best.explained and best.errors.floors_left(best.floor_m) <= NOISE_KNOWN_TO
+    return best.errors.train_rmse_m > best.floor_m and not nothing

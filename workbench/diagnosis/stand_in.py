@@ -7,10 +7,11 @@ Where an explained record leaves more than the noise may be off by, the likelies
     BIC(named) - BIC(form) > 10     in independent samples, and
     the block error, fitted and held out, falls by more than two standard errors
 
-and acts elsewhere if it acts at another place on the path pressure, force, friction, motion, sensor than the one effect
-named, its rivals and what is the same by algebra. At the same place it is the same effect in another shape, and is not
-sought: forms of its kind, which come near, too, would leave no room among the likeliest for what it stands in for. One
-form that does better than several effects together makes stand-ins of them, wherever it acts.
+for which what was fitted must leave more than the floor: else what is left is a held-out slip. It acts elsewhere if
+that is at another place on the path pressure, force, friction, motion, sensor than the one effect named, its rivals and
+what is the same by algebra. At the same place it is the same effect in another shape, and is not sought: forms of its
+kind, which come near, too, would leave no room among the likeliest for what it stands in for. One form that does better
+than several effects together makes stand-ins of them, wherever it acts.
 """
 
 from collections.abc import Mapping, Sequence

@@ -130,11 +130,11 @@ class FormSearch:
         on_proposal(tuple(self.forms[each.name].name for each in order))
         models: dict[str, EvaluatedModel | str] = {}
         here = _Tried(judged_step(base, models, 1, self.effects), dict(self.forms), dict(self.effects))
-        for turn in (order[:FIRST], order[FIRST : self.most]):
+        for turn in filter(None, (order[:FIRST], order[FIRST : self.most])):
             models |= self._fitted(here.step.before, turn, min(self.against, _least(models)))
             here = self._judged(here, models)
             for _ in range(ROUNDS):
-                if _explains(here.step):
+                if _explains(here.step) or _least(models) > IN_RACE * self.against:
                     break
                 models |= self._taken_further(here, models)
                 here = self._judged(here, models)
