@@ -22,7 +22,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.output_files import make_folder, write_json
+from positioner.cli.parts.demo_folder import demo_folder, recording_in
+from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.simulated_plant import AGEING, AGES_AT_S, BUSES, started
 
 if TYPE_CHECKING:
@@ -131,6 +132,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run it; exit status 1 when a step ends too far off, or a ratio is identified too badly."""
+    writable(arguments.json, "--json")
     if arguments.loop:
         from positioner.cli.parts.flow_demo import run_flow
 
@@ -177,10 +179,7 @@ def _folder(asked: Path | None) -> Iterator[Path]:
         with tempfile.TemporaryDirectory() as name:
             yield Path(name)
         return
-    make_folder(asked)
-    for old in (asked / "recordings").glob("*.csv"):
-        old.unlink()
-    yield asked
+    yield demo_folder(asked)
 
 
 def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:
@@ -332,8 +331,7 @@ def _as_called() -> str:
 
 
 def _recording(folder: Path) -> Path:
-    (recording,) = (folder / "recordings").glob("*.csv")
-    return recording
+    return recording_in(folder / "recordings")
 
 
 def _picture(folder: Path, outcome: DemoOutcome) -> Path:

@@ -22,7 +22,8 @@ from positioner.cli.demo import (
 from positioner.cli.main import main
 from positioner.cli.parts import simulated_plant
 from positioner.cli.parts.children import port_in
-from positioner.cli.parts.simulated_plant import started
+from positioner.cli.parts.demo_folder import demo_folder, recording_in
+from positioner.cli.parts.simulated_plant import SLAVE_HEAD, started
 from positioner.dcs import Dcs
 from tests.children import running
 from tests.cli.test_daemon_process import until
@@ -66,6 +67,45 @@ def test_it_ends_within_a_minute_and_leaves_picture_recording_and_figures(
     identified = any(not each["refusal"] for each in told["identified"])
     states = set(read_recording(recording).columns["state"].tolist())
     assert states == ({0.0, 1.0, 2.0, 3.0} if identified else {0.0, 3.0}), "what is refused moves no stem"
+
+
+@pytest.mark.parametrize("form", [[], ["--hidden"]])
+@pytest.mark.parametrize("there", ["daemon.toml", "better.toml", "recordings/demo-plant.csv", "slave.toml"])
+def test_what_no_demo_has_left_is_neither_deleted_nor_written_over(
+    form: list[str], there: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A demo in a site's own folder wrote over its daemon's file and deleted its recordings."""
+    (tmp_path / there).parent.mkdir(exist_ok=True)
+    (tmp_path / there).write_text("of the site")
+    assert main(["demo", *form, "--out", str(tmp_path)]) == 2
+    assert f"holds {Path(there).parts[0]}, not of a demo; allowed is another folder" in capsys.readouterr().err
+    assert [each for each in tmp_path.rglob("*") if each.is_file()] == [tmp_path / there]
+
+
+def test_an_earlier_demos_recordings_go_and_no_others(tmp_path: Path) -> None:
+    (tmp_path / "slave.toml").write_text(SLAVE_HEAD)
+    for name in ("recordings/demo-1.csv", "recordings/mine.csv", "of-mine/demo-1.csv"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    demo_folder(tmp_path)
+    assert {each.relative_to(tmp_path).as_posix() for each in tmp_path.rglob("*.csv")} == {
+        "recordings/mine.csv",
+        "of-mine/demo-1.csv",
+    }
+    (tmp_path / "recordings" / "demo-2.csv").touch()
+    assert recording_in(tmp_path / "recordings").name == "demo-2.csv"
+
+
+@pytest.mark.parametrize("option", ["--json", "--out"])
+def test_what_cannot_be_written_is_said_before_anything_is_started(
+    option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("os.access", lambda path, _: Path(path) != tmp_path)
+    path = tmp_path / "told.json" if option == "--json" else tmp_path
+    assert main(["demo", option, str(path)]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"positioner demo: {option} {path}: cannot be written: Permission denied"
+    ]
 
 
 def test_steps_that_come_after_the_ageing_are_said_to_be_late_and_not_to_be_off() -> None:

@@ -4,6 +4,7 @@ A command imports from here what it needs when it runs.
 
     children, simulated_plant, pseudo_line      other commands as processes, a slave and a daemon of them, a serial line
     flow_demo, flow_cases, flow_on_bus          `demo --loop flow`: what it says, its cases, one of them on wires
+    demo_folder                                 where a demo leaves its files, and whose those there are
     daemon_address, experiment_player           where a daemon is; experiments played on its valve
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages

@@ -16,6 +16,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING
 
 from positioner.cli.parts.children import port_in
+from positioner.cli.parts.demo_folder import recording_in
 from positioner.cli.parts.output_files import write_json
 from positioner.cli.parts.simulated_plant import STROKE_M, BusSetup, daemon_running, slave_running
 
@@ -76,8 +77,6 @@ def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
     from config.writing import write_valve
 
     started_s = time.monotonic()
-    for old in folder.glob("*/*.csv"):
-        old.unlink()
     bare = valve("seed")
     write_valve(
         folder / "hidden.toml", ValveFile.model_validate({"valve": bare.valve.model_dump(), "effect": [HIDDEN]})
@@ -85,8 +84,7 @@ def run_hidden(bus: str, folder: Path, told: Path | None) -> int:
     with slave_running(bus, folder, "hidden.toml", lockstep_s=PERIOD_S) as (setup, slave):
         print(f"slave {slave}: the seed's valve, and an effect that the daemon is not told")
         before = _steps("before", folder, setup, slave)
-        (recording,) = (folder / "before").glob("*.csv")
-        found = _extended(recording, bare, folder / "better.toml")
+        found = _extended(recording_in(folder / "before"), bare, folder / "better.toml")
         after = _steps("after", folder, setup, slave, '[law]\nvalve = "better.toml"\n') if found else before
     outcome = HiddenOutcome(before, after, found)
     seconds = time.monotonic() - started_s

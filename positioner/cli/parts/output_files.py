@@ -43,7 +43,7 @@ def _files(value: object) -> Iterator[Path]:
 
 
 def make_folder(folder: Path, option: str = "--out") -> None:
-    """Make a folder, and those above it, unless it is there.
+    """Make a folder, and those above it, unless it is there; files can be written there then.
 
     Raises:
         InputError: it cannot be written.
@@ -52,6 +52,8 @@ def make_folder(folder: Path, option: str = "--out") -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _unwritable(option, folder, error) from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise _unwritable(option, folder, OSError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
 def writable(path: Path | None, option: str) -> None:

@@ -28,6 +28,8 @@ RTU_WINDOW_S = 1.2
 STROKE_M = 0.1016
 """Of the seed's valve."""
 RECORDER = '[recorder]\nfolder = "recordings"\n'
+SLAVE_HEAD = "# The simulated valve of the demo.\n"
+"""Begins the slave's file: by it a demo knows what another has left."""
 NOISE_PU = 1e-4
 """Standard deviation of the position, share of the stroke."""
 
@@ -132,8 +134,7 @@ def daemon_running(
 
 
 def _slave_toml(valve: str, bus: str, clock: str, tables: str) -> str:
-    return f"""# The simulated valve of the demo.
-valve = "{valve}"
+    return f"""{SLAVE_HEAD}valve = "{valve}"
 {bus}[clock]
 {clock}
 [sensor]
