@@ -13,6 +13,7 @@ daemon the extended valve and makes the same steps again (`parts.hidden_demo`).
 
 import argparse
 import math
+import shlex
 import shutil
 import sys
 import time
@@ -53,10 +54,6 @@ LARGEST_ERROR_PU = 0.01
 LARGEST_RATIO_ERROR = 0.01
 RATIOS = ("b_over_c", "k_over_c")
 PROGRAM = "positioner"
-IN_A_BROWSER = """in a browser:
-  {positioner} workbench {recording} --valve seed
-  {positioner} sim config/profiles/slave.toml & {positioner} run config/profiles/daemon.toml &
-  {positioner} page --config config/profiles/daemon.toml"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +158,7 @@ def _run_steps(arguments: argparse.Namespace) -> int:
         picture = _picture(folder, outcome)
         if arguments.out:
             _print_line(f"picture {picture}, recording {_recording(folder)}")
-            print(IN_A_BROWSER.format(positioner=_as_called(), recording=_recording(folder)))
+            print("in a browser:", *_in_a_browser(_recording(folder)), sep="\n  ")
         if arguments.json:
             write_json(arguments.json, _jsonable(outcome, time.monotonic() - started_s), indent=1)
         for problem in outcome.problems:
@@ -322,6 +319,19 @@ def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:
         "problems": outcome.problems,
         "seconds": seconds,
     }
+
+
+def _in_a_browser(recording: Path) -> Iterator[str]:
+    """Yield what to type to see the recording, and a running valve, from the folder where this was typed."""
+    from config.loading import SHIPPED
+
+    profiles, here = SHIPPED / "profiles", Path.cwd()
+    near = profiles.relative_to(here) if profiles.is_relative_to(here) else profiles
+    slave, daemon = str(near / "slave.toml"), str(near / "daemon.toml")
+    called = _as_called()
+    yield shlex.join([called, "workbench", str(recording), "--valve", "seed"])
+    yield f"{shlex.join([called, 'sim', slave])} & {shlex.join([called, 'run', daemon])} &"
+    yield shlex.join([called, "page", "--config", daemon])
 
 
 def _as_called() -> str:

@@ -1,6 +1,7 @@
 """The demo as a new user runs it. Its figures depend on how punctual the machine is; what it leaves does not."""
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -106,6 +107,21 @@ def test_what_cannot_be_written_is_said_before_anything_is_started(
     assert capsys.readouterr().err.splitlines() == [
         f"positioner demo: {option} {path}: cannot be written: Permission denied"
     ]
+
+
+@pytest.mark.parametrize("folder", ["my demo", "."])
+def test_what_it_says_to_type_next_is_found_from_where_it_was_typed(
+    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It named profiles by their paths in a clone, and a folder with a space as two words."""
+    monkeypatch.chdir(tmp_path)
+    recording = Path(folder) / "demo-1.csv"
+    recording.parent.mkdir(exist_ok=True)
+    recording.touch()
+    words = [word for line in demo._in_a_browser(recording) for word in shlex.split(line)]
+    named = [word for word in words if word.endswith((".csv", ".toml"))]
+    assert len(named) == 4
+    assert all(Path(each).is_file() for each in named)
 
 
 def test_steps_that_come_after_the_ageing_are_said_to_be_late_and_not_to_be_off() -> None:
