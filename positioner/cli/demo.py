@@ -176,7 +176,8 @@ def _folder(asked: Path | None) -> Iterator[Path]:
         with tempfile.TemporaryDirectory() as name:
             yield Path(name)
         return
-    yield demo_folder(asked)
+    with demo_folder(asked):
+        yield asked
 
 
 def _play(port: int, valve: "ValveParameters", powered_s: float) -> DemoOutcome:

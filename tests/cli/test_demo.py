@@ -83,12 +83,16 @@ def test_what_no_demo_has_left_is_neither_deleted_nor_written_over(
     assert [each for each in tmp_path.rglob("*") if each.is_file()] == [tmp_path / there]
 
 
-def test_an_earlier_demos_recordings_go_and_no_others(tmp_path: Path) -> None:
+def test_an_earlier_demos_recordings_go_and_no_others_and_a_second_demo_is_kept_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "slave.toml").write_text(SLAVE_HEAD)
     for name in ("recordings/demo-1.csv", "recordings/mine.csv", "of-mine/demo-1.csv"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
-    demo_folder(tmp_path)
+    with demo_folder(tmp_path):
+        assert main(["demo", "--out", str(tmp_path)]) == 2
+    assert f"{tmp_path}: another demo runs there; allowed is another folder" in capsys.readouterr().err
     assert {each.relative_to(tmp_path).as_posix() for each in tmp_path.rglob("*.csv")} == {
         "recordings/mine.csv",
         "of-mine/demo-1.csv",
