@@ -23,6 +23,8 @@ from positioner.opcua.application_keys import ApplicationKeys, Refusal, uris_in
 from positioner.opcua.valve_desk import Answer, number_in
 
 NOBODY = User(role=UserRole.Anonymous)
+PUBLISHED_WITHIN_MS = (100.0, 3_600_000.0)
+"""How often a subscription may be served: values change four times a second."""
 Write = Callable[[Role, float], Awaitable[Answer]]
 Method = Callable[[Role, list[object]], Awaitable[Answer]]
 
@@ -119,6 +121,18 @@ class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
     def role(self) -> Role:
         """What its user may do."""
         return Role[(self.user.name or "none").upper()]
+
+    async def create_subscription(
+        self, params: ua.CreateSubscriptionParameters, *calls_back: Any, **named: Any
+    ) -> ua.CreateSubscriptionResult:
+        """Subscribe, as often as it can be served.
+
+        asyncua takes any interval: of a microsecond it takes the processor, of 0 it never says that it is alive.
+        """
+        least_ms, most_ms = PUBLISHED_WITHIN_MS
+        asked_ms = min(params.RequestedPublishingInterval, most_ms)
+        params.RequestedPublishingInterval = max(least_ms, asked_ms)  # in this order the least where none is a number
+        return await super().create_subscription(params, *calls_back, **named)
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """Write the set points among them; nothing else can be written."""

@@ -123,6 +123,23 @@ def test_an_observer_sees_the_valve_and_writes_nothing(site: Site, policy: type)
     site.seen("observer", look, policy=policy)
 
 
+@pytest.mark.parametrize(
+    ("asked_ms", "served_ms"),
+    [(0.0, 100.0), (-1.0, 100.0), (1e-3, 100.0), (float("nan"), 100.0), (1e300, 3.6e6), (500.0, 500.0)],
+)
+def test_a_subscription_is_served_as_often_as_it_can_be(site: Site, asked_ms: float, served_ms: float) -> None:
+    """One of a microsecond took two thirds of a processor, and one of 0 was never told that the server is alive."""
+
+    async def look(valve: Nodes) -> Any:
+        asked = ua.CreateSubscriptionParameters(asked_ms, RequestedMaxKeepAliveCount=1)
+        alive = asyncio.Event()
+        subscribed = await valve.client.uaclient.create_subscription(asked, lambda _: alive.set())
+        await alive.wait()
+        return subscribed.RevisedPublishingInterval
+
+    assert site.seen("observer", look) == served_ms
+
+
 def test_an_operator_moves_the_valve_and_identifies_nothing(site: Site) -> None:
     async def look(valve: Nodes) -> None:
         await valve(SETPOINT).write_value(ua.Variant(41.0, ua.VariantType.Float))
