@@ -130,6 +130,8 @@ class Recorder:
                     log_event(log, logging.ERROR, "recording fails", folder=str(self._folder), reason=error.strerror)
                 failed = True
                 if self._stopping.is_set():
+                    fields = {"folder": str(self._folder), "rows": len(self._waiting), "reason": error.strerror}
+                    log_event(log, logging.ERROR, "the end of the recording is lost", **fields)
                     break
         os.close(self._file)
 

@@ -127,6 +127,20 @@ def test_a_rotation_that_fails_goes_on_in_the_old_file_and_is_tried_again(
     assert times_s == pytest.approx([index * 1e-3 for index in range(200)]), "no row is lost"
 
 
+def test_rows_that_a_full_disk_still_keeps_out_at_the_end_are_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """They were lost without a word: `unrecorded` counts those that found no place in the queue."""
+    recorder = Recorder(tmp_path, "v", 10_000, 5)
+    recorder.start()
+    with full_above(0):
+        for index in range(7):
+            recorder.offer(row(index))
+        recorder.stop()
+    lost = caplog.records[-1]
+    assert (lost.getMessage(), lost.fields["rows"]) == ("the end of the recording is lost", 7)  # type: ignore[attr-defined]
+
+
 def test_valves_of_like_names_and_starts_within_a_second_do_not_meet(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
