@@ -56,6 +56,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     from positioner.own_packages import in_the_way
 
+    _open_what_is_closed()
     try:
         if said := in_the_way():
             print(f"positioner: {said}", file=sys.stderr)
@@ -101,6 +102,18 @@ def _done(words: Sequence[str] | None) -> int:
         _drop_output()
         print(f"positioner {arguments.command}: standard output cannot be written: {error.strerror}", file=sys.stderr)
         return 2
+
+
+def _open_what_is_closed() -> None:
+    """Read nothing, and write to nobody, where who began this closed a standard stream (`>&-`, a service manager).
+
+    Python has none in its place then; and the file that is opened next would be taken for it.
+    """
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            os.dup2(os.open(os.devnull, os.O_RDWR), descriptor)
+            os.set_inheritable(descriptor, True)  # which it is not yet where it was opened as this one
+            setattr(sys, name, open(descriptor, "w" if descriptor else "r"))  # noqa: SIM115
 
 
 def _escape_what_cannot_be_shown() -> None:

@@ -65,6 +65,16 @@ def test_output_that_a_full_disk_does_not_take_is_one_line_and_no_answer(unbuffe
     assert (mapped.returncode, mapped.stderr) == (2, said)
 
 
+@pytest.mark.parametrize(
+    ("words", "status"), [(["map"], 0), (["page", "--roles", "roles.json", "--set-password", "engineer"], 2)]
+)
+def test_a_standard_stream_that_is_closed_is_nowhere(words: list[str], status: int, tmp_path: Path) -> None:
+    """Python has none then: after the work was done came a traceback, and the status of what does not hold."""
+    closed = 'exec "$@" <&- >&- 2>&-'
+    command = ["sh", "-c", closed, "sh", sys.executable, "-m", "positioner.cli", *words]
+    assert subprocess.run(command, check=False, cwd=tmp_path).returncode == status
+
+
 def test_help_names_every_command_and_each_has_an_example() -> None:
     everything = subprocess.run(
         [sys.executable, "-m", "positioner.cli", "--help"], capture_output=True, text=True, check=True
