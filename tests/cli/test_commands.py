@@ -310,6 +310,15 @@ def test_the_data_sheet_is_the_one_that_is_shipped(capsys: Capture) -> None:
     assert capsys.readouterr().out == (Path(config.__file__).parent / "profiles" / "positioner.eds").read_text()
 
 
+def test_a_daemon_whose_file_asks_for_certificates_is_not_asked_without(tmp_path: Path, capsys: Capture) -> None:
+    """It closed the connection, and nothing said why."""
+    path = tmp_path / "daemon.toml"
+    tls = "authority = 'a.pem'\ncertificate = 'c.pem'\nkey = 'k.pem'\n"
+    path.write_text(DAEMON.format(port=5020) + f"[supervisory.tls]\n{tls}")
+    assert main(["get", "position", "--config", str(path)]) == 2
+    assert "supervisory.tls: asks for a certificate of whoever connects: --tls" in one_line(capsys)
+
+
 @pytest.mark.parametrize("reader", READERS)
 def test_a_reader_needs_to_know_where_and_speaks_no_tls(reader: str, tmp_path: Path, capsys: Capture) -> None:
     assert main(["map", "--format", reader]) == 2

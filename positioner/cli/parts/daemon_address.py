@@ -44,7 +44,7 @@ def connected(arguments: argparse.Namespace) -> "Dcs":
     """Return a DCS for that place, to be used as a context.
 
     Raises:
-        InputError: a fault in the daemon's file, or a valve is named without it.
+        InputError: a fault in the daemon's file, or a valve is named without it; or that file asks for certificates.
     """
     from config.daemon_file import SupervisoryTable, load_daemon
     from config.errors import InputError
@@ -53,6 +53,8 @@ def connected(arguments: argparse.Namespace) -> "Dcs":
     if arguments.valve is not None and arguments.config is None:
         raise InputError("--valve", "needs --config, the daemon's file that names it; or say --unit")
     where = load_daemon(arguments.config, arguments.valve).supervisory if arguments.config else SupervisoryTable()
+    if where.tls and arguments.tls is None and arguments.host is None and arguments.port is None:
+        raise InputError(str(arguments.config), "supervisory.tls: asks for a certificate of whoever connects: --tls")
     host, port, unit = (
         getattr(where, key) if (said := getattr(arguments, key)) is None else said for key in ("host", "port", "unit")
     )
