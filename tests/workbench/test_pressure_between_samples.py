@@ -8,7 +8,7 @@ from sim.composition import Composition
 from workbench.blind.hiding import hide
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
-from workbench.model.pressure_between_samples import means_between_samples_pa
+from workbench.model.pressure_between_samples import means_between_samples_pa, without_gaps_pa
 
 PERIOD_S, FINE = 0.01, 200
 COMMAND_PA = np.repeat([30e3, 60e3, 20e3, 45e3, 80e3, 50e3], 60)
@@ -66,3 +66,16 @@ def test_by_the_measured_pressure_a_true_valve_leaves_a_quarter_of_what_a_noisy_
     }
     assert np.nanmedian(left_m[True]) < np.nanmedian(left_m[False]) / 4.0
     assert np.nanmean(left_m[True] ** 2) < 0.5 * np.nanmean(left_m[False] ** 2)
+
+
+@pytest.mark.parametrize("lag_s", [1e-4, 0.05])
+def test_a_gap_in_the_measured_pressure_is_what_was_commanded_in_it(lag_s: float) -> None:
+    """A straight line over it missed every step of two seconds: the stem stood where it was 20 kPa away from."""
+    pressure_pa, _ = lagging(lag_s, np.zeros(COMMAND_PA.size))
+    known = np.ones(COMMAND_PA.size, dtype=np.bool_)
+    known[:2] = known[100:290] = known[-5:] = False
+    line_pa = np.interp(np.arange(COMMAND_PA.size), np.flatnonzero(known), pressure_pa[known])
+    whole_pa = without_gaps_pa(PERIOD_S, COMMAND_PA, line_pa, ((0, 210), (210, COMMAND_PA.size)), known)
+    assert np.array_equal(whole_pa[known], pressure_pa[known])
+    assert np.max(np.abs(whole_pa - pressure_pa)) < 500.0
+    assert np.max(np.abs(line_pa - pressure_pa)) > 1e4

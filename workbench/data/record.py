@@ -81,6 +81,8 @@ class Record(Brief):
     """Whose it is."""
     commanded_from: tuple[int, ...] = ()
     """For each segment the row from which its command is known: what lies between was left out, being in motion."""
+    pressure_known: Mask | None = None
+    """Where the pressure was measured; between, it is interpolated."""
     early: Early | None = None
     """How much the stem moves before its command: their clocks differ, and no verdict may rest on it."""
 
@@ -171,9 +173,14 @@ def ready(recording: Recording) -> Record:
     before = early(time_s, command_pa, seen_m, record.scale_m, segments)
     if before:
         notes.append(before.sentence)
-    begun = tuple(first for first, _ in segments)
+    begun, measured_pa = tuple(first for first, _ in segments), columns.get("pressure_pa")
     return replace(
-        record, segments=at_rest, notes=tuple(map(recording.kind.text, notes)), commanded_from=begun, early=before
+        record,
+        segments=at_rest,
+        notes=tuple(map(recording.kind.text, notes)),
+        commanded_from=begun,
+        pressure_known=None if measured_pa is None else np.isfinite(measured_pa),
+        early=before,
     )
 
 

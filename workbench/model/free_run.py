@@ -52,7 +52,7 @@ from workbench.model.initial_state import (
     initial_state,
 )
 from workbench.model.lead import Lead, lead_of
-from workbench.model.pressure_between_samples import means_between_samples_pa
+from workbench.model.pressure_between_samples import means_between_samples_pa, without_gaps_pa
 from workbench.model.sampling import NO_LANDING, Sampling, sampling
 from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
@@ -152,7 +152,7 @@ class FreeRun:
             return
         longest_s = accuracy.steps * self._composition.step_s
         by_setpoint = self._composition.by_setpoint
-        parts_pa = _measured_in_parts(record) if from_pressure else drive_pa[:, None]
+        parts_pa = _in_parts(record, drive_pa) if from_pressure else drive_pa[:, None]
         self._segments = [
             _segment(record, parts_pa, rows, longest_s, lead, by_setpoint=by_setpoint)
             for rows, lead in zip(record.segments, leads, strict=True)
@@ -386,23 +386,29 @@ def _require_same_input(composition: Composition, record: Record) -> None:
 
 
 def _measured(record: Record) -> Column:
-    """Return the measured pressure at the samples, Pa, (n,).
+    """Return the measured pressure at the samples, Pa, (n,); where one has none, what the command makes of it.
 
     Raises:
         InputError: there is none.
     """
-    if record.pressure_pa is None:
+    pressure_pa, known = record.pressure_pa, record.pressure_known
+    if pressure_pa is None:
         raise InputError("recording", "has no measured pressure_pa to simulate from")
-    return record.pressure_pa
+    if known is None or known.all():
+        return pressure_pa
+    return without_gaps_pa(record.period_s, _followed(record), pressure_pa, record.segments, known)
 
 
-def _measured_in_parts(record: Record) -> Vector:
-    """Return its means over the parts from each sample to the next, Pa, (n, parts)."""
-    pressure_pa, period_s = _measured(record), record.period_s
-    # A set point is no pressure that another one follows.
-    command_pa = np.zeros_like(pressure_pa) if record.by_setpoint else record.command_pa
+def _in_parts(record: Record, pressure_pa: Column) -> Vector:
+    """Return the means of a pressure, Pa, (n,), over the parts from each sample to the next, (n, parts)."""
+    period_s = record.period_s
     parts = min(MOST_PARTS, ceil(period_s / PART_S))
-    return means_between_samples_pa(period_s, command_pa, pressure_pa, record.segments, parts)
+    return means_between_samples_pa(period_s, _followed(record), pressure_pa, record.segments, parts)
+
+
+def _followed(record: Record) -> Column:
+    """Return the command that the pressure follows, Pa, (n,): a set point is none."""
+    return np.zeros_like(record.command_pa) if record.by_setpoint else record.command_pa
 
 
 def _require_bare_pressure(composition: Composition) -> None:
