@@ -8,6 +8,8 @@ Its files:
     moved_parameters                              what the file's own effects are by the recording
     kept_mass                                     what another mass than the valve file's would leave
     measured_pressure                             what the stem is from the measured pressure on
+    by_command                                    whether the measured pressure is what drives the stem
+    pressure_scale                                whether the measured pressure is on the command's scale
     stand_in                                      whether a form without a name does better than what was named
     positioner_or_packing                         what holds a stem behind its positioner
     extension, extension_json                     adds what was found; the same as JSON

@@ -18,11 +18,13 @@ from sim.effect import Effect, find_effect, find_effects, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
+from workbench.diagnosis.by_command import ByCommand, by_command
 from workbench.diagnosis.judged_landings import judged_landings
 from workbench.diagnosis.kept_mass import KeptMass, kept_mass
 from workbench.diagnosis.measured_pressure import ByMeasuredPressure, by_measured_pressure
 from workbench.diagnosis.moved_parameters import Moved, moved_parameters
 from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, positioner_or_packing
+from workbench.diagnosis.pressure_scale import PressureScale, pressure_scale
 from workbench.diagnosis.stand_in import StandIn, stand_in
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
 from workbench.diagnosis.verdict_sentence import verdict_line, verdict_sentence
@@ -66,6 +68,10 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     """Another mass than the file's, beside which less is left."""
     by_pressure: ByMeasuredPressure | None = None
     """What the best model is from the measured pressure on, where its own is another."""
+    by_command: ByCommand | None = None
+    """What the best model is by the command, where that is a better witness than the pressure that drives the stem."""
+    pressure_scale: PressureScale | None = None
+    """How the measured pressure stands to its command, where it drives the stem, or says another, and is not that."""
     stand_in: StandIn | None = None
     """A form without a name that does better than what was named, which is then no explanation."""
 
@@ -77,7 +83,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     @property
     def nothing_off(self) -> bool:
         """Whether the valve file holds as it is: no effect is missing, and nothing in it is off."""
-        off = self.moved or self.kept_mass or self.by_pressure or by_another_name(self.steps)
+        off = self.moved or self.kept_mass or self.by_pressure or self.pressure_scale or by_another_name(self.steps)
         return self.verdict == "adequate" and not off
 
     @property
@@ -256,12 +262,16 @@ def diagnose(
         + (f" {asked.stand_in.sentence}." if asked.stand_in else "")
         + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
         + (f" But {asked.kept_mass.sentence}." if asked.kept_mass else "")
-        + (f" But {asked.by_pressure.sentence(best.fit.kind)}." if asked.by_pressure else ""),
+        + (f" But {asked.by_pressure.sentence(best.fit.kind)}." if asked.by_pressure else "")
+        + (f" But {asked.scale.sentence(best.fit.kind)}." if asked.scale else "")
+        + (f" But {asked.by_command.sentence(best.fit.kind)}." if asked.by_command else ""),
         unseen=unseen,
         positioner=held,
         moved=moved,
         kept_mass=asked.kept_mass,
         by_pressure=asked.by_pressure,
+        by_command=asked.by_command,
+        pressure_scale=asked.scale,
         stand_in=asked.stand_in,
     )
 
@@ -272,6 +282,8 @@ class Asked(NamedTuple):
     kept_mass: KeptMass | None = None
     by_pressure: ByMeasuredPressure | None = None
     stand_in: StandIn | None = None
+    by_command: ByCommand | None = None
+    scale: PressureScale | None = None
 
 
 def _asked(
@@ -289,10 +301,15 @@ def _asked(
     """Ask the best model for its mass, its pressure, and, where neither is another, whether it only stands in."""
     if parts.early:
         return Asked()
+    scale = pressure_scale(parts.train.record)
+    if scale and best.fit.from_pressure:
+        return Asked(scale=scale)
+    if commanded := by_command(best, parts, seed=seed, workers=workers, progress=tell):
+        return Asked(by_command=commanded)
     mass = kept_mass(best, parts, tell)
     pressed = by_measured_pressure(best, parts, seed=seed, workers=workers, progress=tell)
     if found not in EXPLAINED or mass or pressed:
-        return Asked(mass, pressed)
+        return Asked(mass, scale=scale) if pressed and scale else Asked(mass, pressed)
     outdone = stand_in(best, steps, valve, library, parts, seed=seed, workers=workers, progress=tell)
     return Asked(stand_in=outdone)
 

@@ -46,6 +46,9 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "by_pressure": diagnosis.by_pressure
         and {"off_pa": diagnosis.by_pressure.off_pa, **_model(diagnosis.by_pressure.model)},
+        "by_command": diagnosis.by_command and _model(diagnosis.by_command.model),
+        "pressure_scale": diagnosis.pressure_scale
+        and {"span": diagnosis.pressure_scale.span, "above_pa": diagnosis.pressure_scale.above_pa},
         "stand_in": diagnosis.stand_in
         and {"form": diagnosis.stand_in.form, "test_rmse_m": diagnosis.stand_in.form_rmse_m},
         "base": _model(diagnosis.base),

@@ -1,0 +1,67 @@
+"""Whether the measured pressure is what drives the stem: what the same valve leaves by its command instead.
+
+A transmitter that is noisy, lags, stands still, is cut off, or is of another line drives a simulated stem elsewhere;
+for that something "is missing that the library does not have". So where a diagnosis by the measured pressure explains
+nothing, its best model is fitted once more by the command. Where that leaves less, by two standard errors of all blocks
+and an evidence of 10 in independent samples, the command is the better witness, and that is said.
+"""
+
+from dataclasses import dataclass
+
+from config.drive import Kind
+from config.results.result import Brief
+from workbench.data.held_out import Split
+from workbench.fit.fitting import fit
+from workbench.select.block_errors import relative_error_reduction
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, bic
+from workbench.select.effect_candidates import EvaluatedModel
+from workbench.select.effect_search import Progress, evaluated
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ByCommand(Brief):
+    """A model that by the measured pressure leaves more than by the command."""
+
+    by_pressure_rmse_m: float
+    """Held out."""
+    model: EvaluatedModel
+    """By the command."""
+
+    def sentence(self, kind: Kind) -> str:
+        """Say so, and what to do."""
+        length, word = kind.length, kind.command.word
+        return kind.text(
+            f"by the command the same valve leaves {length.number(self.model.errors.test_rmse_m)} held out in place of "
+            f"{length.said(self.by_pressure_rmse_m)}: of what drives the stem the measured {word} is the worse witness, "
+            "as that of a transmitter which is noisy, lags, stands still or is cut off, or of another line; diagnose by "
+            "the command"
+        )
+
+
+def by_command(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress) -> ByCommand | None:
+    """Return what the best model by the measured pressure is by the command; None where it explains, or does as well.
+
+    Nor is it asked of a set point, which is no pressure.
+
+    Args:
+        best: what was found.
+        parts: of the record, fitted and held out.
+        seed: of the fit's draws.
+        workers: threads.
+        progress: called with what is under way, and the fraction done.
+    """
+    if not best.fit.from_pressure or best.explained or parts.train.record.by_setpoint:
+        return None
+    found = fit(
+        parts.train.recording,
+        best.fit.valve,
+        seed=seed,
+        workers=workers,
+        profile=False,
+        progress=lambda done: progress("fitting by the command", done),
+    )
+    model = evaluated(found, parts)
+    evidence = model.errors.independent_share * (bic(best.fit) - bic(found))
+    _, standard_errors = relative_error_reduction(best.errors.all_logs, model.errors.all_logs)
+    better = evidence > LEAST_BIC and standard_errors > LEAST_STANDARD_ERRORS
+    return ByCommand(best.errors.test_rmse_m, model) if better else None

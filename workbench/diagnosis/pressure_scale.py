@@ -1,0 +1,91 @@
+"""Whether the measured pressure is on the command's scale: the one is what the other asks for.
+
+    p = u_m + D + c (m - u_m) + e     m the command behind the lag of which the least mean |e| is left, u_m its median
+
+A fit by the measured pressure takes it at its word: psi read as bar make all forces 14.5 times as large, bar absolute a
+preload, and both fit. So c more than a quarter off, or D more than a fifth of what m spans, is said. Where the pressure
+does not follow the command, as |e| of a third of its own changes shows, there is no scale to speak of.
+"""
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from config.drive import Kind
+from config.recording import Column
+from config.results.result import Brief
+from workbench.data.record import UNITS_PA, Record
+
+SPAN_OFF, ZERO_OFF, FOLLOWS = 1.25, 0.2, 1.0 / 3.0
+LAGS = np.geomspace(1e-2, 1e3, 41)
+"""Over the period of the samples."""
+ROUNDS, LEAST_PA = 10, 1e-3
+"""Of weighted least squares, which come to the least mean |e|; and what counts as none there."""
+ALIKE = 0.03
+"""Relative, of what is taken for the ratio of two units, or for an atmosphere."""
+ATMOSPHERE_PA = 101325.0
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PressureScale(Brief):
+    """How a measured pressure stands to its command, where that is not one to one."""
+
+    span: float
+    """c."""
+    above_pa: float
+    """D."""
+
+    def sentence(self, kind: Kind) -> str:
+        """Say so."""
+        off_span = _is_another_span(self.span)
+        way = f"{self.span:.3g} times as large as" if off_span else "off"
+        read = next((f", as {one} read as {other} are" for one, other in _units(self.span)), "") if off_span else ""
+        by = "" if off_span else f" by {kind.command.read.said(self.above_pa)}"
+        zero = "" if off_span or abs(self.above_pa / ATMOSPHERE_PA - 1.0) > ALIKE else ", as absolute ones are"
+        return kind.text(
+            f"the measured {kind.command.word} is {way} the command{by}{read or zero}: what is fitted by it are other "
+            "forces; mend its unit, zero or line, or diagnose by the command"
+        )
+
+
+def pressure_scale(record: Record) -> PressureScale | None:
+    """Return how the measured pressure of a record stands to its command; None where that is one to one, or unknown."""
+    p = record.pressure_pa
+    if p is None or record.by_setpoint:
+        return None
+    rows = np.concatenate([np.arange(*each) for each in record.segments])
+    found = min((_fitted(record, p, rows, share * record.period_s) for share in LAGS), key=lambda each: each[0])
+    left_pa, span, above_pa, spanned_pa = found
+    if left_pa > FOLLOWS * float(np.mean(np.abs(p[rows] - np.median(p[rows])))):
+        return None
+    off = _is_another_span(span) or abs(above_pa) > ZERO_OFF * spanned_pa
+    return PressureScale(span, above_pa) if off else None
+
+
+def _fitted(record: Record, pressure_pa: Column, rows: Column, lag_s: float) -> tuple[float, float, float, float]:
+    """Return mean |e|, Pa, c, D, Pa, and what m spans, Pa, for a lag, s."""
+    e = np.exp(-record.period_s / lag_s)
+    u = record.command_pa
+    m = np.asarray(lfilter([0.0, 1.0 - e], [1.0, -e], u, zi=[u[0]])[0])[rows]
+    p, middle_pa = pressure_pa[rows], float(np.median(m))
+    beside_pa, w = m - middle_pa, np.ones(rows.size)
+    for _ in range(ROUNDS):
+        at_pa, mean_pa = np.average(beside_pa, weights=w), np.average(p, weights=w)
+        spread = float(w @ (beside_pa - at_pa) ** 2)
+        span = float(w @ ((beside_pa - at_pa) * (p - mean_pa))) / spread if spread else 1.0
+        above_pa = float(mean_pa - span * at_pa) - middle_pa
+        off_pa = np.abs(p - middle_pa - above_pa - span * beside_pa)
+        w = 1.0 / (off_pa + LEAST_PA)
+    return float(off_pa.mean()), span, above_pa, float(np.ptp(m))
+
+
+def _is_another_span(span: float) -> bool:
+    return not 1.0 / SPAN_OFF < span < SPAN_OFF
+
+
+def _units(span: float) -> list[tuple[str, str]]:
+    """Return which units read as which others would make a pressure so many times as large."""
+    pairs = permutations(UNITS_PA, 2)
+    return [(one, other) for one, other in pairs if abs(span * UNITS_PA[one] / UNITS_PA[other] - 1.0) < ALIKE]
