@@ -20,7 +20,8 @@ A stem that breaks away under a slower one leaps D ahead, and goes on with the p
     v(t) = u + (D / T - u) exp(-t / T),   T = F_v / k_s,   until v = v_l: for T log((D / T - u) / (v_l - u))
 
 Behind a positioner the stem feeds back on the pressure. There a period is cut into steps so short that the pressure is
-a straight line over each, p'_0 = p'_1, and a jump, which no sample sees under way, is over at once.
+a straight line over each, p'_0 = p'_1, and a jump, which no sample sees under way, is over at once. So it is along a
+measured pressure, of which the ends of parts of a sample are given.
 
 Where a step is told which way the stem went, because the pressure between samples is not known, the stem lands in that
 direction at the pressure of the step's end, or stays.
@@ -52,9 +53,9 @@ from sim.karnopp import (
     write,
 )
 
-FREE, FED_BACK = 2.0, 3.0
-"""What a step is told where the stem decides itself, and where the pressure hangs on it besides; else the direction in
-which it went, -1, 0 or 1."""
+FREE, FED_BACK, ALONG = 2.0, 3.0, 4.0
+"""What a step is told where the stem decides itself, where the pressure hangs on it besides, and where the pressure
+goes evenly to what is commanded; else the direction in which it went, -1, 0 or 1."""
 SLOWEST, FASTEST, SPEEDS = 1e-3, 300.0, 64
 """In Stribeck velocities: where v_l is sought, and on how many points first."""
 GOLDEN = 0.6180339887498949
@@ -378,6 +379,11 @@ def way_of(command: float, h: float, stem: Stem, q: Any, z: Any) -> Way:
 def straight_way(command: float, h: float, stem: Stem, q: Any, z: Any) -> Way:
     """Carry a pressure path that the stem feeds back on over a step, short enough for a straight line."""
     p0, p1 = pressure_ends(command, command, h, stem, q, z)
+    return line(p0, p1, h)
+
+
+def line(p0: float, p1: float, h: float) -> Way:
+    """Return the way of a pressure that goes evenly."""
     rate = (p1 - p0) / h
     return Way(p0, rate, p1, rate)
 
@@ -402,7 +408,12 @@ def over_period(
     for k in range(n):
         t = begin.t + k * h
         stem = Stem(t, now.x, now.v, p)
-        way = straight_way(command, h, stem, q, z) if fed_back else way_of(command, h, stem, q, z)
+        if told == ALONG:
+            way = line(p, p + (command - p) / (n - k), h)
+        elif fed_back:
+            way = straight_way(command, h, stem, q, z)
+        else:
+            way = way_of(command, h, stem, q, z)
         p = way.p1
         if told >= FREE:
             here = Condition(t, now.x, now.v, way.p0, now.mode, now.sigma, now.indicated)
@@ -424,8 +435,8 @@ def glide(
 ) -> None:
     """Hold each command for its period in turn; write t, p, x, v, indicated into the rows of path, the start first.
 
-    `told` says of each period whether the stem is free (FREE, FED_BACK), or the direction in which it went. A period is
-    cut into equal steps of at most longest_step, s: one, but where effects of the pressure path with a memory follow
+    `told` says of each period whether the stem is free (FREE, FED_BACK, ALONG), or the direction in which it went. It
+    is cut into equal steps of at most longest_step, s: one, but where effects of the pressure path with a memory follow
     each other, or the stem feeds back on it.
     """
     valve, now, q, z = karnopp(theta), read(state), theta, state

@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 
-from config.recording import Column
+from config.recording import Column, Recording
+from config.valve_file import EffectTable, valve
 from sim.composition import Composition
+from sim.open_loop import respond
 from workbench.blind.hiding import hide
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
 from workbench.model.pressure_between_samples import means_between_samples_pa, without_gaps_pa
+from workbench.model.sampling import Motion
 
+SEED = valve("seed")
 PERIOD_S, FINE = 0.01, 200
 COMMAND_PA = np.repeat([30e3, 60e3, 20e3, 45e3, 80e3, 50e3], 60)
 
@@ -79,3 +83,20 @@ def test_a_gap_in_the_measured_pressure_is_what_was_commanded_in_it(lag_s: float
     assert np.array_equal(whole_pa[known], pressure_pa[known])
     assert np.max(np.abs(whole_pa - pressure_pa)) < 500.0
     assert np.max(np.abs(line_pa - pressure_pa)) > 1e4
+
+
+@pytest.mark.parametrize("lag_s", [0.3, 1.5, 5.0])
+def test_seen_once_a_second_a_stem_goes_with_the_measured_pressure(lag_s: float) -> None:
+    """Taken for all at once, it left 0.4 to 2 mm of a true valve: it landed where the pressure was a second later."""
+    levels_pa = np.repeat(np.random.default_rng(4).uniform(9e3, 70e3, 30), 8)
+    lag = EffectTable.model_validate({"name": "ip_lag", "time_constant_s": lag_s})
+    lagging = Composition.from_file(SEED.model_copy(update={"effect": (lag,)}))
+    answer = respond(lagging, lagging.theta, levels_pa[:-1], 1.0, step_s=2e-3)
+    noise_m = 3e-5 * np.random.default_rng(5).standard_normal(levels_pa.size)
+    columns = {"command_pa": levels_pa, "position_m": answer.indicated_m + noise_m, "pressure_pa": answer.pressure_pa}
+    record = ready(Recording({"time_s": np.arange(levels_pa.size, dtype=np.float64), **columns}))
+    bare = Composition.from_file(SEED)
+    run = FreeRun(bare, record, from_pressure=True)
+    assert run.by.motion is Motion.QUASI_STATIC
+    off_m = run.position_m(bare.theta) - record.position_m
+    assert np.sqrt(np.nanmean(off_m**2)) < 2e-4

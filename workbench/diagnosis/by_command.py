@@ -30,11 +30,11 @@ class ByCommand(Brief):
     def sentence(self, kind: Kind) -> str:
         """Say so, and what to do."""
         length, word = kind.length, kind.command.word
+        other_m, here_m = length.number(self.model.errors.test_rmse_m), length.said(self.by_pressure_rmse_m)
         return kind.text(
-            f"by the command the same valve leaves {length.number(self.model.errors.test_rmse_m)} held out in place of "
-            f"{length.said(self.by_pressure_rmse_m)}: of what drives the stem the measured {word} is the worse witness, "
-            "as that of a transmitter which is noisy, lags, stands still or is cut off, or of another line; diagnose by "
-            "the command"
+            f"by the command the same valve leaves {other_m} held out in place of {here_m}: of what drives the stem "
+            f"the measured {word} is the worse witness, as that of a transmitter which is noisy, lags, stands still or "
+            "is cut off, or of another line; diagnose by the command"
         )
 
 

@@ -243,9 +243,9 @@ class FreeRun:
         vector = np.array(theta[self._kept])
         for each in self._slow:
             drive_pa, state = self._started(vector, each)
-            path = np.empty((PATH_ROWS, each.rows.size))
+            path = np.empty((PATH_ROWS, each.periods_s.size + 1))
             self._glide(vector, state, drive_pa, each.periods_s, each.told, each.bears_s(vector), path)
-            yield each, path
+            yield each, path[:, :: each.parts]
 
     def _paths(self, theta: Vector) -> Iterator[tuple[int, int, Vector]]:
         """Simulate each segment, from shot to shot: its rows and what the kernel writes, (5, rows)."""

@@ -45,18 +45,37 @@ def means_between_samples_pa(
         parts: of a sample, equal ones.
     """
     rows = [slice(*each) for each in segments]
-    T = _lag_s(period_s, command_pa, pressure_pa, rows)
+    T = pressure_lag_s(period_s, command_pa, pressure_pa, rows)
     ends_s = np.linspace(0.0, period_s, parts + 1)
     left = -np.diff(np.exp(-ends_s / T)) * T / np.diff(ends_s)
     middles = 0.5 * (ends_s[:-1] + ends_s[1:]) / period_s
     means_pa = np.repeat(pressure_pa[:, None], parts, axis=1)
     for each in rows:
         u, p = command_pa[each], pressure_pa[each]
-        m = _followed_pa(period_s, T, u, p)
+        m = command_followed_pa(period_s, T, u, p)
         d = p - m
         followed_pa = u[:-1, None] + np.outer(m[:-1] - u[:-1], left)
         means_pa[each.start : each.stop - 1] = followed_pa + d[:-1, None] + np.outer(np.diff(d), middles)
     return means_pa
+
+
+def ends_of_parts_pa(
+    time_s: Column, command_pa: Column, pressure_pa: Column, followed_pa: Column, lag_s: float, shares: Sequence[float]
+) -> NDArray[np.float64]:
+    """Return the pressures at shares of the time from each sample to the next, Pa, (n - 1, shares).
+
+    Args:
+        time_s: of samples, (n,).
+        command_pa: held from its sample on, (n,).
+        pressure_pa: measured, (n,).
+        followed_pa: m, (n,).
+        lag_s: T.
+        shares: ascending to 1.
+    """
+    s, u = np.array([0.0, *shares]), command_pa[:-1, None]
+    goes_pa = u + (followed_pa[:-1, None] - u) * np.exp(-np.outer(np.diff(time_s), s) / lag_s)
+    d_pa, next_pa = pressure_pa[:-1] - goes_pa[:, 0], pressure_pa[1:] - goes_pa[:, -1]
+    return (goes_pa + d_pa[:, None] + np.outer(next_pa - d_pa, s))[:, 1:]
 
 
 def without_gaps_pa(
@@ -83,26 +102,28 @@ def without_gaps_pa(
             whole_pa[each.start] = command_pa[each.start]
     if not rows:
         return whole_pa
-    T = _lag_s(period_s, command_pa, whole_pa, rows, known)
+    T = pressure_lag_s(period_s, command_pa, whole_pa, rows, known)
     for each in rows:
-        m, there = _followed_pa(period_s, T, command_pa[each], whole_pa[each]), known[each]
+        m, there = command_followed_pa(period_s, T, command_pa[each], whole_pa[each]), known[each]
         at = np.arange(m.size)
         whole_pa[each] = m + np.interp(at, at[there], (whole_pa[each] - m)[there])
     return whole_pa
 
 
-def _lag_s(
+def pressure_lag_s(
     period_s: float,
     command_pa: Column,
     pressure_pa: Column,
     rows: Sequence[slice],
     known: NDArray[np.bool_] | None = None,
 ) -> float:
-    """Return T, s, by what was measured, (n,)."""
+    """Return T, s, by what was measured in some rows; `known`, (n,), says where it was."""
 
     def left_pa(log_share: float) -> float:
         T = period_s * exp(log_share)
-        beyond = [pressure_pa[each] - _followed_pa(period_s, T, command_pa[each], pressure_pa[each]) for each in rows]
+        beyond = [
+            pressure_pa[each] - command_followed_pa(period_s, T, command_pa[each], pressure_pa[each]) for each in rows
+        ]
         d = np.concatenate([d if known is None else d[known[each]] for d, each in zip(beyond, rows, strict=True)])
         return float(np.mean(np.abs(d - np.median(d))))
 
@@ -111,7 +132,7 @@ def _lag_s(
     return period_s * (FASTEST if fast else exp(float(found.x)))
 
 
-def _followed_pa(period_s: float, T: float, u: Column, p: Column) -> Column:
+def command_followed_pa(period_s: float, T: float, u: Column, p: Column) -> Column:
     """Return m, Pa, (n,), from the first measured pressure on."""
     e = exp(-period_s / T)
     m, _ = lfilter([0.0, 1.0 - e], [1.0, -e], u, zi=[p[0]])

@@ -1,6 +1,7 @@
 """A record as it is simulated without inertia, where samples lie farther apart than slides last (`sampling`).
 
-The pressure of a period is the measured one at its end, and rows in which nothing happens are passed over
+A measured pressure goes in straight lines from part to part of a period, as `pressure_between_samples` has it; where
+each rest is judged by itself it is the one at the period's end. Rows in which nothing happens are passed over
 (`stillness`): between a command long held and the next one, with the measured stem at rest, only some are simulated and
 judged. Where the command changed between samples, that of a period is the one at its end, the measured positions say
 which way the stem went, and only rests that a slide ended in are judged. Behind a positioner a period is cut into
@@ -19,11 +20,12 @@ from config.valve_file import ValveParameters
 from sim.composition import AREA, SPRING, Composition
 from sim.karnopp import Vector
 from sim.open_loop import checked_commands, checked_periods
-from sim.quasi_static import FED_BACK, FREE
+from sim.quasi_static import ALONG, FED_BACK, FREE
 from workbench.data.record import Mask, Record
 from workbench.data.stillness import eventful
 from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
 from workbench.model.lead import Lead
+from workbench.model.pressure_between_samples import command_followed_pa, ends_of_parts_pa, pressure_lag_s
 from workbench.model.sampling import Motion, Sampling, landings
 
 CASCADE = 16
@@ -34,6 +36,8 @@ CLOSES, MOST_HALVINGS = 0.5, 3
 """Of the time in which pilot and stem close their loop, the longest step; at most so often it is halved for that."""
 GAIN = "gain_pa_per_ms"
 """K of a positioner."""
+PARTS = (0.01, 0.05, 0.2, 0.5, 1.0)
+"""Where the parts of a period end, along a measured pressure: behind a fast I/P all of it happens in the first."""
 JUDGED = 10
 """Samples of a landing that are judged at most: a long rest knows no more than its beginning."""
 
@@ -52,12 +56,14 @@ class SlowSegment(NamedTuple):
     """As that of a `Segment`."""
     lead: Lead | None
     drive_pa: Vector
-    """Of each period from one of the rows to the next, Pa."""
+    """Of each period from one of the rows to the next, or of each of its parts, Pa."""
     load_n: Vector | None
     """The same of a measured load, N."""
     periods_s: Vector
     told: Vector
-    """Of each period, as `sim.quasi_static` takes it."""
+    """Of each of them, as `sim.quasi_static` takes it."""
+    parts: int
+    """Of a period."""
     step_s: float
     """Longest, s."""
     gain: int | None
@@ -98,7 +104,9 @@ def slow_segments(
         from_pressure: whether what enters is the measured pressure.
         leads: what was commanded before each segment.
     """
-    at_end = from_pressure or not by.held
+    at_end, along = from_pressure or not by.held, from_pressure and by.motion is Motion.QUASI_STATIC
+    shares = np.diff(PARTS, prepend=0.0) if along else np.ones(1)
+    parts = shares.size
     step_s, gain = _longest_s(record, composition), _gain_of(composition)
     told, judged = np.full(len(record), told_nothing(composition)), np.ones(len(record), np.bool_)
     if by.motion is Motion.LANDINGS:
@@ -108,13 +116,16 @@ def slow_segments(
         keep = (judged & (told != FREE) | (np.abs(told) == 1.0))[first:end]
         if by.held:
             keep |= eventful(record, drive_pa, first, end)
+        if along:
+            keep |= eventful(record, record.command_pa, first, end)
         keep[[0, -1]] = True  # a segment has its ends
         rows = first + np.flatnonzero(keep)
         counted = np.flatnonzero(judged[rows])
         following = rows[1:] if at_end else rows[:-1]
-        held_pa = checked_commands(drive_pa[following])
-        load_n = None if record.load_n is None else checked_commands(record.load_n[following])
-        periods_s = checked_periods(np.diff(record.time_s[rows]), held_pa)
+        held_pa = _along_pa(record, drive_pa, rows) if along else drive_pa[following]
+        held_pa = checked_commands(held_pa)
+        load_n = None if record.load_n is None else checked_commands(np.repeat(record.load_n[following], parts))
+        periods_s = checked_periods(np.outer(np.diff(record.time_s[rows]), shares).ravel(), held_pa)
         begin = initial_state(record, first, end, moving=False)
         before = before_start(record, first, end, begin.position_m) if composition.by_setpoint else None
         found.append(
@@ -128,12 +139,22 @@ def slow_segments(
                 drive_pa=held_pa,
                 load_n=load_n,
                 periods_s=periods_s,
-                told=told[rows[1:]],
+                told=np.full(held_pa.size, ALONG) if along else told[rows[1:]],
+                parts=parts,
                 step_s=step_s,
                 gain=gain,
             )
         )
     return found
+
+
+def _along_pa(record: Record, pressure_pa: Column, rows: npt.NDArray[np.int64]) -> Column:
+    """Return the pressure at the ends of the parts of the periods between rows of a segment, Pa, (periods * parts,)."""
+    first, end = next(each for each in record.segments if each[0] == rows[0])
+    u, p = record.command_pa, pressure_pa
+    T = pressure_lag_s(record.period_s, u, p, [slice(*each) for each in record.segments])
+    m = command_followed_pa(record.period_s, T, u[first:end], p[first:end])[rows - first]
+    return ends_of_parts_pa(record.time_s[rows], u[rows], p[rows], m, T, PARTS).ravel()
 
 
 def told_nothing(composition: Composition) -> float:
