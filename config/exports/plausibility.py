@@ -51,7 +51,12 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
         where = f"{position_m[whole][0]:g} {kind.travel.si}"
         said.append(f"the position is {where} throughout: a stem that never moves says nothing")
     elif whole.any() and command_pa is not None and of_valve and not swapped:
-        said += [*_of_pressure(command_pa), *_of_action(position_m, command_pa), *_of_sampling(recording)]
+        held_pa = _held(command_pa)
+        said += [
+            *_of_pressure(command_pa),
+            *_of_action(position_m, held_pa),
+            *_of_sampling(recording.time_s, position_m, held_pa),
+        ]
     return said
 
 
@@ -139,9 +144,15 @@ def _of_action(position_m: Column, command_pa: Column) -> Iterator[str]:
         )
 
 
-def _of_sampling(recording: Recording) -> Iterator[str]:
+def _held(command_pa: Column) -> Column:
+    """Return the commands with those in force where none is written, as of one that is kept with its changes alone."""
+    known = np.isfinite(command_pa)
+    return command_pa[np.maximum.accumulate(np.where(known, np.arange(known.size), 0))]
+
+
+def _of_sampling(time_s: Column, position_m: Column, command_pa: Column) -> Iterator[str]:
     """Yield what is odd about when it was sampled: after the command's change, too seldom, on a historian's lines."""
-    t, x, u = recording.time_s, recording.position_m, recording.command_pa
+    t, x, u = time_s, position_m, command_pa
     whole = np.isfinite(x) & np.isfinite(u)
     t, x, u = t[whole], x[whole], u[whole]
     if x.size < FEWEST_ROWS or np.ptp(u) == 0.0:

@@ -56,3 +56,10 @@ def test_it_is_said(columns: dict[str, Column], said: str) -> None:
 
     found = oddities(recording(**columns), 0.04)
     assert any(re.search(said, each) for each in found), found
+
+
+def test_a_command_that_is_kept_with_its_changes_alone_did_not_change_between_samples() -> None:
+    """Of the rows with a command alone every one shows a stem that has moved meanwhile."""
+    kept = np.where(np.diff(COMMAND, prepend=0.0) != 0.0, COMMAND, np.nan)
+    position_m = answered(COMMAND)
+    assert oddities(recording(command_pa=kept, position_m=position_m), 0.04) == ["98 % of command_pa is missing"]
