@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 
 from positioner.cli.parts.demo_folder import demo_folder, recording_in
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.passing_line import passing
 from positioner.cli.parts.simulated_plant import AGEING, AGES_AT_S, BUSES, started
 
 if TYPE_CHECKING:
@@ -257,26 +258,29 @@ def _observe(dcs: "Dcs", duration_s: float, label: str) -> float:
     while True:
         now = dcs.get_all("state", "position", "reference_in_force", "command")
         positions.append(now["position"])
-        _show_passing(f"{label:36} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa")
+        _show_passing(shown_step(label, now))
         if time.monotonic() >= end_s:
             return sum(positions) / len(positions)
         time.sleep(0.02)
 
 
-def _bar(now: dict[str, float], width: int = 30) -> str:
+def shown_step(label: str, now: dict[str, float]) -> str:
+    """Return what a terminal of 80 columns has room for."""
+    return f"{label:34} {_bar(now)} S{now['state']:.0f} {now['command'] / 1e3:5.1f} kPa"
+
+
+def _bar(now: dict[str, float], width: int = 20) -> str:
     """Draw stem (#) and reference (|) over the travel."""
     stem = round(min(max(now["position"], 0.0), 1.0) * width)
     cells = ["#"] * stem + ["."] * (width - stem)
     cells[min(round(now["reference_in_force"] * width), width - 1)] = "|"
-    return f"[{''.join(cells)}] {now['position']:.3f}"
+    return f"[{''.join(cells)}] {now['position']:z.3f}"
 
 
 def _show_passing(text: str) -> None:
     """Show a passing line on a terminal."""
-    import sys
-
     if sys.stdout.isatty():
-        print(f"\r\033[K{text}", end="", flush=True)
+        print(passing(text, sys.stdout), end="", flush=True)
 
 
 def _print_line(text: str) -> None:

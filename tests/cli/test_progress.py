@@ -1,8 +1,13 @@
 """Progress: one moving line on a terminal, few lines in a log."""
 
 import io
+import os
 import threading
 
+import pytest
+
+from positioner.cli.demo import shown_step
+from positioner.cli.parts.passing_line import passing
 from positioner.cli.parts.progress import SELDOM_S, Progress
 
 
@@ -25,6 +30,29 @@ def test_a_terminal_has_one_line_written_over() -> None:
     assert said.count("\r") == 10
     assert said.count("\n") == 1
     assert said.endswith("100%\n")
+
+
+@pytest.mark.parametrize("columns", [80, 40])
+def test_a_line_that_passes_is_no_longer_than_the_terminal_is_wide(
+    columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The demo's had 88 columns: on a terminal of 80 each left a row behind, some 500 of them."""
+    monkeypatch.setattr("os.get_terminal_size", lambda _: os.terminal_size((columns, 24)))
+    shown = Terminal()
+    shown.fileno = lambda: 1  # type: ignore[method-assign]
+    for what in (step_shown(), "x" * 200):
+        said = passing(what, shown)
+        assert len(said.removeprefix("\r\033[K")) == min(len(what), columns - 1)
+
+
+def test_what_the_demo_shows_of_a_step_has_room_in_eighty_columns() -> None:
+    assert len(step_shown()) < 80
+    assert step_shown().endswith("] 0.000 S3 100.0 kPa")
+
+
+def step_shown() -> str:
+    now = {"position": -1e-9, "reference_in_force": 1.0, "state": 3.0, "command": 1e5}
+    return shown_step("identified anew: step to 0.65 p.u.", now)
 
 
 def test_a_log_has_few_lines() -> None:

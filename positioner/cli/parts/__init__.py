@@ -18,6 +18,6 @@ A command imports from here what it needs when it runs.
     register_readers                            the register map as configurations of programs that read it:
     telegraf, modbus_exporter, home_assistant, node_red     one each
     sampling                                    when a device samples, for `doctor --nudge-pa`
-    authority, progress                         a test certificate authority; progress on a terminal
+    authority, progress, passing_line           a test certificate authority; progress on a terminal, in one line there
     breaking_off                                Ctrl-C during long work: what is known is said
 """

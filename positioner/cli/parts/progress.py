@@ -12,6 +12,7 @@ from threading import Event, Lock, Thread
 from typing import Self, TextIO
 
 from positioner.cli.parts.breaking_off import told_when_broken_off
+from positioner.cli.parts.passing_line import passing
 
 SELDOM_S, BEAT_S = 20.0, 1.0
 """Time between two lines of a log, what is done sooner leaves none; and between two looks at the clock."""
@@ -49,7 +50,7 @@ class Progress:
         if self._beats:
             self._beats.join()
         if self._stream.isatty() and (self._done is None or self._done >= 1.0):
-            print("\r\033[K", end="", file=self._stream, flush=True)
+            print(passing("", self._stream), end="", file=self._stream, flush=True)
 
     @property
     def known(self) -> str:
@@ -61,7 +62,7 @@ class Progress:
         with self._one_at_a_time:
             self._what, self._done = what, done
             if self._stream.isatty():
-                self._redraw("\n" if done >= 1.0 else "")
+                self._redraw(end="\n" if done >= 1.0 else "")
             elif (now_s := self._clock()) - self._told_s >= SELDOM_S:
                 self._tell(self._last, now_s)
 
@@ -71,7 +72,7 @@ class Progress:
             now_s = self._clock()
             so_far = f"{now_s - self._began_s:.0f} s so far"
             if self._stream.isatty():
-                self._redraw(f", {so_far}")
+                self._redraw(said=f", {so_far}")
             elif now_s - self._told_s >= SELDOM_S:
                 self._tell(f"{self._last or 'at work'}, {so_far}", now_s)
 
@@ -83,9 +84,9 @@ class Progress:
         while not self._over.wait(BEAT_S):
             self.beat()
 
-    def _redraw(self, end: str) -> None:
+    def _redraw(self, said: str = "", end: str = "") -> None:
         bar = "" if self._done is None else f" [{'#' * round(20 * self._done):<20}] {self._done:.0%}"
-        print(f"\r\033[K{self._what or 'at work'}{bar}", end=end, file=self._stream, flush=True)
+        print(passing(f"{self._what or 'at work'}{bar}{said}", self._stream), end=end, file=self._stream, flush=True)
 
     def _tell(self, line: str, now_s: float) -> None:
         self._told_s = now_s
