@@ -35,6 +35,7 @@ from config.errors import InputError
 from config.plain_file import MOST_COLUMNS, require_moderate
 from config.results.block import Block, Table
 from config.results.result import Result
+from config.whole_file import beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -317,9 +318,10 @@ def write_recording(path: Path, recording: Recording) -> None:
     require_recording_name(path)
     try:
         if path.suffix == ".parquet":
-            _write_parquet(path, recording)
+            with beside(path) as new:
+                _write_parquet(new, recording)
             return
-        with _text_to(path) as file:
+        with beside(path) as new, _text_to(new, packed=path.suffix == ".gz") as file:
             file.writelines(f"# {key}: {value}\n" for key, value in recording.metadata.items())
             file.write(",".join(recording.own_columns) + "\n")
             for row in zip(*(column.tolist() for column in recording.columns.values()), strict=True):
@@ -330,16 +332,16 @@ def write_recording(path: Path, recording: Recording) -> None:
 
 
 @contextmanager
-def _text_to(path: Path) -> Iterator[TextIO]:
-    """Open a CSV file to be written, compressed if it is named so; the same recording, the same bytes."""
+def _text_to(path: Path, *, packed: bool) -> Iterator[TextIO]:
+    """Open a CSV file to be written, compressed if need be; the same recording, the same bytes."""
     with path.open("wb") as file:
-        if path.suffix != ".gz":
+        if not packed:
             with TextIOWrapper(file, encoding="utf-8", newline="") as text:
                 yield text
             return
         with (
-            gzip.GzipFile("", "wb", fileobj=file, mtime=0) as packed,
-            TextIOWrapper(packed, encoding="utf-8", newline="") as text,
+            gzip.GzipFile("", "wb", fileobj=file, mtime=0) as zipped,
+            TextIOWrapper(zipped, encoding="utf-8", newline="") as text,
         ):
             yield text
 

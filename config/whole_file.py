@@ -1,10 +1,13 @@
-"""Replaces a file whole, so that a crash or a loss of power leaves the old one or the new one, never a part.
+"""Replaces a file whole: a crash, a full disk or a loss of power leaves the old one or the new one, never a part.
 
-The new text is written beside the file and forced to the disk; then it takes the file's name, and the folder, which
-holds the name, is forced to the disk, too.
+The new one is written beside the file, and then takes its name. What must outlive a loss of power is forced to the disk
+before (`replace_whole`), and so is the folder, which holds the name.
 """
 
 import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -14,13 +17,36 @@ def replace_whole(path: Path, text: str) -> None:
     Raises:
         OSError: it cannot be written; the old file is as it was.
     """
-    beside = path.with_name(path.name + ".new")
-    with beside.open("w", encoding="utf-8") as file:
+    with beside(path) as new, new.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
-    beside.replace(path)
     sync_folder(path.parent)
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[Path]:
+    """Give the path at which to write what is to stand at another one: it takes that name once it is whole.
+
+    Of a link, what it points to is replaced. A pipe or a device (`/dev/stdout`) is written itself, so is a file in a
+    folder that takes no other, and one that may not be written says so.
+
+    Raises:
+        OSError: it cannot take the name; the old file is as it was.
+    """
+    target = path.resolve()
+    replaceable = not target.exists() or (target.is_file() and os.access(target, os.W_OK))
+    if not replaceable or not os.access(target.parent, os.W_OK | os.X_OK):
+        yield path
+        return
+    new = target.with_name(target.name + ".new")
+    try:
+        yield new
+        if target.exists():
+            shutil.copymode(target, new)
+        new.replace(target)
+    finally:
+        new.unlink(missing_ok=True)
 
 
 def sync_folder(folder: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from config.drive import VALVE
 from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile
+from config.whole_file import beside
 
 
 def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) -> None:
@@ -18,10 +19,11 @@ def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) 
         InputError: it cannot be written.
     """
     path = Path(path)
-    beside = file.model_copy(update={"effect": tuple(_seen_from(path.parent, each) for each in file.effect)})
-    text = "".join(f"# {remark}\n" for remark in remarks) + valve_toml(beside)
+    seen = file.model_copy(update={"effect": tuple(_seen_from(path.parent, each) for each in file.effect)})
+    text = "".join(f"# {remark}\n" for remark in remarks) + valve_toml(seen)
     try:
-        path.write_text(text, encoding="utf-8")
+        with beside(path) as new:
+            new.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 

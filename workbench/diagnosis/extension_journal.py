@@ -9,6 +9,7 @@ from typing import Self
 from config.drive import Scale
 from config.errors import InputError
 from config.loading import Schema, validated
+from config.whole_file import beside
 from config.writing import write_valve
 from workbench.diagnosis.extension import Extension
 
@@ -75,7 +76,8 @@ class Journal(Schema):
 
     def write_beside(self, valve: Path) -> None:
         """Write the journal of a valve file."""
-        journal_path(valve).write_text(self.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        with beside(journal_path(valve)) as new:
+            new.write_text(self.model_dump_json(indent=2) + "\n", encoding="utf-8")
 
     def remarks(self, length: Scale) -> tuple[str, ...]:
         """Return one line a step, lengths as they are read."""

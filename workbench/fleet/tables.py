@@ -17,6 +17,7 @@ from typing import Any
 
 from config.errors import InputError
 from config.extras import needed
+from config.whole_file import beside
 from workbench.fleet.examination import AS_BEFORE, Examination, unreadable
 from workbench.fleet.valve_course import Model, ValveCourse
 
@@ -125,10 +126,9 @@ def write_tables(courses: Sequence[ValveCourse], folder: Path) -> None:
         schema = arrow.schema(
             [arrow.field(each.name, _type(arrow, each, offset), metadata={"meaning": each.meaning}) for each in columns]
         )
-        beside = path.with_name(path.name + ".new")
         try:
-            parquet.write_table(arrow.Table.from_pylist([_in_utc(row) for row in rows], schema), beside)
-            beside.replace(path)
+            with beside(path) as new:
+                parquet.write_table(arrow.Table.from_pylist([_in_utc(row) for row in rows], schema), new)
         except OSError as error:
             raise InputError(str(path), f"cannot be written: {error.strerror or error}") from None
 

@@ -14,6 +14,7 @@ from typing import Any, NewType
 
 from config.errors import InputError
 from config.valve_file import ValveFile
+from config.whole_file import beside
 from workbench.report.units import Shown
 
 HERE = Path(__file__).parent
@@ -89,7 +90,8 @@ def _write(path: Path, title: str, parts: Iterable[Html], library: str, script: 
         script=script,
     )
     try:
-        path.write_text(page, encoding="utf-8", errors="backslashreplace")  # a file's name need not be text
+        with beside(path) as new:
+            new.write_text(page, encoding="utf-8", errors="backslashreplace")  # a file's name need not be text
     except OSError as error:
         raise InputError(str(path), f"cannot be written: {error.strerror}") from None
 

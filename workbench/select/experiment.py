@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from config.recording import Recording
 from config.results.result import Brief
+from config.whole_file import beside
 from sim.composition import Composition
 from sim.open_loop import respond
 from workbench.data.noise_floor import with_noise
@@ -50,7 +51,8 @@ class Experiment(Brief):
         """Write `time_s, command_pa`."""
         rows = zip(self.time_s.tolist(), self.command_pa.tolist(), strict=True)
         text = "".join(f"{time:.6g},{command:.6g}\n" for time, command in rows)
-        path.write_text(f"# experiment: {self.name}\ntime_s,command_pa\n{text}", encoding="utf-8")
+        with beside(path) as new:
+            new.write_text(f"# experiment: {self.name}\ntime_s,command_pa\n{text}", encoding="utf-8")
 
 
 def _steps(phase: Command) -> Command:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from config.errors import InputError
+from config.whole_file import beside
 
 OPTIONS: Mapping[str, str] = {"out": "-o", "json": "--json", "report": "--report", "picture": "--picture"}
 """By which files are written, by their names among a command's arguments."""
@@ -102,7 +103,8 @@ def write_text(path: Path, text: str, option: str) -> None:
         InputError: it cannot be written.
     """
     try:
-        path.write_text(text, encoding="utf-8")
+        with beside(path) as new:
+            new.write_text(text, encoding="utf-8")
     except OSError as error:
         raise _unwritable(option, path, error) from None
 
