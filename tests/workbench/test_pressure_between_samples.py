@@ -8,9 +8,10 @@ from config.valve_file import EffectTable, valve
 from sim.composition import Composition
 from sim.open_loop import respond
 from workbench.blind.hiding import hide
+from workbench.data.pressure_lag import without_gaps_pa
 from workbench.data.record import ready
 from workbench.model.free_run import FreeRun
-from workbench.model.pressure_between_samples import means_between_samples_pa, without_gaps_pa
+from workbench.model.pressure_between_samples import means_between_samples_pa
 from workbench.model.sampling import Motion
 
 SEED = valve("seed")
@@ -79,7 +80,8 @@ def test_a_gap_in_the_measured_pressure_is_what_was_commanded_in_it(lag_s: float
     known = np.ones(COMMAND_PA.size, dtype=np.bool_)
     known[:2] = known[100:290] = known[-5:] = False
     line_pa = np.interp(np.arange(COMMAND_PA.size), np.flatnonzero(known), pressure_pa[known])
-    whole_pa = without_gaps_pa(PERIOD_S, COMMAND_PA, line_pa, ((0, 210), (210, COMMAND_PA.size)), known)
+    time_s: Column = PERIOD_S * np.arange(COMMAND_PA.size, dtype=np.float64)
+    whole_pa = without_gaps_pa(time_s, COMMAND_PA, line_pa, ((0, 210), (210, COMMAND_PA.size)), known)
     assert np.array_equal(whole_pa[known], pressure_pa[known])
     assert np.max(np.abs(whole_pa - pressure_pa)) < 500.0
     assert np.max(np.abs(line_pa - pressure_pa)) > 1e4

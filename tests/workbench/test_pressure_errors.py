@@ -74,6 +74,17 @@ def test_zero_and_span_of_the_transmitter_are_not_held_against_a_valve() -> None
     assert errors.rms_pa == pytest.approx(NOISE_PA, rel=0.1)
 
 
+def test_what_was_not_measured_is_held_against_no_valve() -> None:
+    """A straight line over all that was commanded meanwhile differed from every model by kilopascals."""
+    whole = recorded(BARE)
+    kept_pa = np.where(np.arange(COUNT) % 500 < 250, whole.columns["pressure_pa"], np.nan)
+    recording = Recording({**whole.columns, "pressure_pa": kept_pa})
+    errors = pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording]))
+    assert errors is not None
+    assert errors.rms_pa == pytest.approx(NOISE_PA, rel=0.1)
+    assert errors.structured_pa < NOISE_PA
+
+
 def test_without_a_measured_pressure_nothing_is_said_of_it() -> None:
     recording = recorded(BARE, measured=False)
     assert pressure_errors(fit(recording, BARE, profile=False, workers=1), split([recording])) is None

@@ -260,3 +260,14 @@ def test_a_position_in_mm_is_told_to_be_imported_as_such() -> None:
     small = SEED.valve.model_copy(update={"stroke_m": 0.04})
     with pytest.raises(InputError, match=r"it looks like mm; import it, --column position_m=NAME:mm$"):
         require_units(ready(Recording({**columns, "position_m": 600.0 * columns["position_m"]})), small)
+
+
+def test_a_pressure_with_gaps_is_in_another_unit_all_the_same() -> None:
+    """What the command makes of a gap is in Pa."""
+    time_s = np.arange(400.0)
+    command_pa = np.repeat(np.random.default_rng(3).uniform(2e4, 8e4, 20), 20)
+    shown_kpa = np.where(time_s % 50.0 < 30.0, 1e-3 * command_pa, np.nan)
+    columns = {"time_s": time_s, "command_pa": command_pa, "position_m": 1e-6 * command_pa, "pressure_pa": shown_kpa}
+    record = ready(Recording(columns))
+    with pytest.raises(InputError, match=r"pressure_pa reaches .*: it looks like kPa"):
+        require_units(record, SEED.valve)

@@ -6,6 +6,7 @@ Its files:
     held_out          what is fitted, and what judges
     clocks            whether the stem moves before its command
     noise_floor       what no model explains: noise, rounding, how well the valve repeats itself
+    pressure_lag      the lag of a measured pressure, and what it was where it was not measured
     motion            velocity, and the slips
     plateaus          where the stem rests, of few samples a move
     stillness         which rows tell something, and which only say it again

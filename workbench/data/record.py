@@ -25,6 +25,7 @@ from config.valve_file import ValveParameters
 from workbench.data.clocks import Early, early
 from workbench.data.motion import AT_ONCE, rests_first, slips
 from workbench.data.noise_floor import UNKNOWN, noise_std_m, not_repeating_m, repeatability_m, said_noise_m
+from workbench.data.pressure_lag import without_gaps_pa
 
 GAP = 10.0
 """A gap is longer than this many times the 95 % quantile of the periods: unevenly logged data have none by that."""
@@ -82,7 +83,7 @@ class Record(Brief):
     commanded_from: tuple[int, ...] = ()
     """For each segment the row from which its command is known: what lies between was left out, being in motion."""
     pressure_known: Mask | None = None
-    """Where the pressure was measured; between, it is interpolated."""
+    """Where the pressure was measured; elsewhere it is what the command makes of it (`pressure_lag`)."""
     early: Early | None = None
     """How much the stem moves before its command: their clocks differ, and no verdict may rest on it."""
 
@@ -159,7 +160,7 @@ def ready(recording: Recording) -> Record:
         time_s,
         command_pa,
         position_m,
-        _whole(columns.get("pressure_pa"), "pressure_pa", notes),
+        _pressure_pa(columns, command_pa, segments, by_setpoint=recording.by_setpoint, notes=notes),
         _whole(columns.get("load_n"), "load_n", notes),
         valid,
         segments,
@@ -305,7 +306,8 @@ def _require_pressure_unit(record: Record) -> None:
     """Hold the measured pressure against the command: both are the same quantity, but for a lag."""
     if record.pressure_pa is None:
         return
-    command_pa, measured = float(np.max(np.abs(record.command_pa))), float(np.max(np.abs(record.pressure_pa)))
+    shown = record.pressure_pa[record.pressure_known]
+    command_pa, measured = float(np.max(np.abs(record.command_pa))), float(np.max(np.abs(shown)))
     for unit, factor in UNITS_PA.items():
         if 0.0 < measured < 0.03 * command_pa and 0.3 < measured * factor / command_pa < 3.0:
             raise InputError(
@@ -468,6 +470,26 @@ def _whole(column: Column | None, name: str, notes: list[str]) -> Column | None:
     notes.append(f"{name} is not a number in {_samples(~finite)}: interpolated")
     rows = np.arange(column.size)
     return np.interp(rows, rows[finite], column[finite])
+
+
+def _pressure_pa(
+    columns: Mapping[str, Column],
+    command_pa: Column,
+    segments: tuple[tuple[int, int], ...],
+    *,
+    by_setpoint: bool,
+    notes: list[str],
+) -> Column | None:
+    """Return the measured pressure; where it is not a number what the command, if that is a pressure, makes of it."""
+    measured_pa = columns.get("pressure_pa")
+    if measured_pa is None or by_setpoint or not np.isfinite(measured_pa).any():
+        return _whole(measured_pa, "pressure_pa", notes)
+    known = np.isfinite(measured_pa)
+    if known.all():
+        return measured_pa
+    notes.append(f"pressure_pa is not a number in {_samples(~known)}: what the command makes of it there")
+    whole_pa = np.where(known, measured_pa, command_pa)
+    return without_gaps_pa(columns["time_s"], command_pa, whole_pa, segments, known)
 
 
 def _is_even(time_s: Column) -> bool:

@@ -56,6 +56,9 @@ def pressure_scale(record: Record) -> PressureScale | None:
     if p is None or record.by_setpoint:
         return None
     rows = np.concatenate([np.arange(*each) for each in record.segments])
+    rows = rows if record.pressure_known is None else rows[record.pressure_known[rows]]
+    if not rows.size:
+        return None
     found = min((_fitted(record, p, rows, share * record.period_s) for share in LAGS), key=lambda each: each[0])
     left_pa, span, above_pa, spanned_pa = found
     if left_pa > FOLLOWS * float(np.mean(np.abs(p[rows] - np.median(p[rows])))):

@@ -52,7 +52,7 @@ from workbench.model.initial_state import (
     initial_state,
 )
 from workbench.model.lead import Lead, lead_of
-from workbench.model.pressure_between_samples import means_between_samples_pa, without_gaps_pa
+from workbench.model.pressure_between_samples import means_between_samples_pa
 from workbench.model.sampling import NO_LANDING, Sampling, sampling
 from workbench.model.slow_segments import SlowSegment, slow_segments, told_nothing
 
@@ -386,29 +386,23 @@ def _require_same_input(composition: Composition, record: Record) -> None:
 
 
 def _measured(record: Record) -> Column:
-    """Return the measured pressure at the samples, Pa, (n,); where one has none, what the command makes of it.
+    """Return the measured pressure at the samples, Pa, (n,).
 
     Raises:
         InputError: there is none.
     """
-    pressure_pa, known = record.pressure_pa, record.pressure_known
-    if pressure_pa is None:
+    if record.pressure_pa is None:
         raise InputError("recording", "has no measured pressure_pa to simulate from")
-    if known is None or known.all():
-        return pressure_pa
-    return without_gaps_pa(record.period_s, _followed(record), pressure_pa, record.segments, known)
+    return record.pressure_pa
 
 
 def _in_parts(record: Record, pressure_pa: Column) -> Vector:
     """Return the means of a pressure, Pa, (n,), over the parts from each sample to the next, (n, parts)."""
     period_s = record.period_s
+    # A set point is no pressure that another one follows.
+    command_pa = np.zeros_like(pressure_pa) if record.by_setpoint else record.command_pa
     parts = min(MOST_PARTS, ceil(period_s / PART_S))
-    return means_between_samples_pa(period_s, _followed(record), pressure_pa, record.segments, parts)
-
-
-def _followed(record: Record) -> Column:
-    """Return the command that the pressure follows, Pa, (n,): a set point is none."""
-    return np.zeros_like(record.command_pa) if record.by_setpoint else record.command_pa
+    return means_between_samples_pa(period_s, command_pa, pressure_pa, record.segments, parts)
 
 
 def _require_bare_pressure(composition: Composition) -> None:

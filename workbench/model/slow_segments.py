@@ -21,11 +21,12 @@ from sim.composition import AREA, SPRING, Composition
 from sim.karnopp import Vector
 from sim.open_loop import checked_commands, checked_periods
 from sim.quasi_static import ALONG, FED_BACK, FREE
+from workbench.data.pressure_lag import command_followed_pa, pressure_lag_s
 from workbench.data.record import Mask, Record
 from workbench.data.stillness import eventful
 from workbench.model.initial_state import BeforeStart, InitialState, before_start, initial_state
 from workbench.model.lead import Lead
-from workbench.model.pressure_between_samples import command_followed_pa, ends_of_parts_pa, pressure_lag_s
+from workbench.model.pressure_between_samples import ends_of_parts_pa
 from workbench.model.sampling import Motion, Sampling, landings
 
 CASCADE = 16

@@ -67,6 +67,7 @@ def _of_rows(record: Record, keep: Mask) -> Record:
         command_pa=held(record.command_pa),
         position_m=record.position_m[rows],
         pressure_pa=None if record.pressure_pa is None else record.pressure_pa[rows],
+        pressure_known=None if record.pressure_known is None else record.pressure_known[rows],
         load_n=None if record.load_n is None else held(record.load_n),
         valid=record.valid[rows],
         segments=tuple((int(at[first]), int(at[end - 1]) + 1) for first, end in record.segments),
