@@ -150,7 +150,7 @@ def _write_valve(diagnosis: "Diagnosis", valve: "ValveFile", arguments: argparse
     from workbench.diagnosis.extension import extension_of
     from workbench.diagnosis.extension_journal import write_extended
 
-    if diagnosis.verdict != "missing":
+    if not diagnosis.sure:
         print(not_written(arguments.out, diagnosis))
         return
     journal = write_extended(extension_of(diagnosis, valve), find_valve(arguments.valve), arguments.out)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,12 +10,14 @@ from scipy.signal import lfilter
 
 from config.drive import VALVE
 from config.recording import Column, Recording
+from positioner.cli.parts.next_step import not_written
 from tests.workbench.test_pressure_errors import BARE, COMMAND_PA, recorded
 from workbench.data.held_out import split
 from workbench.data.record import Record, ready
 from workbench.diagnosis.by_command import ByCommand, by_command
 from workbench.diagnosis.diagnosis import diagnose
 from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.extension import extend
 from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fitting import local_fit
 from workbench.select.effect_search import evaluated
@@ -78,11 +81,20 @@ def by_pressure(pressure_pa: Column) -> Recording:
     return Recording({name: column[:600] for name, column in columns.items()})
 
 
+@pytest.mark.long
 def test_a_valve_by_a_pressure_of_another_unit_is_not_adequate_without_a_word() -> None:
     found = diagnose(by_pressure(14.5038 * behind(0.1)), BARE, effects=(), workers=1, from_pressure=True)
     assert "But the measured pressure is 14.5 times as large" in found.sentence
     assert not found.nothing_off
+    assert not replace(found, verdict="missing").sure
+    assert "another scale" in not_written(Path("better.toml"), replace(found, verdict="missing"))
     assert as_json(found)["pressure_scale"]["span"] == pytest.approx(14.5038, rel=1e-3)
+
+
+@pytest.mark.long
+def test_nor_is_one_extended_without_a_word() -> None:
+    found = extend(by_pressure(behind(0.1) + 101325.0), BARE, ["preload"], workers=1, from_pressure=True)
+    assert "but the measured pressure is off the command by 101 kPa, as absolute ones are" in found.summary()
 
 
 def asked(pressure_pa: Column) -> ByCommand | None:

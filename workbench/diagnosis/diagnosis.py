@@ -87,6 +87,11 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         return self.verdict == "adequate" and not off
 
     @property
+    def sure(self) -> bool:
+        """Whether what is missing is known, by forces that are the valve's."""
+        return self.verdict == "missing" and not (self.pressure_scale and self.best.fit.from_pressure)
+
+    @property
     def suspected(self) -> tuple[str, ...]:
         """Effects that may be there, but that nothing proves: the valve without them is at the floor."""
         return tuple(each.name for each in self.steps[-1].suspected)

@@ -20,6 +20,7 @@ from sim.composition import Composition
 from sim.effect import find_effect, find_effects
 from workbench.data.held_out import Part, Split, residual_m, split
 from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import fit, profiled
@@ -78,11 +79,13 @@ class Extension(Result):
         ]
         floor = "unknown" if self.split.floor_m is None else length.number(self.split.floor_m, ".4g")
         rows.append(("floor: what no model undercuts" + BY_COMMAND * self.extended.from_pressure, floor, floor))
+        scale = pressure_scale(self.split.train.record) if self.extended.from_pressure else None
         return [
             f"with {', '.join(self.effects)} the held-out error {falls} {length.number(before_m, '.4g')} to "
             f"{length.said(after_m, '.4g')} rms",
             Table((f"error, {length.unit} rms", "fitted", "held out"), rows),
             parameter_table(self.extended.parameters, self.extended.kind),
+            *([f"but {scale.sentence(self.extended.kind)}"] if scale else []),
             *([self.extended.by.sentence] if self.extended.by.sentence else []),
         ]
 

@@ -60,6 +60,7 @@ def not_written(path: Path, diagnosis: "Diagnosis") -> str:
     """Return why a diagnosis writes no valve file."""
     why = {
         "adequate": "nothing is missing",
+        "missing": "the measured pressure is on another scale than the command",
         "one_of": "several effects do as well; choose by one of the commands",
         "unexplained": "what was found does not explain the recordings",
         "unjudged": "of these recordings nobody can say whether anything is missing",
