@@ -41,6 +41,14 @@ def test_the_mean_behind_a_lag_that_nobody_told(lag_s: float) -> None:
     assert np.sqrt(np.mean((found_pa - mean_pa)[:-1] ** 2)) < 40.0
 
 
+@pytest.mark.parametrize("lag_s", [1e-4, 0.05])
+def test_a_transmitter_whose_zero_is_off_does_not_kick_the_stem_at_the_start(lag_s: float) -> None:
+    """The command was followed from the pressure at the start: 100 kPa less, and back, within the first sample."""
+    pressure_pa, _ = lagging(lag_s, np.full(COMMAND_PA.size, 1e5))
+    found_pa = means_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, COMMAND_PA.size),), 5)
+    assert np.max(np.abs(found_pa[:10] - pressure_pa[0])) < 100.0
+
+
 def test_stretches_are_no_steps_of_each_other() -> None:
     pressure_pa, _ = lagging(0.02, np.zeros(COMMAND_PA.size))
     alone_pa = means_between_samples_pa(PERIOD_S, COMMAND_PA, pressure_pa, ((0, 180), (180, COMMAND_PA.size)), 1)[:, 0]

@@ -39,10 +39,8 @@ def without_gaps_pa(
         segments: half-open ranges of rows that follow each other.
         known: where it was measured, (n,).
     """
-    whole_pa, rows = pressure_pa.copy(), [slice(*each) for each in segments if known[slice(*each)].any()]
-    for each in rows:
-        if not known[each.start]:
-            whole_pa[each.start] = command_pa[each.start]
+    whole_pa = np.where(known, pressure_pa, command_pa)
+    rows = [slice(*each) for each in segments if known[slice(*each)].any()]
     if not rows:
         return whole_pa
     period_s = float(np.median(np.concatenate([np.diff(time_s[each]) for each in rows])))
@@ -78,9 +76,9 @@ def pressure_lag_s(
 
 
 def command_followed_pa(period_s: float, T: float, u: Column, p: Column) -> Column:
-    """Return m, Pa, (n,), from the first measured pressure on."""
+    """Return m, Pa, (n,), from the first measured pressure on; zero apart, for what p is above u mostly is no lag."""
     from scipy.signal import lfilter
 
     e = exp(-period_s / T)
-    m, _ = lfilter([0.0, 1.0 - e], [1.0, -e], u, zi=[p[0]])
+    m, _ = lfilter([0.0, 1.0 - e], [1.0, -e], u, zi=[p[0] - np.median(p - u)])
     return np.asarray(m)

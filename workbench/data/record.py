@@ -488,8 +488,7 @@ def _pressure_pa(
     if known.all():
         return measured_pa
     notes.append(f"pressure_pa is not a number in {_samples(~known)}: what the command makes of it there")
-    whole_pa = np.where(known, measured_pa, command_pa)
-    return without_gaps_pa(columns["time_s"], command_pa, whole_pa, segments, known)
+    return without_gaps_pa(columns["time_s"], command_pa, measured_pa, segments, known)
 
 
 def _is_even(time_s: Column) -> bool:
