@@ -15,7 +15,7 @@ from workbench.blind.trial import LEVELS, NOISE_M, Trial
 from workbench.data.held_out import joined
 from workbench.data.record import Record, ready
 from workbench.discriminate.experiment_design import Bounds, Terms
-from workbench.discriminate.rival_race import Weighed, evidence, log_odds, slip_odds
+from workbench.discriminate.rival_race import RivalRace, Weighed, evidence, log_odds, slip_odds
 from workbench.discriminate.slip_evidence import SlipForces, Slips, _log_between, _log_density, needed_m, slips
 from workbench.discriminate.slip_promise import promised_by_slips
 from workbench.fit.fit_result import Fit
@@ -71,6 +71,26 @@ def preload_n(one: Fit) -> float:
 def test_slips_tell_a_preload_from_a_hardening_spring(told: dict[str, Slips]) -> None:
     assert told["preload"].count == told["spring_hardening"].count > 40
     assert told["preload"].log_likelihood - told["spring_hardening"].log_likelihood > np.log(100.0)
+
+
+def test_an_experiment_in_which_luck_mistimes_slips_is_explained_by_where_they_land(
+    fits: dict[str, Fit], recordings: list[Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = {"preload": fits["preload"]}
+    begun = RivalRace(one, (recordings[0],), 0, 1)
+    monkeypatch.setattr(RivalRace, "off_m", lambda _race, _name, first=0: np.full(2, 1e-3 if first else 1e-4))
+
+    def explained(played: Recording) -> bool:
+        return RivalRace(one, (recordings[0], played), 0, 1, begun).explained
+
+    def sticking(share: float) -> ValveFile:
+        return PRELOADED.model_copy(
+            update={"valve": BARE.valve.model_copy(update={"static_n": share * BARE.valve.static_n})}
+        )
+
+    assert explained(recordings[1])
+    assert not explained(dirty(with_effect(BARE, "preload", force_n=400.0), 2)), "slides land elsewhere"
+    assert not explained(dirty(sticking(1.3), 2)), "other forces begin them"
 
 
 def test_what_is_one_by_algebra_is_one_by_slips(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:

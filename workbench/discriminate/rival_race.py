@@ -29,7 +29,8 @@ d is the difference from slip to slip, z Vuong's statistic: no rival is the very
 small misfit that both have must not name one. If one is, z^2 is half of l - l_i.
 
 Nothing is named by a search that failed: rivals that have lost are searched anew from many starts before the best one
-is named, and the best must explain the experiments as well as a model can.
+is named, and the best must explain the experiments as it explains the recordings before: by the run, or, where luck
+mistimes more slips of an experiment than of those, by where its slides land and what begins them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,7 +41,7 @@ from math import copysign, exp, inf, log
 from typing import Any, Literal
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, stdtrit
 
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
@@ -49,12 +50,12 @@ from sim.karnopp import Vector
 from workbench.data.held_out import joined
 from workbench.data.record import ready, require_few_samples, require_fittable
 from workbench.discriminate.experiment_design import DesignedExperiment, Terms, designed
-from workbench.discriminate.slip_evidence import Slips, needed_m, slips
+from workbench.discriminate.slip_evidence import FREEDOM, Slips, needed_m, slips, slips_off
 from workbench.discriminate.slip_promise import promised_by_slips
 from workbench.fit.descent import MIDDLING, descended, settled
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
-from workbench.fit.landings import rests
+from workbench.fit.landings import FEWEST, rests
 from workbench.fit.objective import FINAL, SimulationError, softs
 from workbench.fit.threads import on_threads
 from workbench.model.free_run import FreeRun
@@ -70,7 +71,9 @@ from workbench.select.experiment import REST_S
 ODDS = 100.0
 """Of the best against all others, that name it."""
 EXPLAINED = (0.5, 0.75)
-"""Quantiles of the blocks' errors."""
+"""Quantiles of the errors of blocks, landings and break-aways."""
+BY_CHANCE = stdtrit(FREEDOM, 0.5 + 0.5 * np.array(EXPLAINED))
+"""Of what scatters as `slip_evidence` has it, such quantiles of its distance, in scatters."""
 TINY = np.finfo(float).tiny
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
@@ -240,7 +243,24 @@ class RivalRace:
         """
         earlier_m = self._begun.off_m(self.best)
         now_m = self.off_m(self.best, sum(map(len, self._begun._recordings)))
-        return bool(np.all(now_m <= RARELY_OFF * np.maximum(self.record.floor_or_scale_m, earlier_m)))
+        by_run = np.all(now_m <= RARELY_OFF * np.maximum(self.record.floor_or_scale_m, earlier_m))
+        return bool(by_run) or self._explained_by_slips
+
+    @property
+    def _explained_by_slips(self) -> bool:
+        """Whether the best is as near to where slides land, and to what begins them, as in the recordings before.
+
+        What began those is known to the size of their steps: how far that scatters is estimated (S_s).
+        """
+        before, off = self._begun._all[self.best].slips, slips_off(self.fits[self.best], self.record, self._first_rows)
+        played = len(self._begun._recordings)
+        landed_m, broke_n = off.landed_m[off.landed_in >= played], off.broke_n[off.broke_in >= played]
+        if before is None or min(landed_m.size, broke_n.size) < FEWEST:
+            return False
+        earlier_m = np.quantile(off.landed_m[off.landed_in < played], EXPLAINED)
+        usual_n = before.static_n * BY_CHANCE
+        landed = np.all(np.quantile(landed_m, EXPLAINED) <= RARELY_OFF * earlier_m)
+        return bool(landed and np.all(np.quantile(broke_n, EXPLAINED) <= RARELY_OFF * usual_n))
 
     def off_m(self, name: str, first: int = 0) -> Vector:
         """Return by how much a rival is off from a row on, m: `EXPLAINED` quantiles of its blocks' errors."""

@@ -116,6 +116,30 @@ def needed_m(fit: Fit, record: Record, first_rows: Sequence[int]) -> float:
     return float(np.sqrt(max(0.0, np.quantile(beyond, MOSTLY))))
 
 
+class SlipsOff(NamedTuple):
+    """How far a rival is off at each landing, m, and each break-away, N, and in which recording that lies."""
+
+    landed_m: Vector
+    landed_in: NDArray[np.intp]
+    broke_n: Vector
+    """Beyond what was borne and what broke the stem loose: 0 between the two."""
+    broke_in: NDArray[np.intp]
+
+
+def slips_off(fit: Fit, record: Record, first_rows: Sequence[int]) -> SlipsOff:
+    """Return how far a fitted valve is off where slides landed, and in what began them.
+
+    Args:
+        fit: the valve.
+        record: of all recordings.
+        first_rows: of each recording in the record.
+    """
+    forces = SlipForces(fit, record, first_rows)
+    left = forces.left(forces.fitted)
+    broke_n = np.maximum(0.0, np.maximum(left.lower_n, -left.upper_n))
+    return SlipsOff(np.abs(left.short_m), forces.landed_in, broke_n, forces.broke_in)
+
+
 class Left(NamedTuple):
     """Of landings dx_j; of break-aways the bounds of dF_s,k; of loads borne held_i; or slopes of these."""
 
@@ -153,7 +177,7 @@ class SlipForces:
         before_n, _, beyond_n = self._balances_n(theta)
         self.own_m = own_n * 2.0 * self._shift_m / np.maximum(before_n - beyond_n, FORCE_N * SHIFT)
         """sigma_j, (landings,)."""
-        self._landed_in, self._broke_in, self._held_in = (
+        self.landed_in, self.broke_in, self._held_in = (
             np.searchsorted(first_rows, each.rows, side="right") - 1 for each in (landed, self._broke, self._held)
         )
         """In which recording each lies."""
@@ -190,10 +214,8 @@ class SlipForces:
         by_lower, by_upper = -np.exp(_log_density(lower) - broke), np.exp(_log_density(upper) - broke)
         by_held = -np.exp(_log_density(held) - bore)
         of = Left(by_off / scatter_m, by_lower / static_n, by_upper / static_n, by_held / static_n)
-        by_g = self._by_recording(of.lower_n + of.upper_n, self._broke_in) + self._by_recording(
-            of.held_n, self._held_in
-        )
-        by_d = self._by_recording(of.short_m, self._landed_in)
+        by_g = self._by_recording(of.lower_n + of.upper_n, self.broke_in) + self._by_recording(of.held_n, self._held_in)
+        by_d = self._by_recording(of.short_m, self.landed_in)
         d, _ = self._offsets(u)
         slope = np.concatenate(
             [
@@ -231,9 +253,9 @@ class SlipForces:
         landing_m, static_n = np.exp(u[-2:])
         d, g = self._offsets(u)
         scatter_m = self.scatter_m(landing_m)
-        off = (left.short_m - BETWEEN * landing_m * d[self._landed_in]) / scatter_m
-        lower = left.lower_n / static_n - BETWEEN * g[self._broke_in] - PADDING
-        upper = left.upper_n / static_n - BETWEEN * g[self._broke_in] + PADDING
+        off = (left.short_m - BETWEEN * landing_m * d[self.landed_in]) / scatter_m
+        lower = left.lower_n / static_n - BETWEEN * g[self.broke_in] - PADDING
+        upper = left.upper_n / static_n - BETWEEN * g[self.broke_in] + PADDING
         return scatter_m, off, lower, upper, left.held_n / static_n - BETWEEN * g[self._held_in]
 
     def scatter_m(self, landing_m: float) -> Vector:
