@@ -2,7 +2,8 @@
 
 Plate, stem and plug seldom show: the damping holds them. Where they do, a mass that was assumed leaves an error that no
 effect explains, or only the bare valve by another name. Asked where a diagnosis leaves something, be it no more than
-noise may hide; what it finds is said, never used: a mass is weighed.
+noise may hide; what it finds is said, never used: a mass is weighed. And it is said only where most of what was left is
+gone with it: of what the valve scatters a mass imitates some.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from config.drive import Scale
 from config.results.result import Brief
 from workbench.data.held_out import Split
 from workbench.fit.fitting import local_fit
-from workbench.select.block_errors import NOISE_KNOWN_TO
+from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors
 from workbench.select.effect_acceptance import gain
 from workbench.select.effect_candidates import EvaluatedModel
 from workbench.select.effect_search import Progress, evaluated
@@ -20,6 +21,9 @@ MASS = "mass_kg"
 BEGINS = (1.0, 0.2)
 """Shares of the valve file's mass at which searches begin, the rest as the best model has it: one that is too heavy
 hides that a light one does better."""
+
+MOST_LEFT = 0.5
+"""Of the squares of what was left beyond the floor."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -69,8 +73,17 @@ def kept_mass(best: EvaluatedModel, parts: Split, progress: Progress) -> KeptMas
     model = min(models, key=lambda each: each.fit.cost)
     if gain(before, model.fit, best.errors, model.errors).rejection_reason(best.at_floor):
         return None
+    if not explains_most(best.errors, model.errors, best.floor_m):
+        return None
     fitted_kg = model.fit.valve.valve.mass_kg
     return KeptMass(kept_kg, fitted_kg, best.errors.test_rmse_m, model.errors.test_rmse_m, before.kind.length)
+
+
+def explains_most(before: BlockErrors, after: BlockErrors, floor_m: float | None) -> bool:
+    """Whether most of what was left beyond the floor, m, in squares, is gone, fitted and held out."""
+    floor = (floor_m or 0.0) ** 2
+    rmse_m = ((before.train_rmse_m, after.train_rmse_m), (before.test_rmse_m, after.test_rmse_m))
+    return all(now_m**2 - floor <= MOST_LEFT * max(then_m**2 - floor, 0.0) for then_m, now_m in rmse_m)
 
 
 def leaves_something(best: EvaluatedModel) -> bool:
