@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from positioner.cli.parts.export_arguments import add_export_arguments, read_any
 from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
+from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
     from workbench.discover.discovery import Discovery
@@ -28,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw what the form adds over its variable")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
+    add_pressure_argument(parser)
     add_noise_argument(parser)
     add_export_arguments(parser)
 
@@ -53,7 +55,13 @@ def run(arguments: argparse.Namespace) -> int:
     named = files_named(arguments.recordings, arguments.test, arguments.valve)
     with naming(named), at_work("discover") as progress:
         found = discover(
-            recordings, valve, test=test, seed=arguments.seed, on_proposal=_tell_proposal, progress=progress
+            recordings,
+            valve,
+            test=test,
+            seed=arguments.seed,
+            from_pressure=arguments.from_pressure,
+            on_proposal=_tell_proposal,
+            progress=progress,
         )
     print(found.summary())
     if arguments.out is not None:

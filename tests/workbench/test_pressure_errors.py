@@ -14,6 +14,8 @@ from tests.workbench.hand_made import LIBRARY, model_of
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, pressures, with_effect
 from workbench.data.held_out import split
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.discover.discovery import discover
+from workbench.discover.form_search import FormSearch, SearchedForms
 from workbench.fit.fitting import fit
 from workbench.select.effect_candidates import EvaluatedModel, judged_step
 from workbench.select.pressure_errors import PressureErrors, pressure_errors
@@ -123,6 +125,20 @@ def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
     assert "But the measured pressure is not the model's" in found.sentence
     assert "coulomb_n" in found.sentence
     assert not found.nothing_off
+
+
+def test_by_its_measured_pressure_a_form_is_sought_of_the_stem_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording, sought = recorded(BARE, hysteresis_pa=8e3), list[set[str]]()
+
+    def kept(search: FormSearch, base: EvaluatedModel, _told: object) -> SearchedForms:
+        sought.append({each.place.function for each in search.forms.values()})
+        return SearchedForms(base, (), (), ())
+
+    monkeypatch.setattr(FormSearch, "run", kept)
+    found = [discover(recording, BARE, workers=1, from_pressure=driven) for driven in (False, True)]
+    assert [each.base.fit.from_pressure for each in found] == [False, True]
+    by_command, by_pressure = sought
+    assert by_command - by_pressure == {"pressure"}
 
 
 def test_a_pressure_that_is_the_models_but_for_the_noise_is_not_spoken_of() -> None:

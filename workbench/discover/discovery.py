@@ -136,6 +136,7 @@ def discover(
     test: Recording | None = None,
     seed: int = 0,
     workers: int | None = None,
+    from_pressure: bool = False,
     on_proposal: Callable[[tuple[str, ...]], None] | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
@@ -147,18 +148,23 @@ def discover(
         test: held out; by default the last third of the recording.
         seed: of the searches.
         workers: threads, by default one a core; the result does not depend on it.
+        from_pressure: drive the stem by its measured pressure; no form is sought before that.
         on_proposal: given the forms' names, the likeliest first, as soon as they are there.
         progress: called with what is being done, and the fraction of it done.
 
     Raises:
-        InputError: the recording holds too little, other units than SI, or a set point and no command.
+        InputError: the recording holds too little, other units than SI, a set point and no command, or no pressure
+            where it is to drive the stem.
     """
     parts = split([recording] if isinstance(recording, Recording) else recording, test)
     if parts.train.record.by_setpoint:
         raise InputError("recording", "has a set point and no pressure: a form is sought where command_pa is there")
     threads = workers or cpu_count() or 1
     tell = progress or (lambda _what, _done: None)
-    base = EffectSearch(parts, {}, valve.valve, seed=seed, workers=threads, progress=tell).base(valve)
+    search = EffectSearch(
+        parts, {}, valve.valve, seed=seed, workers=threads, progress=tell, from_pressure=from_pressure
+    )
+    base = search.base(valve)
     if base.complete or parts.floor_m is None or parts.early:
         return Discovery("explained" if base.complete and not parts.early else "unjudged", base, (), (), (), parts, ())
     searched = searched_forms(

@@ -89,11 +89,12 @@ def searched_forms(
         on_proposal: given the forms' names, the likeliest first, as soon as they are there.
         most: forms that are fitted at most, the likeliest.
         against: cost of what they are held against.
-        elsewhere_than: places on the path at which no form is sought.
+        elsewhere_than: places on the path at which no form is sought; nor is one before a measured pressure.
     """
-    by = sampling(parts.train.record, valve.valve)
+    by, before_it = sampling(parts.train.record, valve.valve), {"pressure"} if base.fit.from_pressure else set[str]()
+    nowhere = before_it.union(elsewhere_than)
     with tempfile.TemporaryDirectory(prefix="forms-") as folder, written_here(Path(folder)):
-        written = write_forms([each for each in FORMS if each.place.function not in elsewhere_than], Path(folder))
+        written = write_forms([each for each in FORMS if each.place.function not in nowhere], Path(folder))
         effects = {path: find_effect(path, "forms") for path in written}
         effects = {path: each for path, each in effects.items() if not by.left_out(each)}
         forms = {path: written[path] for path in effects}
@@ -244,7 +245,13 @@ class FormSearch:
             return replace(here, step=step)
         bare = ValveFile(valve=step.added.model.fit.valve.valve, effect=base.fit.valve.effect)
         search = EffectSearch(
-            self.split, {}, self.valve.valve, seed=self.seed, workers=self.workers, progress=self.tell
+            self.split,
+            {},
+            self.valve.valve,
+            seed=self.seed,
+            workers=self.workers,
+            progress=self.tell,
+            from_pressure=base.fit.from_pressure,
         )
         again = search.base(bare)
         better = again.fit.cost <= BETTER * base.fit.cost

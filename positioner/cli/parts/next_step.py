@@ -32,7 +32,7 @@ def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str
 
 def discover_command(arguments: argparse.Namespace) -> str:
     """Return the `positioner discover` command that looks for the form of what a diagnosis leaves unexplained."""
-    return shlex.join(["positioner", "discover", *_asked_of(arguments), "-o", FORM])
+    return shlex.join(["positioner", "discover", *_asked_of(arguments), *_driven(arguments), "-o", FORM])
 
 
 def by_pressure_command(arguments: argparse.Namespace) -> str:
@@ -42,8 +42,7 @@ def by_pressure_command(arguments: argparse.Namespace) -> str:
 
 
 def _driven(arguments: argparse.Namespace) -> list[str]:
-    """Return how the stem is driven; a discovery knows but the command."""
-    return ["--from-pressure"] if getattr(arguments, "from_pressure", False) else []
+    return ["--from-pressure"] if arguments.from_pressure else []
 
 
 def _asked_of(arguments: argparse.Namespace) -> list[str]:
