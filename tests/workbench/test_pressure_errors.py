@@ -128,7 +128,7 @@ def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
 
 
 def test_by_its_measured_pressure_a_form_is_sought_of_the_stem_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    recording, sought = recorded(BARE, hysteresis_pa=8e3), list[set[str]]()
+    recording, sought = recorded(LIMITED), list[set[str]]()
 
     def kept(search: FormSearch, base: EvaluatedModel, _told: object) -> SearchedForms:
         sought.append({each.place.function for each in search.forms.values()})
