@@ -30,6 +30,7 @@ def bowed() -> Hidden:
     return hide(32028, dirty=True, pressure=True, duration_s=12.0)
 
 
+@pytest.mark.long
 def test_by_its_pressure_one_effect_is_named_of_two(bowed: Hidden) -> None:
     found = diagnose(bowed.fit, bowed.base, test=bowed.test, effects=(*RIVALS, "ip_lag"), workers=2, from_pressure=True)
     assert found.missing == ("sensor_nonlinearity",)
