@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from config.recording import Column, Recording
+from tests.workbench.valves import drawn_valve, record_of
 from workbench.blind.hiding import hide
 from workbench.data.held_out import Split, split
 from workbench.diagnosis.diagnosis import diagnose
@@ -97,6 +98,17 @@ def test_what_time_tells_is_a_zero_that_drifts_or_forces_that_change(parts: Spli
     assert not off(parts, by_chance).wander
     by_friction = off(parts, friction_over_travel)
     assert by_friction.scatter_m < by_friction.unsteady_m
+
+
+def test_a_zero_that_drifts_is_unexplained_and_when_is_said() -> None:
+    valve = drawn_valve(np.random.default_rng(11))
+    still = [record_of(valve, seed, 3000) for seed in (1, 2)]
+    fitted, held_out = (
+        Recording({**each.columns, "position_m": each.position_m + 5e-5 * each.time_s}) for each in still
+    )
+    found = diagnose(fitted, valve, test=held_out, effects=(), workers=1)
+    assert found.verdict == "unexplained"
+    assert "time tells all of it but" in found.sentence
 
 
 def test_little_is_left_to_be_little(parts: Split) -> None:

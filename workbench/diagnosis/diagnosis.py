@@ -5,7 +5,7 @@ accepted (`effect_candidates`, by the rule of `effect_acceptance`), from all ste
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import cpu_count
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,6 +32,7 @@ from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.sampling import sampling
+from workbench.select.block_errors import with_rests
 from workbench.select.candidate_table import candidate_columns, candidate_table, draw_race, lengths
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.effect_search import EffectSearch, Progress, Race
@@ -249,6 +250,8 @@ def diagnose(
             found = verdict(best, steps, parts.motion_std_m, parts.floor_m, landed, parts.early)
             asked = _asked(found, best, steps, valve, library, parts, seed=seed, workers=threads, tell=tell)
             found = "unexplained" if asked.stand_in else found
+            if found == "unexplained":
+                best = replace(best, errors=with_rests(best.errors, best.fit, parts))
             chosen = search.experiment(steps) if found == "one_of" else None
         except (BrokenOff, KeyboardInterrupt):
             steps, found, chosen, asked = search.so_far(base), "unfinished", None, Asked()

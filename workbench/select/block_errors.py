@@ -74,7 +74,7 @@ class BlockErrors(Brief):
     test_rest_rmse_m: float
     """The rms error held out without these."""
     rests: RestErrors | None = None
-    """How far rests are off, where something may be left."""
+    """How far rests are off, where all else is at the floor and yet something may be left, or `with_rests`."""
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -131,12 +131,11 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         test_rest_rmse_m=test_rmse_m,
     )
     floor_m = split.floor_m
-    if floor_m is None:
+    if floor_m is None or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):
         return found
     if found.floors_left(floor_m) > NOTHING_LEFT:
         found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
-    at_floor = replace(found, test_rest_rmse_m=0.0).at_floor(floor_m)
-    if not at_floor or test_rmse_m <= NOISE_KNOWN_TO * floor_m:
+    if test_rmse_m <= NOISE_KNOWN_TO * floor_m:
         return found
     edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
     if not edges:
@@ -144,6 +143,14 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
     rest_m = error_without(test.record.time_s, held_out_m, edges)
     left = max(fitted_structure, structure(test.record, rest_m, negligible_m))
     return replace(found, knife_edges=edges, test_rest_rmse_m=rms(rest_m), structure=left)
+
+
+def with_rests(errors: BlockErrors, fit: Fit, split: Split) -> BlockErrors:
+    """Return the errors of a fit with how far rests are off, where something is left: slow, for all that is tried."""
+    if errors.rests or split.floor_m is None or errors.floors_left(split.floor_m) <= NOTHING_LEFT:
+        return errors
+    fitted_m, held_out_m = (residual_m(each, fit.indicated_m(each.record)) for each in (split.train, split.test))
+    return replace(errors, rests=rest_errors(split, fitted_m, held_out_m))
 
 
 def block_s(part: Part) -> float:
