@@ -5,6 +5,7 @@ import numpy as np
 from config.codes import InhibitReason, Ne107Cause, Ne107Status, State
 from config.daemon_file import DaemonFile
 from positioner.daemon.health import ne107_condition
+from positioner.estimation.landings.static_law import StaticLaw
 from positioner.estimation.landings.stem_at_rest import Rest, RestWindow
 from tests.control.virtual_loop import VirtualLoop, assert_static_law
 
@@ -67,6 +68,11 @@ class Loop(VirtualLoop):
         return self.valve.stem_m / STROKE_M - reference_pu
 
 
+def assert_true(law: StaticLaw) -> None:
+    up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
+    assert_static_law(law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
+
+
 def test_a_valve_that_creeps_after_each_slide_is_identified() -> None:
     loop = Loop(SLOW)
     loop.begin()
@@ -74,8 +80,7 @@ def test_a_valve_that_creeps_after_each_slide_is_identified() -> None:
     law = loop.decision.static_law
     loop.end()
     assert loop.decision.applied.ratios == law.ratios
-    up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
-    assert_static_law(law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
+    assert_true(law)
 
 
 def test_an_identification_waits_for_the_supply() -> None:
@@ -89,8 +94,7 @@ def test_an_identification_waits_for_the_supply() -> None:
     loop.cycles(200.0)
     loop.end()
     assert waited is InhibitReason.PRESSURE_ELSEWHERE
-    up_pa, down_pa = (COULOMB_N + PRELOAD_N) / AREA_M2, (COULOMB_N - PRELOAD_N) / AREA_M2
-    assert_static_law(loop.decision.static_law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
+    assert_true(loop.decision.static_law)
 
 
 def test_a_stem_that_does_not_come_to_rest_off_its_reference_is_said() -> None:

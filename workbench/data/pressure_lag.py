@@ -30,8 +30,6 @@ def without_gaps_pa(
 ) -> Column:
     """Return a pressure, Pa, (n,), with what the command makes of it where it was not measured.
 
-    A straight line over a gap would miss all that was commanded in it.
-
     Args:
         time_s: of the samples, (n,).
         command_pa: held from its sample on, (n,).

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from config.drive import Kind
 from config.results.result import Brief
 from workbench.data.held_out import Split
-from workbench.fit.fitting import fit
-from workbench.select.block_errors import relative_error_reduction
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, bic
-from workbench.select.effect_candidates import EvaluatedModel
-from workbench.select.effect_search import Progress, evaluated
+from workbench.diagnosis.measured_pressure import driven_otherwise
+from workbench.select.effect_candidates import EvaluatedModel, outdoes
+from workbench.select.effect_search import Progress
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -52,16 +50,5 @@ def by_command(best: EvaluatedModel, parts: Split, *, seed: int, workers: int, p
     """
     if not best.fit.from_pressure or best.explained or parts.train.record.by_setpoint:
         return None
-    found = fit(
-        parts.train.recording,
-        best.fit.valve,
-        seed=seed,
-        workers=workers,
-        profile=False,
-        progress=lambda done: progress("fitting by the command", done),
-    )
-    model = evaluated(found, parts)
-    evidence = model.errors.independent_share * (bic(best.fit) - bic(found))
-    _, standard_errors = relative_error_reduction(best.errors.all_logs, model.errors.all_logs)
-    better = evidence > LEAST_BIC and standard_errors > LEAST_STANDARD_ERRORS
-    return ByCommand(best.errors.test_rmse_m, model) if better else None
+    model = driven_otherwise(best, parts, seed=seed, workers=workers, progress=progress)
+    return ByCommand(best.errors.test_rmse_m, model) if outdoes(model, best) else None

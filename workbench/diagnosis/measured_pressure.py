@@ -65,18 +65,28 @@ def by_measured_pressure(
     of_friction = valve.diaphragm_area_m2 * off_pa / valve.coulomb_n if valve.coulomb_n else 0.0
     if of_friction <= MATTERS:
         return None
+    model = driven_otherwise(best, parts, seed=seed, workers=workers, progress=progress)
+    others = tuple(
+        (name, before.value, after.value)
+        for name, after in model.fit.parameters.items()
+        if (before := best.fit.parameters.get(name)) and abs(after.value - before.value) > ANOTHER * abs(before.value)
+    )
+    return ByMeasuredPressure(off_pa, of_friction, model, others)
+
+
+def driven_otherwise(
+    best: EvaluatedModel, parts: Split, *, seed: int, workers: int, progress: Progress
+) -> EvaluatedModel:
+    """Return a model fitted once more, by the command if it was by the measured pressure, and the other way round."""
+    by_pressure = not best.fit.from_pressure
+    what = f"fitting {'from the measured pressure' if by_pressure else 'by the command'}"
     found = fit(
         parts.train.recording,
         best.fit.valve,
         seed=seed,
         workers=workers,
-        from_pressure=True,
+        from_pressure=by_pressure,
         profile=False,
-        progress=lambda done: progress("fitting from the measured pressure", done),
+        progress=lambda done: progress(what, done),
     )
-    others = tuple(
-        (name, before.value, after.value)
-        for name, after in found.parameters.items()
-        if (before := best.fit.parameters.get(name)) and abs(after.value - before.value) > ANOTHER * abs(before.value)
-    )
-    return ByMeasuredPressure(off_pa, of_friction, evaluated(found, parts), others)
+    return evaluated(found, parts)

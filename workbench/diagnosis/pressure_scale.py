@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from config.drive import Kind
 from config.recording import Column
 from config.results.result import Brief
+from workbench.data.pressure_lag import command_followed_pa
 from workbench.data.record import UNITS_PA, Record
 
 SPAN_OFF, ZERO_OFF, FOLLOWS = 1.25, 0.2, 1.0 / 3.0
@@ -69,9 +69,8 @@ def pressure_scale(record: Record) -> PressureScale | None:
 
 def _fitted(record: Record, pressure_pa: Column, rows: Column, lag_s: float) -> tuple[float, float, float, float]:
     """Return mean |e|, Pa, c, D, Pa, and what m spans, Pa, for a lag, s."""
-    e = np.exp(-record.period_s / lag_s)
     u = record.command_pa
-    m = np.asarray(lfilter([0.0, 1.0 - e], [1.0, -e], u, zi=[u[0]])[0])[rows]
+    m = command_followed_pa(record.period_s, lag_s, u, u)[rows]  # settled where the record begins
     p, middle_pa = pressure_pa[rows], float(np.median(m))
     beside_pa, w = m - middle_pa, np.ones(rows.size)
     for _ in range(ROUNDS):

@@ -24,10 +24,7 @@ from sim.effect import Effect
 from workbench.data.held_out import Split
 from workbench.diagnosis.kept_mass import leaves_something
 from workbench.discover.form_search import FIRST, searched_forms
-from workbench.discover.found_form import FoundForm
-from workbench.select.block_errors import relative_error_reduction
-from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, bic
-from workbench.select.effect_candidates import EffectStep, EvaluatedModel
+from workbench.select.effect_candidates import EffectStep, EvaluatedModel, outdoes
 from workbench.select.effect_search import Progress
 from workbench.select.equivalence import algebraic_class
 
@@ -99,7 +96,7 @@ def stand_in(
         progress=progress,
         elsewhere_than=places,
     ).found
-    better = [each for each in found if _better(each, best)]
+    better = [each for each in found if outdoes(each.model, best)]
     if not better:
         return None
     form, errors = better[0].form, better[0].model.errors
@@ -112,11 +109,3 @@ def _places(name: str, library: Mapping[str, Effect]) -> set[str]:
     return {
         place for each in (name, *algebraic_class(name, library)) if each in by_name for place in by_name[each].places
     }
-
-
-def _better(form: FoundForm, best: EvaluatedModel) -> bool:
-    """Whether a form does better than what was named, fitted and held out."""
-    errors = form.model.errors
-    evidence = errors.independent_share * (bic(best.fit) - bic(form.model.fit))
-    _, standard_errors = relative_error_reduction(best.errors.all_logs, errors.all_logs)
-    return evidence > LEAST_BIC and standard_errors > LEAST_STANDARD_ERRORS

@@ -17,7 +17,7 @@ from workbench.select.block_errors import (
     relative_error_reduction,
 )
 from workbench.select.candidate_table import Tried
-from workbench.select.effect_acceptance import LEAST_BIC, Gain, bic, gain, no_better
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_STANDARD_ERRORS, Gain, bic, gain, no_better
 from workbench.select.equivalence import algebraic_class, bare_parameter, classes
 from workbench.select.forward_selection import Candidate, ForwardStep
 from workbench.select.pressure_errors import PressureErrors
@@ -166,6 +166,13 @@ def leads_farther(one: EvaluatedModel, other: EvaluatedModel) -> bool:
     if abs(standard_errors) > SAME_STANDARD_ERRORS:
         return standard_errors > 0.0
     return bic(other.fit) - bic(one.fit) > LEAST_BIC
+
+
+def outdoes(one: EvaluatedModel, other: EvaluatedModel) -> bool:
+    """Whether a model does better than another: by evidence in independent samples, and fitted and held out."""
+    _, standard_errors = relative_error_reduction(other.errors.all_logs, one.errors.all_logs)
+    evidence = one.errors.independent_share * (bic(other.fit) - bic(one.fit))
+    return evidence > LEAST_BIC and standard_errors > LEAST_STANDARD_ERRORS
 
 
 def _candidate(
