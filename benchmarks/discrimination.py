@@ -37,7 +37,6 @@ from workbench.data.held_out import joined, split
 from workbench.data.record import ready
 from workbench.discriminate.discrimination import (
     BUDGET,
-    FEW_MOVES,
     Designer,
     Discrimination,
     Played,
@@ -45,7 +44,7 @@ from workbench.discriminate.discrimination import (
     by_run_or_slips,
     discriminate,
 )
-from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms, courses
+from workbench.discriminate.experiment_design import Bounds, DesignedExperiment, Terms, courses
 from workbench.discriminate.rival_race import RivalRace
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
@@ -67,8 +66,6 @@ def menu(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
 
     What told nothing comes again: a diagnosis knows of no round before.
     """
-    if terms.most_moves in (FEW_MOVES, MOST_MOVES):
-        return None
     chosen = experiment(race.alive, race.record, seed=terms.seed, workers=1)
     course = next(each for each in courses(race.record, Terms(terms.bounds, WHOLE)) if each.name == chosen.name)
     return DesignedExperiment(course, np.inf)

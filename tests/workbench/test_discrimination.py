@@ -18,9 +18,9 @@ from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
-from workbench.discriminate.discrimination import Discrimination, Played, Player, Round, discriminate
-from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, Course, DesignedExperiment, Leg, Terms
-from workbench.discriminate.rival_race import RivalRace, Weighed, _independent_share, log_odds
+from workbench.discriminate.discrimination import Discrimination, Played, Player, Round, Waiting, discriminate
+from workbench.discriminate.experiment_design import MOST_MOVES, WAYS, Bounds, Course, DesignedExperiment, Leg, Terms
+from workbench.discriminate.rival_race import ODDS, RivalRace, Weighed, _independent_share, log_odds
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.experiment import REST_S
@@ -143,13 +143,15 @@ class Design:
     ) -> None:
         self.separation, self.by_slips = separation, by_slips
         self.course, self.otherwise = course, otherwise or course
-        self.asked: list[int] = []
-        self.left_out: list[frozenset[str]] = []
+        self.terms: list[Terms] = []
+
+    @property
+    def asked(self) -> list[int]:
+        return [each.most_moves for each in self.terms]
 
     def __call__(self, race: RivalRace, terms: Terms) -> DesignedExperiment | None:
-        self.asked.append(terms.most_moves)
-        self.left_out.append(terms.without)
-        course = self.course if terms.most_moves <= MOST_MOVES else self.otherwise
+        self.terms.append(terms)
+        course = self.course if terms.most_moves < MOST_MOVES else self.otherwise
         return DesignedExperiment(course, self.separation, by_slips=self.by_slips)
 
 
@@ -180,13 +182,14 @@ def test_little_promised_is_played_while_moves_are_left(fits: dict[str, Fit], re
 
 
 @pytest.mark.long
-def test_what_told_nothing_waits_until_nothing_else_promises(fits: dict[str, Fit], recording: Recording) -> None:
+def test_a_run_that_told_nothing_waits(fits: dict[str, Fit], recording: Recording) -> None:
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
     design = Design(2.0)
     found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
     assert (found.outcome, found.moves) == ("budget_spent", 4)
-    asked = {len(design.left_out[0]), len(design.left_out[-1])}
-    assert asked == {0, 1}, "the first one is left out of what is chosen next"
+    first, then = design.terms[0], design.terms[-1]
+    assert (first.without, first.ways) == (frozenset(), WAYS)
+    assert (then.without, then.ways) == (frozenset({COURSE.name}), frozenset({"slips"}))
 
 
 @pytest.mark.long
@@ -203,11 +206,39 @@ def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], reco
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
     design = Design(1.0, by_slips=2.0)
     discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=6)
-    assert [len(each) for each in design.left_out] == [0, 0, 0, 0, 1], "a third time is the first one left out"
+    assert [each.ways for each in design.terms] == [WAYS] * 4 + [{"run"}], "a third time they wait"
+
+
+def test_what_came_to_less_than_a_quarter_of_what_was_expected_waits() -> None:
+    run, by_slips = DesignedExperiment(COURSE, 2.0), DesignedExperiment(COURSE, 1.0, by_slips=4.0)
+    kept = Waiting()
+    kept.heard(run, expected=4.0, told=1.1)
+    kept.heard(by_slips, expected=4.0, told=0.0)
+    kept.heard(by_slips, expected=4.0, told=2.1)
+    assert not kept
+    kept.heard(by_slips, expected=4.0, told=0.1)
+    assert not kept, "the latest two told enough"
+    kept.heard(run, expected=4.0, told=0.9)
+    assert (kept.runs, kept.ways) == ({COURSE.name}, {"run"})
+
+
+def test_nobody_is_asked_for_more_than_the_odds() -> None:
+    kept = Waiting()
+    kept.heard(DesignedExperiment(COURSE, 2.0), expected=1e3, told=0.3 * log(ODDS))
+    assert not kept
+
+
+def test_where_both_ways_have_told_nothing_both_are_asked_again() -> None:
+    kept = Waiting()
+    kept.heard(DesignedExperiment(COURSE, 2.0), expected=4.0, told=0.0)
+    for _ in range(2):
+        assert kept.ways == {"run"}
+        kept.heard(DesignedExperiment(COURSE, 1.0, by_slips=4.0), expected=4.0, told=0.0)
+    assert (kept.runs, kept.ways) == ({COURSE.name}, set()), "but no run that has told nothing"
 
 
 @pytest.mark.long
-def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], recording: Recording) -> None:
+def test_where_nothing_else_promises_all_are_asked_again(fits: dict[str, Fit], recording: Recording) -> None:
     twin = {"ip_lag": fits["ip_lag"], "rate_limit": fits["ip_lag"]}
 
     class Once(Design):
@@ -218,8 +249,8 @@ def test_where_all_told_nothing_all_are_asked_again(fits: dict[str, Fit], record
     design = Once(2.0)
     found = discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=4)
     assert (found.outcome, found.moves) == ("budget_spent", 4)
-    assert frozenset({COURSE.name}) in design.left_out
-    assert design.left_out[-1] == frozenset()
+    assert frozenset({COURSE.name}) in [each.without for each in design.terms]
+    assert design.terms[-1].without == frozenset()
 
 
 @pytest.mark.parametrize("outcome", ["not_separable", "budget_spent"])
@@ -232,7 +263,7 @@ def test_who_is_ruled_out_is_said(outcome: Literal["not_separable", "budget_spen
     assert found.as_json()["lost"] == ["preload"]
 
 
-def test_whole_inputs_are_weighed_against_short_ones(fits: dict[str, Fit], recording: Recording) -> None:
+def test_more_moves_are_weighed_against_few(fits: dict[str, Fit], recording: Recording) -> None:
     """Twice as long for as many moves promises twice as much; as long for three times the moves, less."""
     played: list[str] = []
 
@@ -242,10 +273,10 @@ def test_whole_inputs_are_weighed_against_short_ones(fits: dict[str, Fit], recor
 
     longer = Course("longer", COURSE.first_pa, tuple(replace(leg, hold_s=5.0) for leg in COURSE.legs))
     busier = Course("busier", COURSE.first_pa, tuple(replace(leg, hold_s=0.3) for leg in 3 * COURSE.legs))
-    for whole in (longer, busier):
-        design = Design(1.002, otherwise=whole)
+    for more in (longer, busier):
+        design = Design(1.002, otherwise=more)
         discriminate(fits, [recording], noted, BOUNDS, LIBRARY, design=design, budget=30)
-        assert design.asked == [3, 8, 30]
+        assert design.asked == [3, 8]
     assert played == ["longer", "by hand"]
 
 

@@ -310,13 +310,20 @@ def test_slips_say_no_more_than_they_agree(fits: dict[str, Fit]) -> None:
     assert slip_odds(other, one) == pytest.approx(-slip_odds(one, other))
 
 
+@pytest.fixture(autouse=True)
+def unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Courses of the menu as they are: half a second instead of ten."""
+    monkeypatch.setattr("workbench.discriminate.slip_promise.TRIED", 0)
+
+
 def promised(
     fits: dict[str, Fit], told: dict[str, Slips], names: tuple[str, ...], record: Record, window_m: float = 0.2
 ) -> float:
+    """Return log odds a move."""
     low_pa, high_pa = float(record.command_pa.min()), float(record.command_pa.max())
     bounds = Bounds(low_pa, high_pa, 400e3, 26.0, -0.1 * window_m, window_m)
     found = promised_by_slips([(fits[name], told[name]) for name in names], record, [0, ROWS], Terms(bounds, 4))
-    return 0.0 if found is None else found[1]
+    return 0.0 if found is None else found[1] / found[0].moves
 
 
 def test_of_twins_nothing_is_promised(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:
@@ -327,7 +334,7 @@ def test_what_nothing_tells_apart_hides_no_third(fits: dict[str, Fit], told: dic
     assert promised(fits, told, ("preload", "preload", "spring_hardening"), record) > 0.1
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def apart(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> float:
     return promised(fits, told, ("preload", "asymmetric_friction"), record)
 
@@ -339,6 +346,14 @@ def test_a_bent_balance_promises_more_than_a_break_away(
     """Preload and asymmetric friction land alike, and differ by a share of F_s - F_c where they break loose."""
     assert apart > 0.02
     assert promised(fits, told, ("preload", "spring_hardening"), record) > 2.0 * apart
+
+
+@pytest.mark.long
+def test_a_course_of_the_menu_is_changed_to_promise_more(
+    fits: dict[str, Fit], told: dict[str, Slips], record: Record, apart: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workbench.discriminate.slip_promise.TRIED", 25)
+    assert promised(fits, told, ("preload", "asymmetric_friction"), record) > 1.02 * apart
 
 
 @pytest.mark.long

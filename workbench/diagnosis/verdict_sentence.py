@@ -3,17 +3,21 @@
 from collections.abc import Mapping, Sequence
 
 from config.drive import Kind, Scale
+from sim.composition import BASE, COULOMB, STATIC
 from sim.effect import Effect
 from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
+from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, knife_edges_sentence
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.pressure_errors import PressureErrors
 
+NONE_ABOVE = 1.01
+"""Static over sliding friction."""
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
 REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
@@ -28,7 +32,8 @@ def verdict_sentence(
     verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
 ) -> str:
     """Return the verdict in one or a few sentences, in the names and units of what was diagnosed."""
-    return best.fit.kind.text(_said(verdict, best, steps, library, parts))
+    said = _said(verdict, best, steps, library, parts)
+    return best.fit.kind.text(said + (_no_break_away(best.fit) if verdict in EXPLAINED else ""))
 
 
 def _said(
@@ -66,6 +71,20 @@ def _said(
         said = f"Something is missing that {lacked}.{begun}"
         return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
+
+
+def _no_break_away(found: Fit) -> str:
+    """Say that static friction came out at its least, with a leading space; empty where it did not, or that shows.
+
+    Where samples are far apart a break-away falls between two of them, and an interval tells only of what is seen.
+    """
+    static, coulomb_n = found.parameters.get(BASE[STATIC]), found.valve.valve.coulomb_n
+    if not found.by.slow or static is None or not static.at_bound or static.value > NONE_ABOVE * coulomb_n:
+        return ""
+    return (
+        f" Between samples so far apart no break-away is seen: {BASE[STATIC]} came out at {BASE[COULOMB]}, the least "
+        "it can be, and may be more."
+    )
 
 
 def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:

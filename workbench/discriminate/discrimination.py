@@ -11,10 +11,9 @@ How they are weighed stands in `rival_race`. Members of one class by algebra (`e
 experiment is played for them.
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import exp, inf, log
+from dataclasses import dataclass, field, replace
+from math import inf, log
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -24,9 +23,9 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from sim.effect import Effect
 from workbench.diagnosis.diagnosis import Diagnosis
-from workbench.discriminate.experiment_design import MOST_MOVES, Bounds, DesignedExperiment, Terms
+from workbench.discriminate.experiment_design import MOST_MOVES, WAYS, Bounds, DesignedExperiment, Terms, Way
 from workbench.discriminate.measured_pressure import raced_by_pressure
-from workbench.discriminate.rival_race import ODDS, RivalRace
+from workbench.discriminate.rival_race import ODDS, TINY, RivalRace
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.effect_search import Progress
@@ -40,9 +39,11 @@ BUDGET = 60
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
 IMITATED, NOTHING = 1.001, 0.5
-"""A separation below it is none; log odds that a whole budget of moves must promise, and one experiment must change."""
-RUN_WAITS, SLIPS_WAIT = 1, 2
-"""How often in succession they have told nothing when they wait."""
+"""A separation below it is none; log odds that a whole budget of moves must promise."""
+KEPT = 0.25
+"""Of what was expected of it, and of the log odds wanted: a way of telling that has come to less waits."""
+PATIENCE: Mapping[Way, int] = {"run": 1, "slips": 2}
+"""Experiments after which that is asked."""
 
 Outcome = Literal["resolved", "one_class", "not_separable", "budget_spent", "unexplained", "stopped"]
 
@@ -65,8 +66,54 @@ Designer = Callable[[RivalRace, Terms], DesignedExperiment | None]
 
 def by_run_or_slips(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
     """Return the experiment that its run or its slips recommend, whichever promises more a move."""
-    both = [each for each in (race.run_experiment(terms), race.slip_experiment(terms)) if each]
-    return max(both, key=lambda each: race.promised_by(each, terms.most_moves), default=None)
+    ways: Mapping[Way, Callable[[Terms], DesignedExperiment | None]] = {
+        "run": race.run_experiment,
+        "slips": race.slip_experiment,
+    }
+    asked = [chosen for way, designed in ways.items() if way in terms.ways and (chosen := designed(terms))]
+    return max(asked, key=lambda each: race.promised_by(each, terms.most_moves), default=None)
+
+
+@dataclass(slots=True)
+class Waiting:
+    """What waits, for it has told less than was expected of it: ways of telling, and runs by name.
+
+    Where the valve scatters the promise of a run, worked out under few draws of that noise, is often not kept, whatever
+    its course; and one that told little will not tell more by being played again. Slips promise a mean, about which
+    luck scatters by as much.
+    """
+
+    runs: set[str] = field(default_factory=set)
+    ways: set[Way] = field(default_factory=set)
+    _expected: dict[Way, list[float]] = field(default_factory=dict)
+    _told: dict[Way, list[float]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.runs or self.ways)
+
+    def heard(self, chosen: DesignedExperiment, expected: float, told: float) -> None:
+        """Take in by how much an experiment was to change the log odds, and by how much it did."""
+        way = chosen.way
+        self._expected.setdefault(way, []).append(min(expected, log(ODDS)))
+        self._told.setdefault(way, []).append(told)
+        told_lately, expected_lately = (abs(sum(each[way][-PATIENCE[way] :])) for each in (self._told, self._expected))
+        if len(self._told[way]) < PATIENCE[way] or told_lately >= KEPT * expected_lately:
+            return
+        self.ways.add(way)
+        if way == "run":
+            self.runs.add(chosen.course.name)
+        if self.ways == WAYS:
+            self._wake()
+
+    def _wake(self) -> None:
+        self.ways.clear()
+        self._expected.clear()
+        self._told.clear()
+
+    def clear(self) -> None:
+        """Nothing waits any more."""
+        self._wake()
+        self.runs.clear()
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,18 +277,16 @@ def discriminate(
     experiments: list[Recording] = []
     outcome: Outcome | None = "one_class" if len(gathered) == 1 else None
     problem, used = "", 0
-    told_nothing = Counter[str]()
-    """How often in succession, by name."""
-    silent: set[str] = set()
+    waiting = Waiting()
     tell = progress or (lambda _what, _done: None)
     while outcome is None:
         left, number = budget - used, len(rounds) + 1
         tell(f"choosing experiment {number}", used / budget)
-        chosen = _chosen(race, Terms(bounds, left, seed + len(rounds), frozenset(silent)), design)
+        terms = Terms(bounds, left, seed + len(rounds), frozenset(waiting.runs), WAYS - waiting.ways)
+        chosen = _chosen(race, terms, design)
         if chosen is None or _promises_nothing(race, chosen, budget):
-            if silent:
-                silent.clear()
-                told_nothing.clear()
+            if waiting:
+                waiting.clear()
                 continue
             outcome = "not_separable"
             break
@@ -253,13 +298,10 @@ def discriminate(
         experiments.append(played.recording)
         used += chosen.course.moves
         tell(f"refitting the rivals to experiment {number}", used / budget)
-        before = race.relative
+        before = race
         race = race.with_recording(played.recording)
-        name = chosen.course.name
-        told_nothing[name] = told_nothing[name] + 1 if _alike(before, race.relative) else 0
-        if told_nothing[name] >= (SLIPS_WAIT if chosen.by_slips else RUN_WAITS):
-            silent.add(name)
-        rounds.append(Round(name, chosen.separation, used, race.relative))
+        waiting.heard(chosen, before.expected(chosen), _told(before.relative, race.relative))
+        rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
         if on_round:
             on_round(rounds[-1])
@@ -273,9 +315,16 @@ def _promises_nothing(race: RivalRace, chosen: DesignedExperiment, budget: int) 
     return chosen.separation < IMITATED and race.promised_by(chosen, budget) < NOTHING
 
 
-def _alike(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
-    """Whether an experiment has told nothing: the odds are what they were."""
-    return all(before[name] * exp(-NOTHING) <= odds <= before[name] * exp(NOTHING) for name, odds in after.items())
+def _told(before: Mapping[str, float], after: Mapping[str, float]) -> float:
+    """Return by how much the log odds of the best before have changed, against whom, of those left, they did most."""
+    best = max(before, key=lambda name: before[name])
+    left = [name for name, odds in before.items() if odds > 1.0 / ODDS]
+    changes = [_log(before[name]) - _log(after[name] / max(after[best], TINY)) for name in left]
+    return max(changes, key=abs)
+
+
+def _log(odds: float) -> float:
+    return log(max(odds, TINY))
 
 
 def _chosen(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:
@@ -283,11 +332,9 @@ def _chosen(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperime
 
     Where the valve scatters none promises them, for what it repeats no better than its noise says little; nor does the
     promise say much, worked out under few draws of that noise. So experiments go on as long as there are moves left.
-    A run that promised, was played and told nothing will not by being played again: it waits until nothing else does.
-    Slips promise a mean, about which luck scatters by as much: they wait when they have told nothing twice.
     """
     best, left = None, terms.most_moves
-    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES, left)}):
+    for most in sorted({min(each, left) for each in (FEW_MOVES, MOST_MOVES)}):
         chosen = design(race, replace(terms, most_moves=most))
         if chosen is None:
             continue

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import inf
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,10 @@ CORRELATION_S = 0.2
 SHORTEST_S = 0.05
 """Of a leg."""
 
+Way = Literal["run", "slips"]
+"""By what an experiment is to tell rivals apart."""
+WAYS: frozenset[Way] = frozenset({"run", "slips"})
+
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
@@ -73,13 +78,14 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """On which the next experiment is chosen: its bounds, its moves, and names of what is not to be played."""
+    """On which the next experiment is chosen: its bounds, its moves, what is not to be played for its run, its ways."""
 
     bounds: Bounds
     most_moves: int = MOST_MOVES
     seed: int = 0
     """Of the changes tried, and of the noise under which rivals answer."""
     without: frozenset[str] = frozenset()
+    ways: frozenset[Way] = WAYS
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +167,11 @@ class DesignedExperiment(Brief):
     by_slips: float = 0.0
     """By how much its slips promise to raise the log odds of the least distinct pair; 0: nobody has asked."""
 
+    @property
+    def way(self) -> Way:
+        """By what it is to tell."""
+        return "slips" if self.by_slips else "run"
+
     def experiment(self, period_s: float) -> Experiment:
         """Return it as an input sampled at a period, s."""
         return Experiment(self.course.name, self.separation, *self.course.sampled(period_s))
@@ -202,27 +213,32 @@ def _improved(
     rivalry: "Rivalry", course: Course, score: float, bounds: Bounds, generator: np.random.Generator
 ) -> Course:
     for _ in range(TRIED):
-        changed = _changed(course, bounds, generator)
+        changed = changed_at_random(course, bounds, generator)
         there = rivalry.score(changed)
         if there > score:
             course, score = changed, there
     return course
 
 
-def _changed(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
-    """Return a course with one leg changed, or all lengths, or its first level."""
-    span_pa = bounds.maximum_pa - bounds.minimum_pa
+def changed_at_random(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
+    """Return a course with one leg changed, or all lengths, or its first level; as it is where that takes too long."""
+    try:
+        return _changed(course, bounds.maximum_pa - bounds.minimum_pa, generator).within(bounds)
+    except InputError:
+        return course
+
+
+def _changed(course: Course, span_pa: float, generator: np.random.Generator) -> Course:
     size = 10.0 ** generator.uniform(-2.0, -0.3)
     what, i = generator.integers(5), int(generator.integers(len(course.legs)))
+    if what == 0:
+        return replace(course, first_pa=course.first_pa + size * span_pa * generator.standard_normal())
     legs = list(course.legs)
     leg = legs[i]
-    if what == 0:
-        return replace(course, first_pa=course.first_pa + size * span_pa * generator.standard_normal()).within(bounds)
     if what == 1:
         stretch = float(np.exp(2.0 * size * generator.standard_normal()))
-        stretched = tuple(replace(each, ramp_s=stretch * each.ramp_s, hold_s=stretch * each.hold_s) for each in legs)
-        return replace(course, legs=stretched).within(bounds)
-    if what == 2:
+        legs = [replace(each, ramp_s=stretch * each.ramp_s, hold_s=stretch * each.hold_s) for each in legs]
+    elif what == 2:
         legs[i] = replace(
             leg, ramp_s=max(SHORTEST_S, leg.ramp_s) * float(np.exp(3.0 * size * generator.standard_normal()))
         )
@@ -232,7 +248,7 @@ def _changed(course: Course, bounds: Bounds, generator: np.random.Generator) -> 
         )
     else:
         legs[i] = replace(leg, level_pa=leg.level_pa + size * span_pa * float(generator.standard_normal()))
-    return replace(course, legs=tuple(legs)).within(bounds)
+    return replace(course, legs=tuple(legs))
 
 
 def courses(record: Record, terms: Terms) -> Iterator[Course]:
@@ -316,19 +332,18 @@ class Rivalry:
             told.append(0.5 * (logs + logs.T))
         return float(np.min(np.mean(told, axis=0)))
 
-    def answer(self, i: int, course: Course, draw: int, noise: float = 1.0) -> Record | None:
+    def answer(self, i: int, course: Course, draw: int) -> Record | None:
         """Return how valve i answers a course; None where the stem leaves its window.
 
         Args:
             i: of the fits.
             course: what is played to it.
-            draw: of the noise of sensor and pressure.
-            noise: of the pressure, over what makes the valve repeat itself no better than the recordings show.
+            draw: of the noise of sensor and pressure: the valve repeats itself no better than the recordings show.
         """
         composition, period_s = self._compositions[i], self._record.period_s
         generator = np.random.default_rng([self._seed, draw])
         time_s, command_pa = course.sampled(period_s)
-        noise_pa = noise * self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
+        noise_pa = self._noise_pa(i) * _autoregression(generator, command_pa.size - 1, period_s)
         step_s = min(period_s, composition.step_s)
         response = respond(composition, composition.theta, command_pa[:-1] + noise_pa, period_s, step_s=step_s)
         # The first hold brings the valve from rest to where the course begins: a free run starts after it.

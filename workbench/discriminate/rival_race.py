@@ -41,7 +41,7 @@ from math import copysign, exp, inf, log
 from typing import Any, Literal
 
 import numpy as np
-from scipy.special import log_ndtr, stdtrit
+from scipy.special import log_expit, log_ndtr, ndtri_exp, stdtrit
 
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile
@@ -217,6 +217,16 @@ class RivalRace:
         samples = (chosen.course.duration_s - REST_S) / self.record.period_s
         by_run = 0.5 * self._all[self.best].share * samples * log(max(1.0, chosen.separation))
         return max(by_run, chosen.by_slips)
+
+    def expected(self, chosen: DesignedExperiment) -> float:
+        """Return by how much log odds are to rise that say no more than slips agree: z^2 by half of what is promised.
+
+        Differences of a mean m^2/2 and a deviation m, as they are if a rival is the valve, add to l = N m^2/2 and
+        z = sqrt(l/2).
+        """
+        lambda_ = -log(max(sorted(self.relative.values())[-2], TINY))
+        z = float(ndtri_exp(log_expit(lambda_)))
+        return agreed((z**2 + 0.5 * self.promised(chosen)) ** 0.5) - lambda_
 
     def promised_by(self, chosen: DesignedExperiment, moves: int) -> float:
         """Return by how much an experiment is to raise the log odds, repeated for so many moves."""

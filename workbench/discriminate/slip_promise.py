@@ -1,17 +1,21 @@
 """What the slips of an experiment promise to tell of rivals: courses of the menu by the forces of their slips.
 
-A rival A answers a course, undisturbed. Where its slides land and break loose its balances are held against those of
-another, B:
+A rival A answers a course, under the pressure noise that `Rivalry` plays: what slips only in silence promises nothing.
+Where its slides land and break loose its balances are held against those of another, B:
 
     r = ((dx_j,B - dx_j,A)/S_j, (f_k,B - f_k,A)/T_k)     f_k middle of the interval of dF_s,k, see `slip_evidence`
     S_j^2 = S_c^2 + sigma_j^2,  T_k^2 = S_s^2 + w_k^2/12   w_k width of the interval: a large step tells little of F_s
-    l = (nu + 1)/(nu + 3) min over u of |r + J u|^2/2 + u' H u/2              H = 1 + J' J over the recordings so far
+    l = sum of min((nu + 1)/(nu + 3) e^2/2, (nu + 1)/2 log(1 + e^2/nu)) + (nu + 1)/(nu + 3) u' H u/2,  e = r + J u
+    u = argmin |r + J u|^2 + u' H u                                           H = 1 + J' J over the recordings so far
 
 u are B's parameters, held as the recordings know them, and an offset of either friction in the new recording; nu is the
-freedom of t. By l the log odds of A against B are to rise. A course promises the least of all pairs, but of those that
-no course tells apart, however often repeated: what else is suspected can still be ruled out.
+freedom of t, by which no slip says much alone. By l the log odds of A against B are to rise, in the mean over draws of
+the noise, which decides where a stem slips; other draws than those by which a course was found say what it promises.
+A course promises the least of all pairs, but of those that no course tells apart, however often repeated: what else is
+suspected can still be ruled out.
 
-On a valve that scatters a slow ramp of many slips tells more than a large step: each leg is one move.
+On a valve that scatters a slow ramp of many slips tells more than a large step: each leg is one move. The best few of
+the menu are changed at random, a change kept if it promises more a move.
 """
 
 from collections.abc import Sequence
@@ -22,7 +26,17 @@ from numpy.typing import NDArray
 
 from sim.karnopp import Vector
 from workbench.data.record import Record
-from workbench.discriminate.experiment_design import SEARCHED, Course, Rivalry, Terms, courses
+from workbench.discriminate.experiment_design import (
+    CHECKED,
+    KEPT,
+    SEARCHED,
+    TRIED,
+    Course,
+    Rivalry,
+    Terms,
+    changed_at_random,
+    courses,
+)
 from workbench.discriminate.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 from workbench.fit.fit_result import Fit
 from workbench.fit.landings import FEWEST
@@ -50,36 +64,64 @@ def promised_by_slips(
         terms: to keep to.
         workers: threads, by default one a core.
     """
-    fits = [fit for fit, _ in rivals]
-    rivalry = Rivalry(fits, record, terms)
-    known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
+    by_slips = _SlipRivalry(rivals, record, first_rows, terms)
     inside = list(courses(record, terms))
-    nothing = np.zeros(len(fits) * (len(fits) - 1))
-
-    def promised(course: Course) -> Vector:
-        """Return what a course promises of each rival that answers against each other one, (pairs,)."""
-        told: list[float] = []
-        for i in range(len(fits)):
-            answer = rivalry.answer(i, course, SEARCHED[0], noise=0.0)
-            if answer is None:
-                return nothing
-            forces = [
-                SlipForces(replace(fit, from_pressure=False), answer, [0], slips.least_m) for fit, slips in rivals
-            ]
-            if forces[i].landings.count < FEWEST:
-                return nothing
-            left = [each.left(each.fitted) for each in forces]
-            told += [known[j].told_by(forces[j], left[j], left[i]) for j in range(len(fits)) if j != i]
-        return np.array(told)
-
-    rated = np.array(list(on_threads(promised, inside, workers)))
-    moves = np.array([max(1, course.moves) for course in inside])
+    rated = np.array(list(on_threads(lambda course: by_slips.promised(course, SEARCHED), inside, workers)))
     if not rated.size:
         return None
+    moves = np.array([max(1, course.moves) for course in inside])
     told_apart = (rated / moves[:, None]).max(axis=0) > HOPELESS
-    least = rated[:, told_apart].min(axis=1) if told_apart.any() else rated.min(axis=1)
-    best = int(np.argmax(least / moves))
-    return (inside[best], float(least[best])) if least[best] > 0.0 else None
+
+    def least(course: Course, draws: Sequence[int]) -> float:
+        told = by_slips.promised(course, draws)
+        return float((told[told_apart] if told_apart.any() else told).min())
+
+    def improved(i: int) -> Course:
+        course, generator = inside[i], np.random.default_rng([terms.seed, i])
+        most = least(course, SEARCHED) / moves[i]
+        for _ in range(TRIED):
+            changed = changed_at_random(course, terms.bounds, generator)
+            if (there := least(changed, SEARCHED) / max(1, changed.moves)) > most:
+                course, most = changed, there
+        return course
+
+    left = rated[:, told_apart] if told_apart.any() else rated
+    kept = np.argsort(-left.min(axis=1) / moves, kind="stable")[:KEPT].tolist()
+    found = [*on_threads(improved, kept, workers), *(inside[i] for i in kept)]
+    promises = list(on_threads(lambda course: least(course, CHECKED), found, workers))
+    best = max(range(len(found)), key=lambda i: promises[i] / max(1, found[i].moves))
+    return (found[best], promises[best]) if promises[best] > 0.0 else None
+
+
+class _SlipRivalry:
+    """Rivals held against each other's answers by the forces of their slips."""
+
+    def __init__(
+        self, rivals: Sequence[tuple[Fit, Slips]], record: Record, first_rows: Sequence[int], terms: Terms
+    ) -> None:
+        self._rivals = rivals
+        self._rivalry = Rivalry([fit for fit, _ in rivals], record, terms)
+        self._known = [_Known(fit, told, record, first_rows) for fit, told in rivals]
+
+    def promised(self, course: Course, draws: Sequence[int]) -> Vector:
+        """Return what a course promises of each rival that answers against each other one, (pairs,)."""
+        return np.asarray(np.mean([self._told(course, draw) for draw in draws], axis=0))
+
+    def _told(self, course: Course, draw: int) -> Vector:
+        count = len(self._rivals)
+        told: list[float] = []
+        for i in range(count):
+            answer = self._rivalry.answer(i, course, draw)
+            if answer is None:
+                return np.zeros(count * (count - 1))
+            forces = [
+                SlipForces(replace(fit, from_pressure=False), answer, [0], slips.least_m) for fit, slips in self._rivals
+            ]
+            if forces[i].landings.count < FEWEST:
+                return np.zeros(count * (count - 1))
+            left = [each.left(each.fitted) for each in forces]
+            told += [self._known[j].told_by(forces[j], left[j], left[i]) for j in range(count) if j != i]
+        return np.array(told)
 
 
 class _Known:
@@ -102,8 +144,9 @@ class _Known:
         H = np.eye(J.shape[1])
         H[:-2, :-2] = self._information
         u = -np.linalg.solve(J.T @ J + H, J.T @ r)
-        left = r + J @ u
-        return float(0.5 * (FREEDOM + 1.0) / (FREEDOM + 3.0) * (left @ left + u @ H @ u))
+        e = r + J @ u
+        near, far = (FREEDOM + 1.0) / (FREEDOM + 3.0) * e**2, (FREEDOM + 1.0) * np.log1p(e**2 / FREEDOM)
+        return float(0.5 * (np.minimum(near, far).sum() + (FREEDOM + 1.0) / (FREEDOM + 3.0) * (u @ H @ u)))
 
     def _slopes(self, forces: SlipForces, here: Left) -> Matrix:
         """Return what the balances change by with the coordinates, m and N, (slips, coordinates)."""
