@@ -13,7 +13,10 @@ def assert_true(loop: Loop) -> None:
     assert_static_law(loop.decision.static_law, SPRING_N_PER_M / AREA_M2, up_pa, down_pa)
 
 
-@pytest.mark.parametrize(("lost_s", "supply_pa"), [(10.0, 0.0), (25.0, 50e3), (40.0, 20e3)])
+@pytest.mark.parametrize(
+    ("lost_s", "supply_pa"),
+    [(10.0, 0.0), *(pytest.param(*each, marks=pytest.mark.long) for each in ((25.0, 50e3), (40.0, 20e3)))],
+)
 def test_an_identification_waits_for_the_supply(lost_s: float, supply_pa: float) -> None:
     loop = Loop()
     loop.begin()

@@ -80,6 +80,7 @@ def test_a_loop_faster_than_its_samples_is_no_clock(lag: float) -> None:
     assert ready(with_noise(Recording(columns), NOISE_M)).early is None
 
 
+@pytest.mark.long
 def test_of_two_clocks_nothing_is_judged() -> None:
     """It was "unexplained": something is missing that the library does not have."""
     found = diagnose(shifted(STEPS, 3), SEED, effects=["dead_time"])

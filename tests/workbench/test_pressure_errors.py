@@ -61,6 +61,7 @@ def with_pressure(model: EvaluatedModel, off_pa: float) -> EvaluatedModel:
     return replace(model, pressure=PressureErrors(off_pa, np.log(np.full(30, off_pa))))
 
 
+@pytest.mark.long
 def test_a_supply_limit_is_told_from_a_stop_by_the_measured_pressure() -> None:
     """Without it either is as good: `supply_limit or end_stop`."""
     found = diagnose(recorded(LIMITED), BARE, effects=("supply_limit", "end_stop"), workers=1)
@@ -114,6 +115,7 @@ def test_a_pressure_that_is_as_far_off_by_chance_tells_nothing() -> None:
     assert step.contradicted == ()
 
 
+@pytest.mark.long
 def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
     """A hysteresis of the I/P is friction by another name, if not for the measured pressure."""
     found = diagnose(recorded(BARE, hysteresis_pa=8e3), BARE, effects=("supply_limit",), workers=1)

@@ -68,6 +68,7 @@ def preload_n(one: Fit) -> float:
     return force_n
 
 
+@pytest.mark.long
 def test_slips_tell_a_preload_from_a_hardening_spring(told: dict[str, Slips]) -> None:
     assert told["preload"].count == told["spring_hardening"].count > 40
     assert told["preload"].log_likelihood - told["spring_hardening"].log_likelihood > np.log(100.0)

@@ -70,6 +70,7 @@ def test_a_record_that_begins_with_a_step_is_judged_from_where_the_stem_rests(nu
     assert any("about to move: simulated and judged from sample 2 on" in each for each in compared.notes)
 
 
+@pytest.mark.long
 def test_rests_without_noise_have_a_verdict_where_it_is_said_that_nothing_was_held_back(
     tmp_path: Path, capsys: Capture
 ) -> None:

@@ -31,6 +31,7 @@ def lopsided() -> tuple[Recording, ValveFile]:
     return record_of(with_effect(valve, "asymmetric_friction", asymmetry=ASYMMETRY), 5, command_pa=command_pa), valve
 
 
+@pytest.mark.long
 def test_a_preload_that_imitates_an_asymmetry_which_was_not_tried_is_no_explanation(
     lopsided: tuple[Recording, ValveFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,8 +13,9 @@ parameters z:
     sigma_p = k_s / A sqrt(sigma^2 - sigma_sensor^2)     of the noise, an autoregression of 0.2 s; sigma floor
 
 The best few, and the best of the menu as they are, are then refitted in full, by descents from wide to narrow under
-other noise, and the one with the largest separation is chosen: by how many times a refitted rival is worse off than the
-valve that answered. A slip that only luck decides mistimes both, and separates nothing.
+other noise, the better half under more of it, and the one with the largest separation is chosen: by how many times a
+refitted rival is worse off than the valve that answered. A slip that only luck decides mistimes both, and separates
+nothing.
 
 Every course stays inside its bounds: pressures, rate, length; and every rival says that the stem stays in its window.
 """
@@ -202,11 +203,19 @@ def designed(
 
     kept = order[:KEPT]
     found = [*on_threads(improved, kept, workers), *(starts[i] for i in kept)]
-    rated = list(on_threads(rivalry.separation, found, workers))
-    if not rated:
+    if not found:
         return None
-    best = int(np.argmax(rated))
-    return DesignedExperiment(found[best], rated[best])
+    better = _ranked(rivalry, found, CHECKED[:1], workers)[:KEPT]
+    separation, best = _ranked(rivalry, [course for _, course in better], CHECKED, workers)[0]
+    return DesignedExperiment(best, separation)
+
+
+def _ranked(
+    rivalry: "Rivalry", found: Sequence[Course], draws: Sequence[int], workers: int | None
+) -> list[tuple[float, Course]]:
+    """Return courses with their separations after refits in full under draws of the noise, largest first."""
+    rated = on_threads(lambda course: rivalry.separation(course, draws), found, workers)
+    return sorted(zip(rated, found, strict=True), key=lambda each: -each[0])
 
 
 def _improved(
@@ -314,9 +323,9 @@ class Rivalry:
         """Return the separation after one step, by its logarithm; minus infinity where the stem leaves its window."""
         return self._least(course, SEARCHED, self._stepped)
 
-    def separation(self, course: Course) -> float:
+    def separation(self, course: Course, draws: Sequence[int]) -> float:
         """Return the separation after refits in full."""
-        return float(np.exp(self._least(course, CHECKED, self._refitted)))
+        return float(np.exp(self._least(course, draws, self._refitted)))
 
     def _least(self, course: Course, draws: Sequence[int], cost: Callable[[Record, int], float]) -> float:
         """Return the least of all pairs of log C_B / C_A, the mean over draws of the noise."""

@@ -53,7 +53,7 @@ from workbench.discriminate.experiment_design import DesignedExperiment, Terms, 
 from workbench.discriminate.slip_evidence import FREEDOM, Slips, needed_m, slips, slips_off
 from workbench.discriminate.slip_promise import promised_by_slips
 from workbench.fit.descent import MIDDLING, descended, settled
-from workbench.fit.fit_result import Fit
+from workbench.fit.fit_result import ELSEWHERE, Fit
 from workbench.fit.fitting import fit
 from workbench.fit.landings import FEWEST, rests
 from workbench.fit.objective import FINAL, SimulationError, softs
@@ -278,11 +278,17 @@ class RivalRace:
         return np.asarray(np.exp(np.quantile(block_logs(self.record.time_s[first:], error_m, 0.0), EXPLAINED)))
 
     def with_recording(self, recording: Recording) -> "RivalRace":
-        """Return it after another recording: every rival refitted from where it was, and from where the best was."""
+        """Return it after another recording: every rival refitted from where it was, and from where the best was.
+
+        One that has lost is followed from where it was alone: all are searched anew before the best is named.
+        """
         race = RivalRace(self.fits, (*self._recordings, recording), self._seed, self._workers, self._begun)
-        names = list(self.fits)
-        refitted = on_threads(lambda name: race._refitted(self.fits[name], self.fits[self.best]), names, self._workers)
-        found = race._with(dict(zip(names, refitted, strict=True)))
+        best, left, names = self.fits[self.best], self._alive, list(self.fits)
+
+        def refitted(name: str) -> Fit:
+            return race._refitted(self.fits[name], best if name in left else None)
+
+        found = race._with(dict(zip(names, on_threads(refitted, names, self._workers), strict=True)))
         return found.searched_anew() if found.odds >= ODDS else found
 
     def searched_anew(self) -> "RivalRace":
@@ -301,21 +307,26 @@ class RivalRace:
     def _with(self, fits: Mapping[str, Fit]) -> "RivalRace":
         return RivalRace(fits, self._recordings, self._seed, self._workers, self._begun)
 
-    def _refitted(self, here: Fit, best: Fit) -> Fit:
-        """Return a fit to the whole record, from its own parameters and from those that it shares with the best."""
+    def _refitted(self, here: Fit, best: Fit | None) -> Fit:
+        """Return a fit to the whole record, from its own parameters and from those that it shares with the best.
+
+        All starts descend. The lowest is settled first, and no other that has come to where one has been; nor are the
+        stairs of what stays behind scanned.
+        """
         composition = Composition.from_file(here.valve)
         parameters = free_parameters(composition, tuple(here.parameters))
         run = FreeRun(composition, self.record, from_pressure=here.from_pressure)
         error = SimulationError(run, composition, parameters, composition.theta)
-        own = error.coordinates(composition.theta)
-        shared = composition.theta.copy()
-        bests = Composition.from_file(best.valve)
-        for name, value in zip(bests.names, bests.theta.tolist(), strict=True):
-            if name in composition.names:
-                shared[composition.names.index(name)] = value
-        starts = [own, error.coordinates(shared), *map(error.coordinates, here.seeds)]
-        ends = [settled(error, descended(error, z, MIDDLING)) for z in starts]
-        z = min(ends, key=error.cost)
+        starts = [error.coordinates(composition.theta)]
+        if best:
+            starts += map(error.coordinates, (_shared(composition, best), *here.seeds))
+        z, *others = sorted((descended(error, each, MIDDLING) for each in starts), key=error.cost)
+        came = [z, z := settled(error, z)]
+        for other in others:
+            if min(float(np.max(np.abs(other - each))) for each in came) > ELSEWHERE:
+                end = settled(error, other, error.cost(z))
+                came += [other, end]
+                z = min(z, end, key=error.cost)
         theta = error.theta(z)
         values: dict[str, float] = dict(zip(composition.names, theta.tolist(), strict=True))
         base = here.valve.valve.model_copy(
@@ -369,6 +380,15 @@ class RivalRace:
 
     def _is_noise(self, error_m: Vector) -> bool:
         return not np.isfinite(error_m).any() or float(np.nanmean(error_m**2)) <= (RARELY_OFF * self._sigma_m) ** 2
+
+
+def _shared(composition: Composition, best: Fit) -> Vector:
+    """Return theta of a rival with what it shares with the best as it is there."""
+    theta, bests = composition.theta.copy(), Composition.from_file(best.valve)
+    for name, value in zip(bests.names, bests.theta.tolist(), strict=True):
+        if name in composition.names:
+            theta[composition.names.index(name)] = value
+    return theta
 
 
 def _stretches(each: Vector, period_s: float) -> list[Vector]:
