@@ -105,6 +105,7 @@ def test_static_friction_as_printed_is_refused_in_a_valve_file() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_sine_of_its_own_sample_rate_vanishes_and_one_in_rad_per_s_does_not(quiet: ScenarioRun) -> None:
     assert largest_sample_pu(LITERAL, quiet) < 1e-10
     assert largest_sample_pu(HONEST_SINE, quiet) == pytest.approx(0.01, rel=1e-3)
@@ -176,6 +177,7 @@ def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
         assert all((one["value"] is None) == (one["error"] is None) for one in case["identified"])
 
 
+@pytest.mark.long
 def test_the_noise_table_sets_ours_at_the_bound_and_the_seeds_far_off() -> None:
     """40 runs scatter a standard deviation by 11 %: 1.2 times the bound, and three times that scatter."""
     found = noise_table.cell(FILE, noise_table.motion(FILE, 1e-3), 1e-3, 1e-4, 40)

@@ -144,6 +144,7 @@ def test_the_seeds_law_does_not_make_them() -> None:
     assert np.sqrt(np.mean(errors**2)) > 0.01
 
 
+@pytest.mark.long
 def test_small_steps_under_ten_times_the_noise() -> None:
     errors, _ = made(identified(1e-3), STEPS_PU[:12])
     assert np.mean(errors <= 2.5e-3) >= 0.95

@@ -91,6 +91,7 @@ def test_of_two_clocks_nothing_is_judged() -> None:
     assert not any("two clocks" in str(each) for each in found.blocks()[1:])
 
 
+@pytest.mark.long
 def test_nor_is_a_form_sought() -> None:
     found = discover(shifted(STEPS, 3), SEED)
     assert found.outcome == "unjudged"

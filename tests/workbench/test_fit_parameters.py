@@ -77,6 +77,7 @@ def test_without_motion_both_ways_nothing_is_fitted() -> None:
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not there")
+@pytest.mark.long
 def test_the_servo_motors_friction_is_asymmetric() -> None:
     motor = {"mass_kg": 2e-4, "diaphragm_area_m2": 1.0, "spring_n_per_m": 1e-9, "viscous_ns_per_m": 2.5e-4}
     friction = {"coulomb_n": 0.0303, "static_n": 0.0303, "stribeck_velocity_m_per_s": 0.1, "deadzone_ratio": 0.6}

@@ -54,6 +54,7 @@ def test_stops_are_sought_where_the_positions_end() -> None:
     assert np.any(lowest < lowest.max() - 2e-3), "the lower stop alone out of reach"
 
 
+@pytest.mark.long
 def test_a_stop_that_the_stem_nowhere_comes_to_stays_where_it_is_declared() -> None:
     """Where the record happens to end a lower stop had been found, 95 %: 3.5 to 5.4 mm, and the law went no lower."""
     upper_m, lowest_m = 0.06, 0.02

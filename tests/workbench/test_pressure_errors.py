@@ -143,6 +143,7 @@ def test_by_its_measured_pressure_a_form_is_sought_of_the_stem_alone(monkeypatch
     assert by_command - by_pressure == {"pressure"}
 
 
+@pytest.mark.long
 def test_a_pressure_that_is_the_models_but_for_the_noise_is_not_spoken_of() -> None:
     assert NOISE_PA * BARE.valve.diaphragm_area_m2 > 0.01 * BARE.valve.coulomb_n
     found = diagnose(recorded(BARE), BARE, effects=("supply_limit",), workers=1)

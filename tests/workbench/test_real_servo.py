@@ -63,6 +63,7 @@ def test_friction_differs_between_the_directions(diagnosed: Diagnosis) -> None:
     assert diagnosed.best.fit.parameters["asymmetric_friction.asymmetry"].value == pytest.approx(-0.12, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_stribeck_term_is_refused(diagnosed: Diagnosis) -> None:
     tried = [each for each in diagnosed.candidates if each.name == "stribeck"]
     assert len(tried) == len(diagnosed.steps)

@@ -331,6 +331,7 @@ def test_of_twins_nothing_is_promised(fits: dict[str, Fit], told: dict[str, Slip
     assert promised(fits, told, ("preload", "preload"), record) < 1e-9
 
 
+@pytest.mark.long
 def test_what_nothing_tells_apart_hides_no_third(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:
     assert promised(fits, told, ("preload", "preload", "spring_hardening"), record) > 0.1
 

@@ -154,6 +154,7 @@ def test_changes_between_samples_without_a_rest_are_refused_in_a_line(tmp_path: 
         assert "no slide is seen to end in a rest of three samples, by which alone it could be judged" in said[0]
 
 
+@pytest.mark.long
 def test_a_dead_time_between_two_samples_is_found_alone_and_no_other_effect_beside_it() -> None:
     """Seen once a second its error is a stair, on any step of which a search ends."""
     recording = once_a_second(SEED, 400, held_s=12.0, offset_s=0.5)
