@@ -3,10 +3,10 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from math import log
+from math import exp, log
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
 from workbench.discriminate.discrimination import Discrimination, Played, Player, Round, Waiting, discriminate
 from workbench.discriminate.experiment_design import MOST_MOVES, WAYS, Bounds, Course, DesignedExperiment, Leg, Terms
-from workbench.discriminate.rival_race import ODDS, RivalRace, Weighed, _independent_share, log_odds
+from workbench.discriminate.rival_race import ODDS, RivalRace, Weighed, _independent_share, agreed, log_odds
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.experiment import REST_S
@@ -207,6 +207,13 @@ def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], reco
     design = Design(1.0, by_slips=2.0)
     discriminate(twin, [recording], answering, BOUNDS, LIBRARY, design=design, budget=6)
     assert [each.ways for each in design.terms] == [WAYS] * 4 + [{"run"}], "a third time they wait"
+
+
+@pytest.mark.parametrize(("z", "promised"), [(0.0, 6.0), (1.0, 6.0), (2.0, 0.0)])
+def test_log_odds_that_say_no_more_than_slips_agree_rise_by_less_than_is_promised(z: float, promised: float) -> None:
+    race = cast(RivalRace, SimpleNamespace(relative={"a": 1.0, "b": exp(-agreed(z))}, promised=lambda _: promised))
+    expected = agreed((z**2 + 0.5 * promised) ** 0.5) - agreed(z)
+    assert RivalRace.expected(race, DesignedExperiment(COURSE, 2.0)) == pytest.approx(expected, abs=1e-9)
 
 
 def test_what_came_to_less_than_a_quarter_of_what_was_expected_waits() -> None:

@@ -314,7 +314,7 @@ def test_slips_say_no_more_than_they_agree(fits: dict[str, Fit]) -> None:
 @pytest.fixture(autouse=True)
 def unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Courses of the menu as they are: half a second instead of ten."""
-    monkeypatch.setattr("workbench.discriminate.slip_promise.TRIED", 0)
+    monkeypatch.setattr("workbench.discriminate.experiment_design.TRIED", 0)
 
 
 def promised(
@@ -354,7 +354,7 @@ def test_a_bent_balance_promises_more_than_a_break_away(
 def test_a_course_of_the_menu_is_changed_to_promise_more(
     fits: dict[str, Fit], told: dict[str, Slips], record: Record, apart: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("workbench.discriminate.slip_promise.TRIED", 25)
+    monkeypatch.setattr("workbench.discriminate.experiment_design.TRIED", 25)
     assert promised(fits, told, ("preload", "asymmetric_friction"), record) > 1.02 * apart
 
 

@@ -198,11 +198,11 @@ def designed(
     scores = list(on_threads(rivalry.score, starts, workers))
     order = sorted((i for i, score in enumerate(scores) if score > -np.inf), key=lambda i: -scores[i])
 
-    def improved(i: int) -> Course:
-        return _improved(rivalry, starts[i], scores[i], terms.bounds, np.random.default_rng([terms.seed, i]))
+    def changed(i: int) -> Course:
+        return improved(rivalry.score, starts[i], scores[i], terms.bounds, np.random.default_rng([terms.seed, i]))
 
     kept = order[:KEPT]
-    found = [*on_threads(improved, kept, workers), *(starts[i] for i in kept)]
+    found = [*on_threads(changed, kept, workers), *(starts[i] for i in kept)]
     if not found:
         return None
     better = _ranked(rivalry, found, CHECKED[:1], workers)[:KEPT]
@@ -218,18 +218,19 @@ def _ranked(
     return sorted(zip(rated, found, strict=True), key=lambda each: -each[0])
 
 
-def _improved(
-    rivalry: "Rivalry", course: Course, score: float, bounds: Bounds, generator: np.random.Generator
+def improved(
+    score: Callable[[Course], float], course: Course, most: float, bounds: Bounds, generator: np.random.Generator
 ) -> Course:
+    """Return a course changed at random, a change kept if it scores more than all before; `most`: as it is."""
     for _ in range(TRIED):
-        changed = changed_at_random(course, bounds, generator)
-        there = rivalry.score(changed)
-        if there > score:
-            course, score = changed, there
+        changed = _changed_inside(course, bounds, generator)
+        there = score(changed)
+        if there > most:
+            course, most = changed, there
     return course
 
 
-def changed_at_random(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
+def _changed_inside(course: Course, bounds: Bounds, generator: np.random.Generator) -> Course:
     """Return a course with one leg changed, or all lengths, or its first level; as it is where that takes too long."""
     try:
         return _changed(course, bounds.maximum_pa - bounds.minimum_pa, generator).within(bounds)

@@ -30,12 +30,11 @@ from workbench.discriminate.experiment_design import (
     CHECKED,
     KEPT,
     SEARCHED,
-    TRIED,
     Course,
     Rivalry,
     Terms,
-    changed_at_random,
     courses,
+    improved,
 )
 from workbench.discriminate.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 from workbench.fit.fit_result import Fit
@@ -76,18 +75,16 @@ def promised_by_slips(
         told = by_slips.promised(course, draws)
         return float((told[told_apart] if told_apart.any() else told).min())
 
-    def improved(i: int) -> Course:
-        course, generator = inside[i], np.random.default_rng([terms.seed, i])
-        most = least(course, SEARCHED) / moves[i]
-        for _ in range(TRIED):
-            changed = changed_at_random(course, terms.bounds, generator)
-            if (there := least(changed, SEARCHED) / max(1, changed.moves)) > most:
-                course, most = changed, there
-        return course
+    def a_move(course: Course) -> float:
+        return least(course, SEARCHED) / max(1, course.moves)
+
+    def changed(i: int) -> Course:
+        generator = np.random.default_rng([terms.seed, i])
+        return improved(a_move, inside[i], a_move(inside[i]), terms.bounds, generator)
 
     left = rated[:, told_apart] if told_apart.any() else rated
     kept = np.argsort(-left.min(axis=1) / moves, kind="stable")[:KEPT].tolist()
-    found = [*on_threads(improved, kept, workers), *(inside[i] for i in kept)]
+    found = [*on_threads(changed, kept, workers), *(inside[i] for i in kept)]
     promises = list(on_threads(lambda course: least(course, CHECKED), found, workers))
     best = max(range(len(found)), key=lambda i: promises[i] / max(1, found[i].moves))
     return (found[best], promises[best]) if promises[best] > 0.0 else None
