@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from math import exp, log
+from math import log
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Literal, cast
@@ -211,7 +211,7 @@ def test_slips_wait_when_they_have_told_nothing_twice(fits: dict[str, Fit], reco
 
 @pytest.mark.parametrize(("z", "promised"), [(0.0, 6.0), (1.0, 6.0), (2.0, 0.0)])
 def test_log_odds_that_say_no_more_than_slips_agree_rise_by_less_than_is_promised(z: float, promised: float) -> None:
-    race = cast(RivalRace, SimpleNamespace(relative={"a": 1.0, "b": exp(-agreed(z))}, promised=lambda _: promised))
+    race = cast(RivalRace, SimpleNamespace(behind={"a": 0.0, "b": agreed(z)}, promised=lambda _: promised))
     expected = agreed((z**2 + 0.5 * promised) ** 0.5) - agreed(z)
     assert RivalRace.expected(race, DesignedExperiment(COURSE, 2.0)) == pytest.approx(expected, abs=1e-9)
 

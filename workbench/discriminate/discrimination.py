@@ -25,7 +25,7 @@ from sim.effect import Effect
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.discriminate.experiment_design import MOST_MOVES, WAYS, Bounds, DesignedExperiment, Terms, Way
 from workbench.discriminate.measured_pressure import raced_by_pressure
-from workbench.discriminate.rival_race import ODDS, TINY, RivalRace
+from workbench.discriminate.rival_race import ODDS, RivalRace
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameters_json
 from workbench.select.effect_search import Progress
@@ -40,7 +40,7 @@ FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
 IMITATED, NOTHING = 1.001, 0.5
 """A separation below it is none; log odds that a whole budget of moves must promise."""
-KEPT = 0.25
+LEAST_TOLD = 0.25
 """Of what was expected of it, and of the log odds wanted: a way of telling that has come to less waits."""
 PATIENCE: Mapping[Way, int] = {"run": 1, "slips": 2}
 """Experiments after which that is asked."""
@@ -76,7 +76,7 @@ def by_run_or_slips(race: RivalRace, terms: Terms) -> DesignedExperiment | None:
 
 @dataclass(slots=True)
 class Waiting:
-    """What waits, for it has told less than was expected of it: ways of telling, and runs by name.
+    """What waits, for it has told less than was expected of it: ways of telling, and the inputs of runs by name.
 
     Where the valve scatters the promise of a run, worked out under few draws of that noise, is often not kept, whatever
     its course; and one that told little will not tell more by being played again. Slips promise a mean, about which
@@ -85,8 +85,8 @@ class Waiting:
 
     runs: set[str] = field(default_factory=set)
     ways: set[Way] = field(default_factory=set)
-    _expected: dict[Way, list[float]] = field(default_factory=dict)
-    _told: dict[Way, list[float]] = field(default_factory=dict)
+    _lately: dict[Way, list[tuple[float, float]]] = field(default_factory=dict)
+    """What was expected and what was told, experiment by experiment."""
 
     def __bool__(self) -> bool:
         return bool(self.runs or self.ways)
@@ -94,10 +94,10 @@ class Waiting:
     def heard(self, chosen: DesignedExperiment, expected: float, told: float) -> None:
         """Take in by how much an experiment was to change the log odds, and by how much it did."""
         way = chosen.way
-        self._expected.setdefault(way, []).append(min(expected, log(ODDS)))
-        self._told.setdefault(way, []).append(told)
-        told_lately, expected_lately = (abs(sum(each[way][-PATIENCE[way] :])) for each in (self._told, self._expected))
-        if len(self._told[way]) < PATIENCE[way] or told_lately >= KEPT * expected_lately:
+        lately = [*self._lately.get(way, []), (min(expected, log(ODDS)), told)][-PATIENCE[way] :]
+        self._lately[way] = lately
+        wanted, changed = (sum(each) for each in zip(*lately, strict=True))
+        if len(lately) < PATIENCE[way] or abs(changed) >= LEAST_TOLD * wanted:
             return
         self.ways.add(way)
         if way == "run":
@@ -107,8 +107,7 @@ class Waiting:
 
     def _wake(self) -> None:
         self.ways.clear()
-        self._expected.clear()
-        self._told.clear()
+        self._lately.clear()
 
     def clear(self) -> None:
         """Nothing waits any more."""
@@ -300,7 +299,7 @@ def discriminate(
         tell(f"refitting the rivals to experiment {number}", used / budget)
         before = race
         race = race.with_recording(played.recording)
-        waiting.heard(chosen, before.expected(chosen), _told(before.relative, race.relative))
+        waiting.heard(chosen, before.expected(chosen), race.told_since(before))
         rounds.append(Round(chosen.course.name, chosen.separation, used, race.relative))
         tell(f"experiment {number} weighed", 1.0)
         if on_round:
@@ -313,18 +312,6 @@ def discriminate(
 def _promises_nothing(race: RivalRace, chosen: DesignedExperiment, budget: int) -> bool:
     """Whether it would tell nothing, repeated for a whole budget: what is left of it says nothing of the valve."""
     return chosen.separation < IMITATED and race.promised_by(chosen, budget) < NOTHING
-
-
-def _told(before: Mapping[str, float], after: Mapping[str, float]) -> float:
-    """Return by how much the log odds of the best before have changed, against whom, of those left, they did most."""
-    best = max(before, key=lambda name: before[name])
-    left = [name for name, odds in before.items() if odds > 1.0 / ODDS]
-    changes = [_log(before[name]) - _log(after[name] / max(after[best], TINY)) for name in left]
-    return max(changes, key=abs)
-
-
-def _log(odds: float) -> float:
-    return log(max(odds, TINY))
 
 
 def _chosen(race: RivalRace, terms: Terms, design: Designer) -> DesignedExperiment | None:

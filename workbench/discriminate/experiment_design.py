@@ -79,7 +79,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """On which the next experiment is chosen: its bounds, its moves, what is not to be played for its run, its ways."""
+    """On which the next experiment is chosen: its bounds, its moves, inputs that are not to be played, its ways."""
 
     bounds: Bounds
     most_moves: int = MOST_MOVES

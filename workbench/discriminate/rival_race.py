@@ -181,13 +181,16 @@ class RivalRace:
 
         return max(self.fits, key=least_said)
 
+    @cached_property
+    def behind(self) -> Mapping[str, float]:
+        """By how much each rival is behind the best: lambda of the best against it, at least 0."""
+        best = self._all[self.best]
+        return {name: max(0.0, evidence(best, each)) if name != self.best else 0.0 for name, each in self._all.items()}
+
     @property
     def relative(self) -> Mapping[str, float]:
         """The odds of each rival against the best."""
-        best = self._all[self.best]
-        return {
-            name: exp(-max(0.0, evidence(best, each))) if name != self.best else 1.0 for name, each in self._all.items()
-        }
+        return {name: exp(-each) for name, each in self.behind.items()}
 
     @property
     def alive(self) -> list[Fit]:
@@ -224,9 +227,14 @@ class RivalRace:
         Differences of a mean m^2/2 and a deviation m, as they are if a rival is the valve, add to l = N m^2/2 and
         z = sqrt(l/2).
         """
-        lambda_ = -log(max(sorted(self.relative.values())[-2], TINY))
+        lambda_ = sorted(self.behind.values())[1]
         z = float(ndtri_exp(log_expit(lambda_)))
         return agreed((z**2 + 0.5 * self.promised(chosen)) ** 0.5) - lambda_
+
+    def told_since(self, before: "RivalRace") -> float:
+        """Return by how much log odds of the best before have changed, against whom, of those left, they did most."""
+        of_best = self.behind[before.best]
+        return max((self.behind[name] - of_best - before.behind[name] for name in before._alive), key=abs)
 
     def promised_by(self, chosen: DesignedExperiment, moves: int) -> float:
         """Return by how much an experiment is to raise the log odds, repeated for so many moves."""

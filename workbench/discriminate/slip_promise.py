@@ -70,20 +70,20 @@ def promised_by_slips(
         return None
     moves = np.array([max(1, course.moves) for course in inside])
     told_apart = (rated / moves[:, None]).max(axis=0) > HOPELESS
+    if not told_apart.any():
+        told_apart[:] = True
+    a_move = rated[:, told_apart].min(axis=1) / moves
 
     def least(course: Course, draws: Sequence[int]) -> float:
-        told = by_slips.promised(course, draws)
-        return float((told[told_apart] if told_apart.any() else told).min())
+        return float(by_slips.promised(course, draws)[told_apart].min())
 
-    def a_move(course: Course) -> float:
+    def score(course: Course) -> float:
         return least(course, SEARCHED) / max(1, course.moves)
 
     def changed(i: int) -> Course:
-        generator = np.random.default_rng([terms.seed, i])
-        return improved(a_move, inside[i], a_move(inside[i]), terms.bounds, generator)
+        return improved(score, inside[i], a_move[i], terms.bounds, np.random.default_rng([terms.seed, i]))
 
-    left = rated[:, told_apart] if told_apart.any() else rated
-    kept = np.argsort(-left.min(axis=1) / moves, kind="stable")[:KEPT].tolist()
+    kept = np.argsort(-a_move, kind="stable")[:KEPT].tolist()
     found = [*on_threads(changed, kept, workers), *(inside[i] for i in kept)]
     promises = list(on_threads(lambda course: least(course, CHECKED), found, workers))
     best = max(range(len(found)), key=lambda i: promises[i] / max(1, found[i].moves))
