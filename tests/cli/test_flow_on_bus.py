@@ -11,6 +11,7 @@ pytestmark = pytest.mark.real_time
 CASE = FlowCase("slides", 0.02, settle_s=2.0, measured_s=8.0)
 
 
+@pytest.mark.long
 def test_dcs_and_daemon_on_modbus_make_the_same_course_every_time() -> None:
     first, second = (outcome_on_modbus(CASE).course for _ in range(2))
     assert len(first.time_s) > 10.0 / 0.02 - 2

@@ -14,6 +14,7 @@ from config.exports import reader_process
 from config.exports.column_mapping import ExportOptions, read_mapping
 from config.exports.export_preview import preview
 from config.historian_export import read_export
+from tests.cases import few_always
 
 TIME_S = np.arange(0.0, 2.0, 0.01)
 POSITION_MM = 20.0 + 10.0 * np.sin(TIME_S)
@@ -118,7 +119,7 @@ def test_the_proposal_reads_it(name: str, tmp_path: Path) -> None:
 
 
 @each_file
-@pytest.mark.parametrize("kept", [0.5, *(pytest.param(each, marks=pytest.mark.long) for each in (0.1, 0.9))])
+@pytest.mark.parametrize("kept", few_always([0.5, 0.1, 0.9]))
 def test_a_torn_file_is_one_line_or_what_is_left_of_it(name: str, kept: float, tmp_path: Path) -> None:
     write, words = FILES[name]
     write(tmp_path / name)

@@ -24,6 +24,7 @@ from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
+from tests.cases import few_always
 
 VALVE = load_valve(shipped_valve("seed")).valve
 STROKE_M = VALVE.stroke_m
@@ -161,11 +162,13 @@ def test_at_rest_nothing_happens(noise_pu: float) -> None:
 
 @pytest.mark.parametrize(
     ("effect", "largest_pu"),
-    [
-        ({"name": "backlash", "width_m": 3e-3 * STROKE_M}, 3e-3),
-        ({"name": "asymmetric_friction", "asymmetry": 0.15}, 2e-3),
-        ({"name": "ip_lag", "time_constant_s": 0.05}, 0.015),
-    ],
+    few_always(
+        [
+            ({"name": "backlash", "width_m": 3e-3 * STROKE_M}, 3e-3),
+            ({"name": "asymmetric_friction", "asymmetry": 0.15}, 2e-3),
+            ({"name": "ip_lag", "time_constant_s": 0.05}, 0.015),
+        ]
+    ),
     ids=lambda value: value["name"] if isinstance(value, dict) else "",
 )
 def test_effects_that_the_law_does_not_know_leave_it_stable(effect: dict[str, object], largest_pu: float) -> None:

@@ -18,6 +18,7 @@ from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.effect import FINE_STEP_S
 from sim.slave.simulated_device import Device
 from sim.valve import Valve
+from tests.cases import few_always
 
 STROKE_M, LOW, HIGH = 0.04, 0.1, 0.9
 START_PA = 60e3
@@ -104,7 +105,7 @@ def whole_s(period_s: float) -> float:
     return period_s * len(path)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9])
+@pytest.mark.parametrize("share", few_always([0.1, 0.6, 0.0, 0.25, 0.4, 0.5, 0.75, 0.9], 2))
 @pytest.mark.parametrize("period_s", PERIODS_S)
 def test_a_stem_that_is_not_seen_any_more_is_not_driven_out_of_the_window(period_s: float, share: float) -> None:
     """Frozen while it goes on, in a turn, in the last one: by 23, or by the monitor's fault in the first turn."""

@@ -7,6 +7,7 @@ import pytest
 from benchmarks.sensor_faults import EXPERIMENTS, NO_FAULT, STROKE_M, SensorFault, identified, off
 from config.codes import Refusal
 from positioner.estimation.refiner import InProcessRefiner, RefinementJob
+from tests.cases import few_always
 
 SINE, *STAIRCASES = EXPERIMENTS
 JUMPS = [SensorFault(at_s, inf, by * STROKE_M) for by in (-0.1, 0.02, 0.1) for at_s in (0.25, 0.5, 0.8)]
@@ -20,12 +21,12 @@ def wrong(fault: SensorFault, seed: int = 0) -> bool:
     return decision.applied.ratios is not None and min(off(SINE, decision, each) for each in (0.0, by_m)) > 1.0
 
 
-@pytest.mark.parametrize("fault", [*JUMPS[::2], *SHORT], ids=str)
+@pytest.mark.parametrize("fault", few_always([*SHORT, *JUMPS[::2]], 4), ids=str)
 def test_a_sine_with_a_sensor_that_jumps_applies_nothing_wrong(fault: SensorFault) -> None:
     assert not wrong(fault)
 
 
-@pytest.mark.parametrize("fault", JUMPS[::2], ids=str)
+@pytest.mark.parametrize("fault", few_always(JUMPS[::2], 2), ids=str)
 def test_nor_where_nobody_refines(fault: SensorFault, monkeypatch: pytest.MonkeyPatch) -> None:
     """The algebraic estimates have a residual of their own."""
 

@@ -4,6 +4,7 @@ import pytest
 
 from config.codes import InhibitReason, Ne107Cause, Ne107Status
 from positioner.daemon.health import ne107_condition
+from tests.cases import few_always
 from tests.control.pneumatic_valve import AREA_M2, COULOMB_N, GOOD_PA, PRELOAD_N, SPRING_N_PER_M, Loop
 from tests.control.virtual_loop import assert_static_law
 
@@ -15,7 +16,7 @@ def assert_true(loop: Loop) -> None:
 
 @pytest.mark.parametrize(
     ("lost_s", "supply_pa"),
-    [(10.0, 0.0), *(pytest.param(*each, marks=pytest.mark.long) for each in ((25.0, 50e3), (40.0, 20e3)))],
+    few_always([(10.0, 0.0), (25.0, 50e3), (40.0, 20e3)]),
 )
 def test_an_identification_waits_for_the_supply(lost_s: float, supply_pa: float) -> None:
     loop = Loop()
@@ -32,7 +33,7 @@ def test_an_identification_waits_for_the_supply(lost_s: float, supply_pa: float)
     assert_true(loop)
 
 
-@pytest.mark.parametrize(("low_pu", "high_pu"), [(0.3, 0.7), (0.5, 0.51)])
+@pytest.mark.parametrize(("low_pu", "high_pu"), few_always([(0.5, 0.51), (0.3, 0.7)]))
 def test_a_move_waits_for_the_supply_and_lands_when_it_is_back(low_pu: float, high_pu: float) -> None:
     loop = Loop().identified()
     assert abs(loop.step_to(low_pu, 60.0)) < 1e-3
@@ -66,7 +67,7 @@ def test_a_stem_that_a_lost_supply_takes_away_comes_back_by_itself() -> None:
     assert abs(loop.step_to(0.4, 20.0)) < 1e-3
 
 
-@pytest.mark.parametrize("scale", [0.1, 14.5])
+@pytest.mark.parametrize("scale", few_always([14.5, 0.1]))
 def test_a_register_of_another_scale_is_no_lost_supply(scale: float) -> None:
     loop = Loop(lambda actuator_pa: scale * actuator_pa + 500.0).identified()
     assert_true(loop)

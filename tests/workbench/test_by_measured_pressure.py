@@ -47,6 +47,7 @@ def fits(bowed: Hidden) -> dict[str, Fit]:
     return {name: fit(whole, bowed.base, effects=(name,), base=base, profile=False) for name in RIVALS}
 
 
+@pytest.mark.long
 def test_rivals_are_raced_by_the_pressure_where_it_was_measured(bowed: Hidden, fits: dict[str, Fit]) -> None:
     raced = raced_by_pressure(fits, [bowed.fit, bowed.test], LIBRARY, 2)
     assert all(each.from_pressure for each in raced.values())

@@ -18,9 +18,19 @@ from sim.composition import Composition
 from sim.effect import shipped_effect, shipped_effects
 from sim.open_loop import respond
 from tests.workbench.valves import drawn_valve, record_of, with_effect
+from workbench.discriminate import rival_race
 from workbench.discriminate.discrimination import Discrimination, Played, Player, Round, Waiting, discriminate
-from workbench.discriminate.experiment_design import MOST_MOVES, WAYS, Bounds, Course, DesignedExperiment, Leg, Terms
-from workbench.discriminate.rival_race import ODDS, RivalRace, Weighed, _independent_share, agreed, log_odds
+from workbench.discriminate.experiment_design import (
+    MOST_MOVES,
+    WAYS,
+    Bounds,
+    Course,
+    DesignedExperiment,
+    Leg,
+    Terms,
+    told_apart,
+)
+from workbench.discriminate.rival_race import ASKED, ODDS, RivalRace, Weighed, _independent_share, agreed, log_odds
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import fit
 from workbench.select.experiment import REST_S
@@ -119,6 +129,23 @@ def test_a_course_stays_inside_its_bounds() -> None:
     assert command_pa.max() <= BOUNDS.maximum_pa
     assert tame.duration_s <= BOUNDS.longest_s * (1 + 1e-9)
     assert np.max(np.abs(np.diff(command_pa)) / np.diff(time_s)) <= BOUNDS.rate_pa_per_s * (1 + 1e-6)
+
+
+def test_a_pair_that_no_course_tells_apart_is_left_out_unless_there_is_no_other() -> None:
+    rated = np.array([[0.2, 0.0005, -0.3], [-0.1, 0.0, 0.002]])
+    assert told_apart(rated, 1e-3).tolist() == [True, False, True]
+    assert told_apart(rated[:, 1:2], 1e-3).tolist() == [True]
+
+
+def test_an_experiment_is_designed_for_the_likeliest(
+    fits: dict[str, Fit], recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    race = RivalRace({f"{name} {i}": each for name, each in fits.items() for i in range(3)}, (recording,), 0, 1)
+    asked: list[object] = []
+    monkeypatch.setattr(rival_race, "designed", lambda left, *_, **__: asked.extend(left))
+    race.run_experiment(Terms(BOUNDS))
+    assert len(race.alive) > ASKED
+    assert asked == race.alive[:ASKED]
 
 
 def answer_of(valve: ValveFile, chosen: DesignedExperiment) -> Played:

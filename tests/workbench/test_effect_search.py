@@ -154,6 +154,16 @@ def test_it_ends_where_nothing_is_accepted(searched: Callable[..., tuple[EffectS
     assert names(last) == ["backlash"], "what is there is not tried again"
 
 
+@pytest.mark.parametrize(("floors_second", "count"), [(15.0, 2), (13.0, 3)], ids=["most is left", "little is left"])
+def test_it_ends_where_two_steps_leave_most_of_the_error(
+    searched: Callable[..., tuple[EffectStep, ...]], floors_second: float, count: int
+) -> None:
+    def ends(there: Effects, added: Effects) -> float:
+        return {0: 20.0, 1: 18.0, 2: floors_second}.get(len(there | added), 9.0)
+
+    assert len(searched(ends, "backlash", "ip_lag", "stribeck")) == count
+
+
 def test_the_steps_do_not_depend_on_the_workers(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
     """Nor on which fit is done first."""
 

@@ -129,6 +129,7 @@ def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
     assert not found.nothing_off
 
 
+@pytest.mark.long
 def test_by_its_measured_pressure_a_form_is_sought_of_the_stem_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     recording, sought = recorded(LIMITED), list[set[str]]()
 

@@ -10,6 +10,7 @@ import pytest
 from config.recording import Recording
 from config.valve_file import ValveFile
 from positioner.cli.main import main
+from tests.cases import few_always
 from tests.workbench.valves import SEED
 from workbench.data.imposed_motion import read_imposed
 from workbench.forces.force_diagnosis import ForceDiagnosis, diagnose_forces
@@ -88,7 +89,7 @@ def test_one_pressure_alone_does_not_show_that_friction_grows_with_it() -> None:
     assert not {"pressure_friction", "pressure_power_friction"} & set(found.missing)
 
 
-@pytest.mark.parametrize("bar", BARS)
+@pytest.mark.parametrize("bar", few_always(BARS))
 def test_at_whichever_pressure_it_is_judged_friction_grows_with_pressure(bar: int) -> None:
     """With friction in proportion to the pressure alone, this was refused where the seal is judged at 3 bar."""
     others = [each for each in BARS if each != bar]

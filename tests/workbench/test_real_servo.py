@@ -70,6 +70,7 @@ def test_a_stribeck_term_is_refused(diagnosed: Diagnosis) -> None:
     assert not any(each.accepted for each in tried)
 
 
+@pytest.mark.long
 def test_a_motor_that_does_not_repeat_itself_is_not_called_explained(diagnosed: Diagnosis) -> None:
     assert diagnosed.verdict in {"unexplained", "untrusted"}
 

@@ -74,6 +74,7 @@ def test_slips_tell_a_preload_from_a_hardening_spring(told: dict[str, Slips]) ->
     assert told["preload"].log_likelihood - told["spring_hardening"].log_likelihood > np.log(100.0)
 
 
+@pytest.mark.long
 def test_an_experiment_in_which_luck_mistimes_slips_is_explained_by_where_they_land(
     fits: dict[str, Fit], recordings: list[Recording], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -327,6 +328,7 @@ def promised(
     return 0.0 if found is None else found[1] / found[0].moves
 
 
+@pytest.mark.long
 def test_of_twins_nothing_is_promised(fits: dict[str, Fit], told: dict[str, Slips], record: Record) -> None:
     assert promised(fits, told, ("preload", "preload"), record) < 1e-9
 

@@ -23,7 +23,15 @@ from config.results.block import Block, Table
 from config.results.result import Result
 from sim.effect import Effect
 from workbench.diagnosis.diagnosis import Diagnosis
-from workbench.discriminate.experiment_design import MOST_MOVES, WAYS, Bounds, DesignedExperiment, Terms, Way
+from workbench.discriminate.experiment_design import (
+    IMITATED,
+    MOST_MOVES,
+    WAYS,
+    Bounds,
+    DesignedExperiment,
+    Terms,
+    Way,
+)
 from workbench.discriminate.measured_pressure import raced_by_pressure
 from workbench.discriminate.rival_race import ODDS, RivalRace
 from workbench.fit.fit_result import Fit
@@ -38,8 +46,8 @@ BUDGET = 60
 """Moves."""
 FEW_MOVES, SURE = 3, 3.0
 """An experiment of few moves will do if it promises so many times the log odds wanted."""
-IMITATED, NOTHING = 1.001, 0.5
-"""A separation below it is none; log odds that a whole budget of moves must promise."""
+NOTHING = 0.5
+"""Log odds that a whole budget of moves must promise."""
 LEAST_TOLD = 0.25
 """Of what was expected of it, and of the log odds wanted: a way of telling that has come to less waits."""
 PATIENCE: Mapping[Way, int] = {"run": 1, "slips": 2}

@@ -9,7 +9,7 @@ and its rival B are refitted to the answer by one Gauss-Newton step, each held t
 parameters z:
 
     dz = argmin |r + J dz|^2 + dz' H dz,   e = r + J dz     r residuals, H = J' J over the recordings
-    separation = C(e_B) / C(e_A)     C soft-L1 cost; both ways in the geometric mean, least of all pairs
+    separation = C(e_B) / C(e_A)     C soft-L1 cost; both ways in the geometric mean, least of all pairs told apart
     sigma_p = k_s / A sqrt(sigma^2 - sigma_sensor^2)     of the noise, an autoregression of 0.2 s; sigma floor
 
 The best few, and the best of the menu as they are, are then refitted in full, by descents from wide to narrow under
@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import inf
+from math import exp, inf, log
 from typing import Literal
 
 import numpy as np
@@ -56,6 +56,8 @@ DIFFERENCE = 1e-3
 """Of a log-parameter, for the one step: wide enough to see across a stair."""
 SEARCHED, CHECKED = (1, 2), (3, 4, 5)
 """Draws of the noise for which a course is sought, and for which the best are refitted in full."""
+IMITATED = 1.001
+"""A separation below it is none."""
 CORRELATION_S = 0.2
 SHORTEST_S = 0.05
 """Of a leg."""
@@ -79,7 +81,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """On which the next experiment is chosen: its bounds, its moves, inputs that are not to be played, its ways."""
+    """On which the next experiment is chosen: its bounds, its moves, inputs whose runs are not asked, its ways."""
 
     bounds: Bounds
     most_moves: int = MOST_MOVES
@@ -195,27 +197,41 @@ def designed(
     """
     rivalry = Rivalry(fits, record, terms)
     starts = list(courses(record, terms))
-    scores = list(on_threads(rivalry.score, starts, workers))
-    order = sorted((i for i, score in enumerate(scores) if score > -np.inf), key=lambda i: -scores[i])
+    rated = list(on_threads(rivalry.stepped, starts, workers))
+    inside = [i for i, logs in enumerate(rated) if logs is not None]
+    if not inside:
+        return None
+    kept_pairs = told_apart(np.array([rated[i] for i in inside]), log(IMITATED))
+
+    def least(logs: Vector | None) -> float:
+        return -inf if logs is None else float(logs[kept_pairs].min())
+
+    def score(course: Course) -> float:
+        return least(rivalry.stepped(course))
 
     def changed(i: int) -> Course:
-        return improved(rivalry.score, starts[i], scores[i], terms.bounds, np.random.default_rng([terms.seed, i]))
+        return improved(score, starts[i], least(rated[i]), terms.bounds, np.random.default_rng([terms.seed, i]))
 
-    kept = order[:KEPT]
+    def ranked(found: Sequence[Course], draws: Sequence[int]) -> list[tuple[float, Course]]:
+        refitted = on_threads(lambda course: least(rivalry.refitted(course, draws)), found, workers)
+        return sorted(zip(refitted, found, strict=True), key=lambda each: -each[0])
+
+    kept = sorted(inside, key=lambda i: -least(rated[i]))[:KEPT]
     found = [*on_threads(changed, kept, workers), *(starts[i] for i in kept)]
-    if not found:
-        return None
-    better = _ranked(rivalry, found, CHECKED[:1], workers)[:KEPT]
-    separation, best = _ranked(rivalry, [course for _, course in better], CHECKED, workers)[0]
-    return DesignedExperiment(best, separation)
+    better = [course for _, course in ranked(found, CHECKED[:1])][:KEPT]
+    separation, best = ranked(better, CHECKED)[0]
+    return DesignedExperiment(best, exp(separation))
 
 
-def _ranked(
-    rivalry: "Rivalry", found: Sequence[Course], draws: Sequence[int], workers: int | None
-) -> list[tuple[float, Course]]:
-    """Return courses with their separations after refits in full under draws of the noise, largest first."""
-    rated = on_threads(lambda course: rivalry.separation(course, draws), found, workers)
-    return sorted(zip(rated, found, strict=True), key=lambda each: -each[0])
+def told_apart(rated: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
+    """Return the pairs that are told apart by some course; all where none is.
+
+    Args:
+        rated: what each course tells of each pair, (courses, pairs).
+        least: that counts.
+    """
+    told = rated.max(axis=0) > least
+    return told if told.any() else np.ones_like(told)
 
 
 def improved(
@@ -320,27 +336,32 @@ class Rivalry:
         """H of each rival."""
         return [self._known(i) for i in range(len(self._compositions))]
 
-    def score(self, course: Course) -> float:
-        """Return the separation after one step, by its logarithm; minus infinity where the stem leaves its window."""
-        return self._least(course, SEARCHED, self._stepped)
+    def stepped(self, course: Course) -> Vector | None:
+        """Return the log separation of each pair after one step, (pairs,); None where the stem leaves its window."""
+        return self._pairs(course, SEARCHED, self._after_step)
 
-    def separation(self, course: Course, draws: Sequence[int]) -> float:
-        """Return the separation after refits in full."""
-        return float(np.exp(self._least(course, draws, self._refitted)))
+    def refitted(self, course: Course, draws: Sequence[int]) -> Vector | None:
+        """Return the log separation of each pair after refits in full, (pairs,); None where the stem leaves its window.
 
-    def _least(self, course: Course, draws: Sequence[int], cost: Callable[[Record, int], float]) -> float:
-        """Return the least of all pairs of log C_B / C_A, the mean over draws of the noise."""
-        told = []
+        Args:
+            course: to be answered.
+            draws: of the noise.
+        """
+        return self._pairs(course, draws, self._after_refit)
+
+    def _pairs(self, course: Course, draws: Sequence[int], cost: Callable[[Record, int], float]) -> Vector | None:
+        """Return log C_B / C_A of each pair, the mean over both ways and over draws of the noise."""
+        count = len(self._compositions)
+        logs = np.zeros((count, count))
         for draw in draws:
-            logs = np.full((len(self._compositions),) * 2, np.inf)
-            for i in range(len(self._compositions)):
+            for i in range(count):
                 answer = self.answer(i, course, draw)
                 if answer is None:
-                    return -np.inf
-                costs = [cost(answer, j) for j in range(len(self._compositions))]
-                logs[i] = [np.log(each / costs[i]) if j != i else np.inf for j, each in enumerate(costs)]
-            told.append(0.5 * (logs + logs.T))
-        return float(np.min(np.mean(told, axis=0)))
+                    return None
+                costs = np.log([cost(answer, j) for j in range(count)])
+                logs[i] += costs - costs[i]
+        one, other = np.triu_indices(count, 1)
+        return np.asarray((logs[one, other] + logs[other, one]) / (2 * len(draws)))
 
     def answer(self, i: int, course: Course, draw: int) -> Record | None:
         """Return how valve i answers a course; None where the stem leaves its window.
@@ -382,7 +403,7 @@ class Rivalry:
         J = error.jacobian(z, error.residuals(z), DIFFERENCE)
         return np.asarray(J.T @ J + np.eye(z.size))
 
-    def _stepped(self, answer: Record, j: int) -> float:
+    def _after_step(self, answer: Record, j: int) -> float:
         """Return C after one step."""
         error = self._error(j, answer)
         z = error.coordinates(self._compositions[j].theta)
@@ -391,7 +412,7 @@ class Rivalry:
         dz = -np.linalg.solve(J.T @ J + self._information[j], J.T @ r)
         return min(soft(r, FINAL), soft(r + J @ dz, FINAL))
 
-    def _refitted(self, answer: Record, j: int) -> float:
+    def _after_refit(self, answer: Record, j: int) -> float:
         """Return C after a refit in full."""
         held = _Held(self._error(j, answer), self._information[j], self._compositions[j].theta)
         return soft(held.of_record(descended_through(held, held.middle)), FINAL)

@@ -74,6 +74,8 @@ EXPLAINED = (0.5, 0.75)
 """Quantiles of the errors of blocks, landings and break-aways."""
 BY_CHANCE = stdtrit(FREEDOM, 0.5 + 0.5 * np.array(EXPLAINED))
 """Of what scatters as `slip_evidence` has it, such quantiles of its distance, in scatters."""
+ASKED = 3
+"""Rivals that an experiment is designed for, the likeliest: to choose one costs by the square of their number."""
 TINY = np.finfo(float).tiny
 STRETCH_S = 2.0
 """Longer than an error lasts that begins with a mistimed slip, at the pace of an experiment's moves."""
@@ -241,16 +243,20 @@ class RivalRace:
         return self.promised(chosen) * max(1.0, moves / max(1, chosen.course.moves))
 
     def run_experiment(self, terms: Terms) -> DesignedExperiment | None:
-        """Return the experiment designed for the runs of the rivals left; None if no course stays inside the bounds."""
-        return designed(self.alive, self.record, terms, workers=self._workers)
+        """Return the experiment designed for the likeliest rivals' runs; None if no course stays inside the bounds."""
+        return designed(self.alive[:ASKED], self.record, terms, workers=self._workers)
 
     def slip_experiment(self, terms: Terms) -> DesignedExperiment | None:
-        """Return the input of the menu whose slips promise most; None where slips do not tell of all rivals left."""
-        left = [self._all[name] for name in self._alive]
-        told = [(each.fit, each.slips) for each in left if each.slips]
-        if len(told) < len(left):
+        """Return the course whose slips promise most; None where slips do not tell of all that are asked.
+
+        An input whose run has told little is asked, too: its slips may tell more.
+        """
+        asked = [self._all[name] for name in self._alive[:ASKED]]
+        told = [(each.fit, each.slips) for each in asked if each.slips]
+        if len(told) < len(asked):
             return None
-        chosen = promised_by_slips(told, self.record, self._first_rows, terms, workers=self._workers)
+        any_input = replace(terms, without=frozenset())
+        chosen = promised_by_slips(told, self.record, self._first_rows, any_input, workers=self._workers)
         return None if chosen is None else DesignedExperiment(chosen[0], 1.0, by_slips=chosen[1])
 
     @property

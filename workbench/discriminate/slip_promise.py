@@ -35,6 +35,7 @@ from workbench.discriminate.experiment_design import (
     Terms,
     courses,
     improved,
+    told_apart,
 )
 from workbench.discriminate.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 from workbench.fit.fit_result import Fit
@@ -69,13 +70,11 @@ def promised_by_slips(
     if not rated.size:
         return None
     moves = np.array([max(1, course.moves) for course in inside])
-    told_apart = (rated / moves[:, None]).max(axis=0) > HOPELESS
-    if not told_apart.any():
-        told_apart[:] = True
-    a_move = rated[:, told_apart].min(axis=1) / moves
+    pairs = told_apart(rated / moves[:, None], HOPELESS)
+    a_move = rated[:, pairs].min(axis=1) / moves
 
     def least(course: Course, draws: Sequence[int]) -> float:
-        return float(by_slips.promised(course, draws)[told_apart].min())
+        return float(by_slips.promised(course, draws)[pairs].min())
 
     def score(course: Course) -> float:
         return least(course, SEARCHED) / max(1, course.moves)

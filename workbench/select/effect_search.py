@@ -8,7 +8,8 @@ would add leaves something to explain. Before they are judged, the valve without
 parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
 model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
 two steps leave something to explain, the first is tried with each of its runners-up added, too, and taken back if that
-leads farther. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
+leads farther; but where they leave most of what was there before them, the search ends: what is missing is none of the
+library. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
 several explain all, what had evidence in an earlier step is asked again beside what was added later.
 """
 
@@ -54,6 +55,8 @@ MOST_STEPS = 5
 """Steps made at most: a step that is judged anew is followed by others."""
 BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
+FAR = 0.5
+"""Of the squared error held out, less the floor's: two steps that leave more have found little of what is missing."""
 LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
 OUT_OF_RACE = 10.0
@@ -143,11 +146,14 @@ class EffectSearch:
             self._known = _Known(tuple(steps), here)
             following = self._step(len(steps) + 1, here)
             if steps:
-                steps[-1], following = self._taken_back(steps[-1], following)
+                if not _far([*steps, following]):
+                    steps[-1], following = self._taken_back(steps[-1], following)
                 steps[-1] = without_missing(steps[-1], following, self._library)
             steps = self._judged_anew([*steps, following])
             added = steps[-1].added
             if added is None or added.model is None or len(steps) == MOST_ADDED or self._leaves_nothing(added.model):
+                break
+            if _far(steps):
                 break
             here = added.model
         return steps
@@ -487,6 +493,18 @@ def _rms_so_far_m(found: BegunFit | EvaluatedModel | str) -> float | None:
 
 def _best(step: EffectStep) -> EvaluatedModel:
     return step.added.model if step.added and step.added.model else step.before
+
+
+def _far(steps: Sequence[EffectStep]) -> bool:
+    """Whether two steps or more leave most of the error held out, of a typical second and of the rms."""
+    before, best = steps[0].before, _best(steps[-1])
+    floor_m2 = (best.floor_m or 0.0) ** 2
+    errors = (
+        (before.errors.test_block_m, best.errors.test_block_m),
+        (before.errors.test_rmse_m, best.errors.test_rmse_m),
+    )
+    most = all(after_m**2 - floor_m2 > FAR * (before_m**2 - floor_m2) for before_m, after_m in errors)
+    return len(steps) > 1 and most and not best.explained
 
 
 def _may_be_none(found: Fit, effect: Effect) -> bool:

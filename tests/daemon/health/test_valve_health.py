@@ -25,6 +25,7 @@ from positioner.estimation.acceptance import Applied, Ratios
 from positioner.observer.words import ne107_causes
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.modbus_slave import device_of
+from tests.cases import few_always
 
 STROKE_M = 0.1016
 LAW = {"b_over_c_pa_per_m": -814e3, "k_over_c_pa": -22e3}
@@ -128,11 +129,13 @@ def test_moves_add_up_to_travel_reversals_and_stiction() -> None:
 
 @pytest.mark.parametrize(
     ("factor", "alpha_pa", "cause"),
-    [
-        (1.7, 100e3, Ne107Cause.FRICTION_HIGH),
-        (0.4, 70e3, Ne107Cause.FRICTION_LOW),
-        (1.2, 90e3, Ne107Cause.NONE),
-    ],
+    few_always(
+        [
+            (1.7, 100e3, Ne107Cause.FRICTION_HIGH),
+            (0.4, 70e3, Ne107Cause.FRICTION_LOW),
+            (1.2, 90e3, Ne107Cause.NONE),
+        ]
+    ),
 )
 def test_a_packing_that_ages_is_found_by_the_next_identification(
     factor: float, alpha_pa: float, cause: Ne107Cause
