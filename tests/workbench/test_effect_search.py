@@ -290,6 +290,21 @@ def test_what_stood_in_for_two_is_taken_out(searched: Callable[..., tuple[Effect
     assert [step.added.name for step in steps if step.added] == ["ip_lag", "asymmetric_friction"]
 
 
+def test_what_was_added_after_a_stand_in_is_fitted_without_it_though_it_had_not_been_tried(
+    searched: Callable[..., tuple[EffectStep, ...]],
+) -> None:
+    """The hysteresis comes after presliding, which shows only behind the lag, and the lag is not needed beside both."""
+    found = frozenset({"presliding_hysteresis", "backlash"})
+    floors = {frozenset({"ip_lag"}): 8.0, frozenset({"ip_lag", "presliding"}): 5.0}
+    floors |= {frozenset({"presliding_hysteresis"}): 12.0, frozenset({"ip_lag", "presliding_hysteresis"}): 3.0}
+
+    def ends(there: Effects, added: Effects) -> float:
+        return 1.0 if found <= there | added else floors.get(there | added, 20.0)
+
+    steps = searched(ends, "ip_lag", "presliding", "presliding_hysteresis", "backlash")
+    assert [step.added.name for step in steps if step.added] == ["presliding_hysteresis", "backlash"]
+
+
 def test_a_rival_that_is_accepted_after_the_added_one_is_missing_too(
     searched: Callable[..., tuple[EffectStep, ...]],
 ) -> None:

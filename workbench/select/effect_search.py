@@ -171,11 +171,22 @@ class EffectSearch:
             valve = last.fit.valve
             others = tuple(each for each in valve.effect if each.name != name)
             without = self.base(ValveFile(valve=valve.valve, effect=others))
-            following = next(each for each in steps[i].candidates if each.name == added[i + 1])
-            if following.model and not leads_farther(last, without):
-                turned = [*steps[:i], with_added(steps[i], following, self._library)]
+            if leads_farther(last, without):
+                continue
+            step = self._with_tried(steps[i], added[i + 1])
+            following = next(each for each in step.candidates if each.name == added[i + 1])
+            if following.model:
+                turned = [*steps[:i], with_added(step, following, self._library)]
                 return turned if following.model.explained else self._forward(turned, following.model)
         return steps
+
+    def _with_tried(self, step: EffectStep, name: str) -> EffectStep:
+        """Return a step with an effect among its candidates that waited for another to have evidence."""
+        models = {each.name: each.model or each.rejection_reason for each in step.candidates}
+        if name in models:
+            return step
+        number = step.candidates[0].step
+        return judged_step(step.before, models | self._refitted(number, step.before, [name]), number, self._library)
 
     def _taken_back(self, step: EffectStep, following: EffectStep) -> tuple[EffectStep, EffectStep]:
         """Return a step and the one after it, with a runner-up added in the first where that leads farther.
