@@ -40,7 +40,7 @@ from sim.composition import VISCOUS, Composition
 from sim.karnopp import Vector
 from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import DIFFERENCE, FEWEST, FORCE_N, Landings, Loaded, rests
+from workbench.fit.landings import DIFFERENCE, FEWEST, FORCE_N, Landings, Loaded, Rest, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
@@ -155,7 +155,14 @@ class SlipForces:
     u = ((z - z_fit) / HELD of what is free, d_r / (S_c / 2), g_r / (S_s / 2), log S_c, log S_s)
     """
 
-    def __init__(self, fit: Fit, record: Record, first_rows: Sequence[int], least_m: float = 0.0) -> None:
+    def __init__(
+        self,
+        fit: Fit,
+        record: Record,
+        first_rows: Sequence[int],
+        least_m: float = 0.0,
+        came_to_rest: Sequence[Rest] | None = None,
+    ) -> None:
         self._least_m = least_m
         composition = Composition.from_file(fit.valve)
         theta = composition.theta
@@ -163,7 +170,7 @@ class SlipForces:
         run = FreeRun(composition, record, from_pressure=fit.from_pressure)
         self.error = SimulationError(run, composition, parameters, theta)
         self.fitted = self.error.coordinates(theta)
-        self.landings = Landings(self.error, rests(record))
+        self.landings = Landings(self.error, rests(record) if came_to_rest is None else came_to_rest)
         pressure_pa = self.error.run.run(theta).pressure_pa
         self._stroke_m = composition.valve.stroke_m
         self._shift_m = SHIFT * self._stroke_m

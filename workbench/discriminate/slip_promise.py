@@ -39,7 +39,7 @@ from workbench.discriminate.experiment_design import (
 )
 from workbench.discriminate.slip_evidence import BETWEEN, FREEDOM, Left, SlipForces, Slips
 from workbench.fit.fit_result import Fit
-from workbench.fit.landings import FEWEST
+from workbench.fit.landings import FEWEST, rests
 from workbench.fit.threads import on_threads
 
 Matrix = NDArray[np.float64]
@@ -110,8 +110,10 @@ class _SlipRivalry:
             answer = self._rivalry.answer(i, course, draw)
             if answer is None:
                 return np.zeros(count * (count - 1))
+            came_to_rest = rests(answer)
             forces = [
-                SlipForces(replace(fit, from_pressure=False), answer, [0], slips.least_m) for fit, slips in self._rivals
+                SlipForces(replace(fit, from_pressure=False), answer, [0], slips.least_m, came_to_rest)
+                for fit, slips in self._rivals
             ]
             if forces[i].landings.count < FEWEST:
                 return np.zeros(count * (count - 1))

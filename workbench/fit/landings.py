@@ -128,7 +128,7 @@ def _rests(position_m: Column, noise_m: float, offset: int) -> list[Rest]:
     """Return the rests of one segment, (samples,) in m, whose first row in the record is `offset`."""
     found: list[Rest] = []
     for first, end in _still(position_m, noise_m):
-        middle_m = float(np.nanmedian(position_m[first:end]))
+        middle_m = float(np.median(position_m[first:end]))
         off_m = np.abs(position_m - middle_m)
         near = first + np.flatnonzero(off_m[first:end] < AWAY * noise_m)
         if near.size < max(WINDOW, MOSTLY * (end - first)) or _drifts(position_m[near], noise_m):
