@@ -154,14 +154,31 @@ def test_it_ends_where_nothing_is_accepted(searched: Callable[..., tuple[EffectS
     assert names(last) == ["backlash"], "what is there is not tried again"
 
 
-@pytest.mark.parametrize(("floors_second", "count"), [(15.0, 2), (13.0, 3)], ids=["most is left", "little is left"])
-def test_it_ends_where_two_steps_leave_most_of_the_error(
+@pytest.mark.parametrize(("floors_second", "count"), [(17.0, 2), (15.0, 3)], ids=["next to nothing", "something"])
+def test_it_ends_where_the_second_step_brings_next_to_nothing(
     searched: Callable[..., tuple[EffectStep, ...]], floors_second: float, count: int
 ) -> None:
     def ends(there: Effects, added: Effects) -> float:
         return {0: 20.0, 1: 18.0, 2: floors_second}.get(len(there | added), 9.0)
 
     assert len(searched(ends, "backlash", "ip_lag", "stribeck")) == count
+
+
+@pytest.mark.parametrize(("floors_stand_in", "found"), [(18.0, "stribeck"), (7.0, "ip_lag")])
+def test_no_runner_up_is_tried_where_two_steps_leave_most_of_the_error(
+    searched: Callable[..., tuple[EffectStep, ...]], floors_stand_in: float, found: str
+) -> None:
+    """The runner-up would lead farther."""
+
+    def ends(there: Effects, added: Effects) -> float:
+        effects = there | added
+        if "stribeck" in effects:
+            return floors_stand_in if len(effects) == 1 else 0.85 * floors_stand_in
+        return {0: 20.0, 1: 1.01 * floors_stand_in}.get(len(effects), 0.8 * floors_stand_in)
+
+    first, *_ = searched(ends, "stribeck", "ip_lag", "backlash")
+    assert first.added
+    assert first.added.name == found
 
 
 def test_the_steps_do_not_depend_on_the_workers(searched: Callable[..., tuple[EffectStep, ...]]) -> None:

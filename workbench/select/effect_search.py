@@ -8,9 +8,10 @@ would add leaves something to explain. Before they are judged, the valve without
 parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
 model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
 two steps leave something to explain, the first is tried with each of its runners-up added, too, and taken back if that
-leads farther; but where they leave most of what was there before them, the search ends: what is missing is none of the
-library. Of three effects, one that is not needed beside the others has stood in for them, and is taken out. Where
-several explain all, what had evidence in an earlier step is asked again beside what was added later.
+leads farther; not where they leave most of what was there before them. Where the second brings next to nothing, the
+search ends: what is missing is none of the library. Of three effects, one that is not needed beside the others has
+stood in for them, and is taken out. Where several explain all, what had evidence in an earlier step is asked again
+beside what was added later.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -55,8 +56,8 @@ MOST_STEPS = 5
 """Steps made at most: a step that is judged anew is followed by others."""
 BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
-FAR = 0.5
-"""Of the squared error held out, less the floor's: two steps that leave more have found little of what is missing."""
+MOST, NEARLY_ALL = 0.5, 0.8
+"""Of the squared error held out, less the floor's: what two steps, and the second of them, leave in vain."""
 LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
 OUT_OF_RACE = 10.0
@@ -146,14 +147,14 @@ class EffectSearch:
             self._known = _Known(tuple(steps), here)
             following = self._step(len(steps) + 1, here)
             if steps:
-                if not _far([*steps, following]):
+                if not _leaves(MOST, steps[0].before, _best(following)):
                     steps[-1], following = self._taken_back(steps[-1], following)
                 steps[-1] = without_missing(steps[-1], following, self._library)
             steps = self._judged_anew([*steps, following])
             added = steps[-1].added
             if added is None or added.model is None or len(steps) == MOST_ADDED or self._leaves_nothing(added.model):
                 break
-            if _far(steps):
+            if len(steps) > 1 and _leaves(NEARLY_ALL, steps[-1].before, added.model):
                 break
             here = added.model
         return steps
@@ -506,16 +507,15 @@ def _best(step: EffectStep) -> EvaluatedModel:
     return step.added.model if step.added and step.added.model else step.before
 
 
-def _far(steps: Sequence[EffectStep]) -> bool:
-    """Whether two steps or more leave most of the error held out, of a typical second and of the rms."""
-    before, best = steps[0].before, _best(steps[-1])
-    floor_m2 = (best.floor_m or 0.0) ** 2
+def _leaves(share: float, before: EvaluatedModel, after: EvaluatedModel) -> bool:
+    """Whether a model explains not all and leaves more than a share of another's squared errors, rms and typical."""
+    floor_m2 = (after.floor_m or 0.0) ** 2
     errors = (
-        (before.errors.test_block_m, best.errors.test_block_m),
-        (before.errors.test_rmse_m, best.errors.test_rmse_m),
+        (before.errors.test_block_m, after.errors.test_block_m),
+        (before.errors.test_rmse_m, after.errors.test_rmse_m),
     )
-    most = all(after_m**2 - floor_m2 > FAR * (before_m**2 - floor_m2) for before_m, after_m in errors)
-    return len(steps) > 1 and most and not best.explained
+    so_much = all(after_m**2 - floor_m2 > share * (before_m**2 - floor_m2) for before_m, after_m in errors)
+    return so_much and not after.explained
 
 
 def _may_be_none(found: Fit, effect: Effect) -> bool:
