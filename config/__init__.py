@@ -21,5 +21,6 @@ Its files:
     recording, historian_export, noise            the recording format; others' exports; the noise of a position
     exports                                       each step from a file of another program to a recording
     results                                       what results have in common in a notebook
+    arguments                                     what the library's functions are given: other kinds are refused
     errors                                        InputError (exit status 2), CommandFailed (1): each one line
 """

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any, Self, TextIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from config.arguments import kinds_held
 from config.drive import COLUMNS, KINDS, VALVE, Kind, kind_of_columns
 from config.errors import InputError
 from config.plain_file import MOST_COLUMNS, require_moderate
@@ -76,6 +77,8 @@ class Recording(Result):
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not hasattr(self.columns, "items"):
+            raise InputError("recording", f"allowed are columns by their names, got {self.columns!r}")
         object.__setattr__(self, "columns", {name: _numbers(name, given) for name, given in self.columns.items()})
 
     @classmethod
@@ -134,6 +137,7 @@ class Recording(Result):
         return self.columns["position_m"]
 
     @classmethod
+    @kinds_held
     def read(cls, path: Path | str) -> Self:
         """Read a recording whose clock may have been set back here and there, which the workbench cuts there.
 
@@ -145,6 +149,7 @@ class Recording(Result):
         )
         return cls.of(columns, metadata)
 
+    @kinds_held
     def write(self, path: Path | str) -> None:
         """Write as CSV, or as Parquet if the file is named so; numbers keep every bit.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.recording import Recording
 from config.results.block import Block, Table
@@ -128,6 +129,7 @@ class RecordingEstimates(Result):
         return intervals(shown, "two standard deviations about the estimate, %")[0]
 
 
+@kinds_held
 def estimate(
     recording: Recording, *, noise_std_m: float | None = None, pressure_held: bool | None = None
 ) -> RecordingEstimates:

@@ -12,6 +12,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from config.arguments import kinds_held
 from config.noise import quantum_m
 from config.recording import Column, Recording
 from positioner.response.dead_band import dead_band_and_resolution
@@ -33,6 +34,7 @@ class _InputSegment:
     input: Column
 
 
+@kinds_held
 def respond(recording: Recording) -> ResponseFigures:
     """Return the response figures of a recording; without steps it has none, and says so."""
     notes: list[str] = []

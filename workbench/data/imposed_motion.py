@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.noise import position_noise_m
 from config.recording import Column, Recording, read_table
@@ -91,6 +92,7 @@ def is_imposed(path: Path) -> bool:
     return "command_pa" not in names and bool(names & {"load_n", "branch"})
 
 
+@kinds_held
 def read_imposed(path: Path | str) -> Recording:
     """Read a bench's recording, or a static curve, whose `branch` becomes +1 rising and -1 falling.
 
