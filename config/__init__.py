@@ -10,7 +10,7 @@ Its files:
     file_kinds                                    which of these a file is, where another is asked for
     file_stem                                     what the names of a valve's files begin with
     json_value                                    a result as JSON has it, which knows no NaN
-    whole_file, lock_file                         replaces a file so that a crash leaves old or new; a lock
+    whole_file, lock_file                         replaces a file, or fills a folder, whole or not at all; a lock
     device, canopen_device                        table [device], on Modbus and on CANopen
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
     hosts, serial_port, tls_table                 where it is, and how it is secured
