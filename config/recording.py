@@ -24,6 +24,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
@@ -60,7 +61,7 @@ CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
 
 LONGEST_LINE, MOST_CHARACTERS = 1_000_000, 10_000_000_000
-"""Of a compressed recording."""
+"""Of a compressed recording; of any, the longest first line."""
 LONGEST_NAMED = 300
 """Characters of the names there are that a message shows."""
 
@@ -383,7 +384,7 @@ def _read(
                 columns, metadata, first_line = _table(path, _moderate(path, packed), required, or_required)
         else:
             with path.open(newline="", encoding="utf-8-sig") as file:
-                columns, metadata, first_line = _table(path, file, required, or_required)
+                columns, metadata, first_line = _table(path, lines_of(path, file), required, or_required)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (EOFError, zlib.error) as error:
@@ -396,6 +397,19 @@ def _read(
         raise InputError(str(path), "holds no samples")
     _require_increasing_time(path, columns["time_s"], first_line, clock_steps)
     return columns, metadata
+
+
+def lines_of(path: Path, file: TextIO) -> Iterator[str]:
+    """Return the lines of a text file.
+
+    Raises:
+        InputError: the first does not end where it must, as of a file of zeros: told before it is read whole.
+    """
+    first = file.readline(LONGEST_LINE)
+    if len(first) == LONGEST_LINE:
+        hint = f"; `positioner import {path}` says how to read another program's export"
+        raise InputError(str(path), f"is not a CSV file of ours: line 1 is longer than {LONGEST_LINE} characters{hint}")
+    return chain([first] if first else [], file)
 
 
 def _moderate(path: Path, packed: TextIO) -> Iterator[str]:
