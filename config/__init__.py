@@ -10,7 +10,7 @@ Its files:
     file_kinds                                    which of these a file is, where another is asked for
     file_stem                                     what the names of a valve's files begin with
     json_value                                    a result as JSON has it, which knows no NaN
-    whole_file, lock_file                         replaces a file so that a crash leaves old or new; a lock
+    whole_file, lock_file                         replaces a file, or fills a folder, whole or not at all; a lock
     device, canopen_device                        table [device], on Modbus and on CANopen
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
     hosts, serial_port, tls_table                 where it is, and how it is secured
@@ -21,5 +21,6 @@ Its files:
     recording, historian_export, noise            the recording format; others' exports; the noise of a position
     exports                                       each step from a file of another program to a recording
     results                                       what results have in common in a notebook
+    arguments                                     what the library's functions are given: other kinds are refused
     errors                                        InputError (exit status 2), CommandFailed (1): each one line
 """

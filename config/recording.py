@@ -24,12 +24,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from config.arguments import kinds_held
 from config.drive import COLUMNS, KINDS, VALVE, Kind, kind_of_columns
 from config.errors import InputError
 from config.plain_file import MOST_COLUMNS, require_moderate
@@ -59,7 +61,7 @@ CLOCK_STEPS_TOLERATED = 0.01
 """Part of the rows at which a clock may be set back before the time is no clock at all."""
 
 LONGEST_LINE, MOST_CHARACTERS = 1_000_000, 10_000_000_000
-"""Of a compressed recording."""
+"""Of a compressed recording; of any, the longest first line."""
 LONGEST_NAMED = 300
 """Characters of the names there are that a message shows."""
 
@@ -76,6 +78,8 @@ class Recording(Result):
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not hasattr(self.columns, "items"):
+            raise InputError("recording", f"allowed are columns by their names, got {self.columns!r}")
         object.__setattr__(self, "columns", {name: _numbers(name, given) for name, given in self.columns.items()})
 
     @classmethod
@@ -134,6 +138,7 @@ class Recording(Result):
         return self.columns["position_m"]
 
     @classmethod
+    @kinds_held
     def read(cls, path: Path | str) -> Self:
         """Read a recording whose clock may have been set back here and there, which the workbench cuts there.
 
@@ -145,6 +150,7 @@ class Recording(Result):
         )
         return cls.of(columns, metadata)
 
+    @kinds_held
     def write(self, path: Path | str) -> None:
         """Write as CSV, or as Parquet if the file is named so; numbers keep every bit.
 
@@ -378,7 +384,7 @@ def _read(
                 columns, metadata, first_line = _table(path, _moderate(path, packed), required, or_required)
         else:
             with path.open(newline="", encoding="utf-8-sig") as file:
-                columns, metadata, first_line = _table(path, file, required, or_required)
+                columns, metadata, first_line = _table(path, lines_of(path, file), required, or_required)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror or error}") from None
     except (EOFError, zlib.error) as error:
@@ -391,6 +397,19 @@ def _read(
         raise InputError(str(path), "holds no samples")
     _require_increasing_time(path, columns["time_s"], first_line, clock_steps)
     return columns, metadata
+
+
+def lines_of(path: Path, file: TextIO) -> Iterator[str]:
+    """Return the lines of a text file.
+
+    Raises:
+        InputError: the first does not end where it must, as of a file of zeros: told before it is read whole.
+    """
+    first = file.readline(LONGEST_LINE)
+    if len(first) == LONGEST_LINE:
+        hint = f"; `positioner import {path}` says how to read another program's export"
+        raise InputError(str(path), f"is not a CSV file of ours: line 1 is longer than {LONGEST_LINE} characters{hint}")
+    return chain([first] if first else [], file)
 
 
 def _moderate(path: Path, packed: TextIO) -> Iterator[str]:

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from config.arguments import kinds_held
 from config.drive import KINDS, VALVE, Kind, KindName
 from config.errors import InputError
 from config.file_kinds import require_kind
@@ -155,6 +156,7 @@ def valve_alone(file: ValveFile, source: str, who: str) -> ValveFile:
     return file
 
 
+@kinds_held
 def valve(name: Path | str) -> ValveFile:
     """Read a valve file, or one that comes with the package by its name.
 

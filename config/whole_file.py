@@ -1,13 +1,15 @@
 """Replaces a file whole: a crash, a full disk or a loss of power leaves the old one or the new one, never a part.
 
 The new one is written beside the file, and then takes its name. What must outlive a loss of power is forced to the disk
-before (`replace_whole`), and so is the folder, which holds the name.
+before (`replace_whole`), and so is the folder, which holds the name. Files that are of use only
+together fill a folder so (`filling`), where no power is lost.
 """
 
+import errno
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -47,6 +49,37 @@ def beside(path: Path) -> Iterator[Path]:
         new.replace(target)
     finally:
         new.unlink(missing_ok=True)
+
+
+@contextmanager
+def filling(folder: Path) -> Iterator[Path]:
+    """Give the folder in which to write what is to fill another, a new or an empty one: that gets all of it, or none.
+
+    Raises:
+        FileExistsError: it is no folder, or not empty.
+        OSError: it cannot be written.
+    """
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    new = folder / ".new"
+    new.mkdir()
+    moved: list[Path] = []
+    try:
+        if any(each != new for each in folder.iterdir()):
+            raise FileExistsError(errno.ENOTEMPTY, os.strerror(errno.ENOTEMPTY))
+        yield new
+        for each in sorted(new.iterdir()):
+            moved.append(folder / each.name)
+            each.replace(moved[-1])
+        new.rmdir()
+    except BaseException:
+        for each in moved:
+            each.unlink(missing_ok=True)
+        shutil.rmtree(new, ignore_errors=True)
+        with suppress(OSError):  # of another's that came into it meanwhile
+            for each in made:
+                each.rmdir()
+        raise
 
 
 def sync_folder(folder: Path) -> None:

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from config.arguments import kinds_held
 from config.drive import VALVE
 from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile
 from config.whole_file import beside
 
 
+@kinds_held
 def write_valve(path: Path | str, file: ValveFile, remarks: Sequence[str] = ()) -> None:
     """Write a valve file, own effects named by their paths as seen from its folder; remarks become comments.
 

@@ -287,10 +287,8 @@ def find_effects(names: Sequence[str], source: str) -> list[Effect]:
     """Return the effects that a person named.
 
     Raises:
-        InputError: as `find_effect`, or one name where a list of them is asked for: its letters are none.
+        InputError: as `find_effect`.
     """
-    if isinstance(names, str):
-        raise InputError(source, f'must be a list of names, got the text "{names}"; one effect is ["{names}"]')
     return [find_effect(each, source) for each in names]
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.loading import validated
 from config.recording import Column, Recording, of_kind
@@ -14,6 +15,7 @@ from sim.valve import Valve
 FEWEST = 2
 
 
+@kinds_held
 def simulate(
     valve: ValveFile,
     time_s: npt.ArrayLike,
@@ -48,7 +50,7 @@ def simulate(
         )
     if not (np.diff(time) > 0.0).all():
         raise InputError("simulate", "time_s must increase strictly")
-    sensor = validated(Sensor, {"noise_std_m": noise_std_m, "seed": seed}, "sensor")
+    sensor = validated(Sensor, {"noise_std_m": float(noise_std_m), "seed": int(seed)}, "sensor")
     simulated = Valve.from_file(valve)
     response = simulated.run(command[:-1], np.diff(time))
     transmitter = Transmitter(sensor)
@@ -64,7 +66,10 @@ def simulate(
 
 
 def _series(name: str, values: npt.ArrayLike) -> Column:
-    series = np.array(values, dtype=np.float64)
+    try:
+        series = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("simulate", f"{name} must be a series of finite numbers, got {values!r}") from None
     if series.ndim != 1 or not np.isfinite(series).all():
         raise InputError("simulate", f"{name} must be a series of finite numbers, its shape is {series.shape}")
     return series

@@ -41,6 +41,8 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
     for magic, problem in REFUSED.items():
         if begin.startswith(magic):
             raise InputError(str(path), problem)
+    if begin and not begin.strip(b"\0"):
+        raise InputError(str(path), "begins with zeros alone: it is damaged, or no text")
     if begin.startswith(b"PK\x03\x04"):
         return typed_tables.workbook(path, sheet)
     for magic, read in (

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from config.drive import VALVE
 from config.recording import Column, Recording
 
 LONGEST_STROKE_M = 1.5
@@ -37,27 +38,32 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
         stroke_m: of its valve, if that is known.
     """
     position_m, command_pa, kind = recording.position_m, recording.columns.get("command_pa"), recording.kind
-    of_valve = kind.name == "valve"
-    if swapped := of_valve and command_pa is not None and in_each_others_place(position_m, command_pa):
-        of_size = [
-            f"positions go to {_reach(position_m):.4g} m and commands to {_reach(command_pa):.4g} Pa: do their columns "
-            "stand in each other's place?"
-        ]
-    else:
-        of_size = [*_of_size(position_m, stroke_m)] if of_valve else []
-    said = [*of_size, *_of_rows(recording)]
+    said = [*odd_sizes(recording, stroke_m), *_of_rows(recording)]
     whole = np.isfinite(position_m)
     if whole.any() and np.ptp(position_m[whole]) == 0.0:
         where = f"{position_m[whole][0]:g} {kind.travel.si}"
         said.append(f"the position is {where} throughout: a stem that never moves says nothing")
-    elif whole.any() and command_pa is not None and of_valve and not swapped:
+    elif whole.any() and command_pa is not None and kind is VALVE and not in_each_others_place(position_m, command_pa):
         held_pa = _held(command_pa)
         said += [
-            *_of_pressure(command_pa),
+            *_of_constant(command_pa),
             *_of_action(position_m, held_pa),
             *_of_sampling(recording.time_s, position_m, held_pa),
         ]
     return said
+
+
+def odd_sizes(recording: Recording, stroke_m: float | None = None) -> list[str]:
+    """Return what is odd about the sizes of a valve's numbers, a line each: those of other units, or of no value."""
+    position_m, command_pa = recording.position_m, recording.columns.get("command_pa")
+    if recording.kind is not VALVE:
+        return []
+    if command_pa is not None and in_each_others_place(position_m, command_pa):
+        return [
+            f"positions go to {_reach(position_m):.4g} m and commands to {_reach(command_pa):.4g} Pa: do their columns "
+            "stand in each other's place?"
+        ]
+    return [*_of_size(position_m, stroke_m), *([] if command_pa is None else _of_pressure(command_pa))]
 
 
 def in_each_others_place(position_m: Column, command_pa: Column) -> bool:
@@ -124,12 +130,16 @@ def _of_rows(recording: Recording) -> Iterator[str]:
 
 def _of_pressure(command_pa: Column) -> Iterator[str]:
     low, high = _ends(command_pa)
-    if low == high:
-        yield f"the command is {low:g} Pa throughout: a stem that is not driven says nothing"
-    elif high - low < LEAST_SPAN_PA:
+    if 0.0 < high - low < LEAST_SPAN_PA:
         yield f"commands span {high - low:.3g} Pa: are they in bar, kPa or %? Then command_pa=THEIRS:bar, or :kPa, :%"
     elif high > LARGEST_PA:
         yield f"commands go to {1e-5 * high:.3g} bar: is the unit right?"
+
+
+def _of_constant(command_pa: Column) -> Iterator[str]:
+    low, high = _ends(command_pa)
+    if low == high:
+        yield f"the command is {low:g} Pa throughout: a stem that is not driven says nothing"
 
 
 def _of_action(position_m: Column, command_pa: Column) -> Iterator[str]:

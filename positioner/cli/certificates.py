@@ -30,6 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     from config.errors import InputError
     from config.hosts import is_host
     from config.roles import Role
+    from config.whole_file import filling
     from positioner.cli.parts.authority import Authority, Owner
 
     hosts = tuple(arguments.host or HERE)
@@ -45,12 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
     }
     folder: Path = arguments.out
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise InputError(f"-o {folder}", "must be a new or empty folder: keys are never written over")
-        authority = Authority(folder, arguments.days)
-        for owner in owners:
-            authority.sign(owner)
+        with filling(folder) as new:
+            authority = Authority(new, arguments.days)
+            for owner in owners:
+                authority.sign(owner)
+    except FileExistsError:
+        raise InputError(f"-o {folder}", "must be a new or empty folder: keys are never written over") from None
     except OSError as error:
         raise InputError(f"-o {folder}", f"cannot be written: {error.strerror}") from None
     print(f"{folder / 'authority.pem'}  signs all of these for {arguments.days:g} days")

@@ -68,6 +68,7 @@ def as_json(estimated: "RecordingEstimates") -> dict[str, object]:
             "landings": law.landings,
             "residual_m": law.residual_m,
         },
+        "notes": list(estimated.notes),
     }
 
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from config.arguments import kinds_held
 from config.errors import InputError
+from config.exports.plausibility import odd_sizes
 from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
@@ -128,6 +130,7 @@ class RecordingEstimates(Result):
         return intervals(shown, "two standard deviations about the estimate, %")[0]
 
 
+@kinds_held
 def estimate(
     recording: Recording, *, noise_std_m: float | None = None, pressure_held: bool | None = None
 ) -> RecordingEstimates:
@@ -152,6 +155,7 @@ def estimate(
 
 def _notes(recording: Recording, pressure_pa: Array) -> Iterator[str]:
     """Yield what is not as it should be in a recording, and what is left out of it."""
+    yield from odd_sizes(recording)
     for key, said in recording.metadata.items():
         if key == "torn" or key.startswith("not "):
             yield f"{key}: {said}"

@@ -20,12 +20,12 @@ from cryptography import x509
 from config.passwords import SignIn
 from config.roles import Role
 from positioner.opcua.application_keys import ApplicationKeys, Refusal, uris_in
-from positioner.opcua.valve_desk import Answer, number_in
+from positioner.opcua.valve_desk import Answer
 
 NOBODY = User(role=UserRole.Anonymous)
 PUBLISHED_WITHIN_MS = (100.0, 3_600_000.0)
 """How often a subscription may be served: values change four times a second."""
-Write = Callable[[Role, float], Awaitable[Answer]]
+Write = Callable[[Role, object], Awaitable[Answer]]
 Method = Callable[[Role, list[object]], Awaitable[Answer]]
 
 
@@ -147,8 +147,7 @@ class GuardedSession(InternalSession):  # type: ignore[misc]  # the same
             # A value that its own client takes for bad or uncertain is nothing to move a valve by.
             doubtful = Answer("BadWriteNotSupported", f"only a good value is taken, its status was {quality.name}")
             return self._status(doubtful, "set point")
-        value = number_in(sent.Value if sent is not None else None)
-        return self._status(await write(self.role, value), "set point")
+        return self._status(await write(self.role, None if sent is None else sent.Value), "set point")
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Call methods of valves; those of the server itself as asyncua has them."""

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from config.errors import one_line
 from config.roles import Role
 from positioner.observer.valve_commands import EXCITATION, Confirmation, refusal_for
 from positioner.observer.watched_valves import WatchedValve
@@ -45,12 +46,13 @@ class ValveDesk:
         self._tell = tell
         self._under_way: asyncio.Task[None] | None = None
 
-    async def write_setpoint(self, role: Role, percent: float) -> Answer:
+    async def write_setpoint(self, role: Role, sent: object) -> Answer:
         """Ask for a position, % of the stroke."""
         if refusal := refusal_for(role, "reference"):
             return Answer("BadUserAccessDenied", refusal)
+        percent = _number_in(sent)
         if not 0.0 <= percent <= PERCENT:
-            return Answer("BadOutOfRange", f"set point: allowed is 0 to 100 %, got {percent:g}")
+            return Answer("BadOutOfRange", f"set point: allowed is 0 to 100 %, got {_shown(sent)}")
         set_reference = self._valve.commands.set_reference
         return _answer(await asyncio.to_thread(set_reference, role, percent / PERCENT))
 
@@ -85,13 +87,15 @@ class ValveDesk:
         await self._under_way
         return Answer("Good", "broken off; the law has the command again")
 
-    async def auto_adjust(self, role: Role, mode: float) -> Answer:
+    async def auto_adjust(self, role: Role, sent: object) -> Answer:
         """Do as PA-DIM's AutoAdjustPositioner: start or abort."""
+        mode = _number_in(sent)
         if mode == START:
             return await self.identify(role)
         if mode == ABORT:
             return await self.break_off(role)
-        return Answer("BadOutOfRange", f"ExecutionMode: allowed are {START} (Start) and {ABORT} (Abort), got {mode:g}")
+        allowed = f"allowed are {START} (Start) and {ABORT} (Abort)"
+        return Answer("BadOutOfRange", f"ExecutionMode: {allowed}, got {_shown(sent)}")
 
     async def end(self) -> None:
         """Break off what is under way, and wait for it."""
@@ -104,9 +108,16 @@ class ValveDesk:
         self._tell((await asked).text)
 
 
-def number_in(value: object) -> float:
+def _number_in(sent: object) -> float:
     """Return a number that a client sent, NaN of what is none."""
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    return float(sent) if isinstance(sent, int | float) and not isinstance(sent, bool) else math.nan
+
+
+def _shown(sent: object) -> str:
+    """Return what a client sent, as a line of a log has it; nothing is "no value"."""
+    if sent is None:
+        return "no value"
+    return f"{sent:g}" if isinstance(sent, float) else one_line(repr(sent))
 
 
 def _answer(confirmed: Confirmation) -> Answer:

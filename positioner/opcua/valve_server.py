@@ -28,7 +28,7 @@ from positioner.opcua.address_space import (
 from positioner.opcua.application_keys import ApplicationKeys
 from positioner.opcua.guarded_session import Door, GuardedServer
 from positioner.opcua.recorded_history import BY_HOUR, BY_IDENTIFICATION, Recorded, RecordedHistory
-from positioner.opcua.valve_desk import ValveDesk, number_in
+from positioner.opcua.valve_desk import ValveDesk
 from positioner.opcua.valve_nodes import IDENTIFICATION, POSITION, SETPOINT, Shown, Why, refused, shown
 
 EVERY_S = 0.25
@@ -157,7 +157,7 @@ def _desk(server: Server, door: Door, valve: WatchedValve, space: ValveSpace) ->
     door.methods[device, space.node_id(BREAK_OFF)] = (lambda role, _: desk.break_off(role), True)
     door.methods[device, space.node_id(ACKNOWLEDGE)] = (lambda role, _: desk.acknowledge(role), True)
     door.methods[position, space.node_id(ADJUST)] = (
-        lambda role, values: desk.auto_adjust(role, number_in(values[0] if values else None)),
+        lambda role, values: desk.auto_adjust(role, values[0] if values else None),
         False,
     )
     return desk

@@ -12,6 +12,8 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from config.arguments import kinds_held
+from config.exports.plausibility import odd_sizes
 from config.noise import quantum_m
 from config.recording import Column, Recording
 from positioner.response.dead_band import dead_band_and_resolution
@@ -33,9 +35,13 @@ class _InputSegment:
     input: Column
 
 
+@kinds_held
 def respond(recording: Recording) -> ResponseFigures:
-    """Return the response figures of a recording; without steps it has none, and says so."""
-    notes: list[str] = []
+    """Return the response figures of a recording; without steps it has none, and says so.
+
+    Numbers that look like those of other units are noted, for without a valve file nobody knows the stroke.
+    """
+    notes = odd_sizes(recording)
     whole = _usable(recording, notes)
     for name in ("reference_m", "command_pa"):
         if name not in recording.columns:

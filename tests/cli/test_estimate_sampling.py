@@ -1,6 +1,8 @@
 """`positioner estimate` on recordings sampled as historians do, of a valve with a preload: right, or refused."""
 
+import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from config.codes import Refusal
 from config.recording import Recording
 from config.valve_file import valve
+from positioner.cli.main import main
 from positioner.estimation.recording_estimates import RecordingEstimates, estimate
 from tests.simulated import simulated
 
@@ -50,3 +53,13 @@ def test_what_a_preload_would_explain_as_well_says_so() -> None:
     assert abs(found.estimates.b_over_c.value / TRUE_PA_PER_M - 1.0) > 0.4
     assert found.estimates.b_over_c.reason is Refusal.PRELOAD_EXPLAINS_AS_WELL
     assert not found.law_ready
+
+
+def test_commands_in_bar_are_asked_about(tmp_path: Path) -> None:
+    rows = moved("sine", 1)
+    columns = {"time_s": rows.time_s, "command_pa": 1e-5 * rows.command_pa, "position_m": rows.position_m}
+    in_bar = Recording({name: column[:1000] for name, column in columns.items()})
+    in_bar.write(tmp_path / "bar.csv")
+    main(["estimate", str(tmp_path / "bar.csv"), "--json", str(tmp_path / "said.json")])
+    (note,) = json.loads((tmp_path / "said.json").read_text())["notes"]
+    assert "are they in bar, kPa or %?" in note

@@ -216,6 +216,21 @@ def test_certificates_are_never_written_over_and_bad_input_is_one_line(
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.parametrize("there", [False, True])
+def test_certificates_that_are_broken_off_leave_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: bool
+) -> None:
+    def interrupted(self: Authority, owner: Owner) -> None:
+        raise KeyboardInterrupt
+
+    pki = tmp_path / "keys" / "pki"
+    if there:
+        pki.mkdir(parents=True)
+    monkeypatch.setattr(Authority, "sign", interrupted)
+    assert main(["certificates", "-o", str(pki)]) == 130
+    assert list(tmp_path.rglob("*")) == ([pki.parent, pki] if there else [])
+
+
 def test_a_missing_certificate_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "daemon.toml").write_text(
         "[valve]\nstroke_m = 0.1016\n[device.tls]\nauthority = 'a.pem'\ncertificate = 'b.pem'\nkey = 'b.key'\n"

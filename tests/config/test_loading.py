@@ -8,6 +8,7 @@ import pytest
 from config.daemon_file import load_daemon
 from config.errors import InputError
 from config.valve_file import load_valve, shipped_valve
+from positioner.cli.parts.served_valves import places_in
 
 SEED = """[valve]
 name = "v"
@@ -142,3 +143,16 @@ def test_an_error_passes_between_processes() -> None:
     error = InputError("valve.toml", "stroke_m: must be greater than 0")
     passed = pickle.loads(pickle.dumps(error))
     assert (str(passed), passed.source, passed.problem) == (str(error), error.source, error.problem)
+
+
+def test_of_a_link_every_path_counts_from_where_the_link_is(tmp_path: Path) -> None:
+    file, link = tmp_path / "etc" / "daemon.toml", tmp_path / "site" / "daemon.toml"
+    for each in (file, link):
+        each.parent.mkdir()
+    tables = "[valve]\nstroke_m = 0.1\n[law]\nvalve = 'v.toml'\n[recorder]\nfolder = 'r'\n[history]\nfolder = 'h'\n"
+    file.write_text(tables)
+    link.symlink_to(file)
+    law = load_daemon(link).law
+    (place,) = places_in([link])
+    assert law is not None
+    assert [law.valve, place.recordings, place.history] == [link.parent / name for name in ("v.toml", "r", "h")]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.recording import Recording, read_recording, write_recording
+from config.exports.file_kind import raw_tables
+from config.recording import LONGEST_LINE, Recording, read_recording, write_recording
 
 HEADER = "time_s,command_pa,position_m\n"
 
@@ -135,3 +136,13 @@ def test_what_is_no_column_of_numbers_is_refused_by_name(given: Any, got: str) -
     with pytest.raises(InputError) as caught:
         Recording({"time_s": given})
     assert f"time_s: allowed is one number a sample, NaN where none is known, got {got}" in str(caught.value)
+
+
+def test_a_file_of_zeros_is_refused_by_its_beginning(tmp_path: Path) -> None:
+    path = tmp_path / "zeros.csv"
+    with path.open("wb") as file:
+        file.truncate(2 * LONGEST_LINE)
+    with pytest.raises(InputError, match="is not a CSV file of ours: line 1 is longer than"):
+        read_recording(path)
+    with pytest.raises(InputError, match=r"begins with zeros alone: it is damaged, or no text$"):
+        raw_tables(path)

@@ -11,7 +11,7 @@ import pytest
 from config.errors import InputError
 from config.recording import Recording, write_recording
 from config.valve_file import load_valve, shipped_valve
-from config.whole_file import beside
+from config.whole_file import beside, filling
 from config.writing import write_valve
 
 ROOM_BYTES = 64
@@ -70,3 +70,21 @@ def test_a_pipe_or_a_device_is_written_itself(tmp_path: Path) -> None:
         with beside(path) as new:
             assert new == path
     assert pipe.is_fifo()
+
+
+def test_a_folder_is_filled_whole_or_not_at_all(tmp_path: Path, full_disk: None) -> None:
+    folder = tmp_path / "new" / "folder"
+
+    def filled(text: str) -> None:
+        with filling(folder) as new:
+            for name in ("a", "b"):
+                (new / name).write_text(name if name == "a" else text)
+
+    with pytest.raises(OSError, match="too large"):
+        filled("b" * (ROOM_BYTES + 1))
+    assert list(tmp_path.iterdir()) == []
+    filled("b")
+    assert sorted(each.name for each in folder.iterdir()) == ["a", "b"]
+    with pytest.raises(FileExistsError):
+        filled("c")
+    assert [each.read_text() for each in sorted(folder.iterdir())] == ["a", "b"]

@@ -1,12 +1,14 @@
 """`import positioner as pos`: every name there, nothing loaded before it is asked for, what is missing in one line."""
 
+import inspect
 import subprocess
 import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
-from typing import assert_type
+from typing import Any, assert_type
 
+import numpy as np
 import pytest
 
 import positioner as pos
@@ -122,3 +124,56 @@ def test_a_simulated_recording_is_the_valves_answer_and_survives_its_file(tmp_pa
     again = pos.Recording.read(tmp_path / "rec.csv")
     assert again.columns.keys() == recording.columns.keys()
     assert all((again.columns[name] == column).all() for name, column in recording.columns.items())
+
+
+@pytest.fixture
+def valve() -> pos.ValveFile:
+    return pos.valve("seed")
+
+
+@pytest.fixture
+def recording(valve: pos.ValveFile) -> pos.Recording:
+    return pos.simulate(valve, [0.0, 1.0], [0.0, 1.0])
+
+
+@pytest.mark.parametrize("name", [name for name in pos.__all__ if name.islower()])
+def test_every_function_says_what_it_may_be_given(name: str) -> None:
+    function = getattr(pos, name)
+    first = next(iter(inspect.signature(function).parameters))
+    with pytest.raises(pos.InputError, match=rf"^{first}: must be a .*, got a Device$"):
+        function(*[pos.Device(bus="modbus")] * 3)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda r, _: pos.compare(r, "seed"), "valve: must be a ValveFile (valve(name) reads one), got 'seed'"),  # type: ignore[arg-type]
+        (
+            lambda r, v: pos.diagnose([r, "b.csv"], v),  # type: ignore[list-item]
+            "recording: must be a Recording (Recording.read(file) reads one) or a list of Recordings, "
+            "got a list of Recording and str",
+        ),
+        (
+            lambda r, v: pos.extend(r, v, "backlash"),
+            "effects: must be a list of texts, got 'backlash'; one is ['backlash']",
+        ),
+        (lambda *_: pos.hide(seed="3"), "seed: must be a whole number, got '3'"),  # type: ignore[arg-type]
+        (
+            lambda _, v: pos.simulate(v, "now", [0.0]),
+            "simulate: time_s must be a series of finite numbers, got 'now'",
+        ),
+        (lambda *_: pos.Recording("r.csv"), "recording: allowed are columns by their names, got 'r.csv'"),  # type: ignore[arg-type]
+    ],
+)
+def test_another_kind_of_thing_is_refused_in_one_line(
+    call: Any, said: str, recording: pos.Recording, valve: pos.ValveFile
+) -> None:
+    with pytest.raises(pos.InputError) as refused:
+        call(recording, valve)
+    assert str(refused.value) == said
+
+
+def test_numbers_of_other_libraries_are_taken_and_a_wrong_call_stays_pythons_own(valve: pos.ValveFile) -> None:
+    simulated = pos.simulate(valve, [0.0, 1.0], [0.0, 1.0], noise_std_m=np.float32(1e-5), seed=np.int64(1))  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'valve'"):
+        pos.compare(simulated)  # type: ignore[call-arg]

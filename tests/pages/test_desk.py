@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -12,11 +14,13 @@ from config.errors import CommandFailed, InputError
 from config.recording import Recording, write_recording
 from config.valve_file import load_valve, shipped_valve
 from config.writing import write_valve
-from positioner.pages.workbench_page.background import Limits, News, Raced, diagnosed
+from positioner.pages.workbench_page.background import Limits, News, Raced, Work, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve, named_valve
 from positioner.pages.workbench_page.notebook import notebook
 from positioner.pages.workbench_page.opening import ColumnChoice, Opened, opened_like
+from positioner.pages.workbench_page.search import Search
+from positioner.pages.workbench_page.search_panel import SearchPanel
 from tests.pages.laid_out import hidden
 from workbench.diagnosis.extension import extend
 
@@ -146,3 +150,17 @@ def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: P
     dropped.write_text(shipped_valve("seed").read_text() + '\n[[effect]]\nname = "./tight_spot.py"\n')
     with pytest.raises(InputError, match=r"^mine\.toml: names tight_spot\.py, an effect of your own"):
         named_valve(str(dropped), "mine.toml")
+
+
+def test_the_race_and_the_errors_are_in_the_unit_that_was_chosen(desk: Desk) -> None:
+    desk.search = Search(
+        "diagnose", valve().file, None, 0, cast(Work, SimpleNamespace(is_over=True)), race={"backlash": 2.54e-3}
+    )
+    panel = cast(SearchPanel, SimpleNamespace(_desk=desk))
+    for unit, error in {"mm": 2.54, "in": 0.1}.items():
+        desk.units.position = unit
+        drawn = SearchPanel._drawn(panel)
+        assert drawn["data"][0]["x"] == pytest.approx([error])
+        assert f"fitted error, {unit} rms" in str(drawn["layout"]["xaxis"])
+        assert (desk.errors.shown(2.54e-3).text, desk.errors.unit) == (f"{error:g}", unit)
+    assert desk.errors.shown(None).text == "–"

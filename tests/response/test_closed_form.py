@@ -167,6 +167,13 @@ def test_a_gap_over_the_answer_makes_its_times_untold_and_keeps_the_others() -> 
     assert response.notes[0].startswith(f"{int(hole.sum())} of {len(recording)} rows have no position")
 
 
+def test_positions_in_mm_are_asked_about() -> None:
+    recording = first_order(np.arange(0, 8, 0.005), 3.0, 0.1, 0.3, 0.01)
+    in_mm = replace(recording, columns={**recording.columns, "position_m": 1e3 * recording.position_m})
+    assert respond(recording).notes == ()
+    assert respond(in_mm).notes == ("positions go to 30 m: are they in mm, or in %? Then position_m=THEIRS:mm, or :%",)
+
+
 def test_a_gap_before_the_step_leaves_its_beginning_unknown() -> None:
     recording = first_order(np.arange(0, 8, 0.005), 3.0, 0.1, 0.3, 0.01)
     kept = (recording.time_s < 2.5) | (recording.time_s > 3.02)

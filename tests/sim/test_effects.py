@@ -10,7 +10,7 @@ import pytest
 from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
 from sim.composition import Composition
-from sim.effect import find_effects, read_effect, shipped_effect, shipped_effects
+from sim.effect import read_effect, shipped_effect, shipped_effects
 from sim.valve import Valve
 
 SEED = load_valve(shipped_valve("seed"))
@@ -272,9 +272,3 @@ def test_a_force_that_outgrows_every_step_ends(tmp_path: Path) -> None:
     valve = Valve(Composition.of(file_with({"name": "own"}), [read_effect(path)], "v.toml"), step_s=1e-3)
     with pytest.raises(InputError, match="nobody can say"):
         valve.run(np.full(3, 50e3), 1e-3)
-
-
-def test_one_name_where_a_list_is_asked_for_is_no_list_of_its_letters() -> None:
-    with pytest.raises(InputError) as refused:
-        find_effects("backlash", "effects")
-    assert str(refused.value) == 'effects: must be a list of names, got the text "backlash"; one effect is ["backlash"]'

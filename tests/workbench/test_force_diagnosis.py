@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.recording import Column, Recording, write_recording
+from config.recording import LONGEST_LINE, Column, Recording, write_recording
 from config.writing import valve_toml
 from positioner.cli.main import main
 from tests.workbench.benches import (
@@ -207,3 +207,7 @@ def test_a_recording_with_a_command_is_none_of_a_bench(tmp_path: Path) -> None:
     path.write_text("# a bench\ntime_s,pressure_pa,position_m,load_n\n0,1,2,3\n")
     assert is_imposed(path)
     assert len(read_imposed(path)) == 1
+    path.write_bytes(bytes(LONGEST_LINE))
+    assert not is_imposed(path)
+    with pytest.raises(InputError, match="line 1 is longer than"):
+        read_imposed(path)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.recording import Recording
 from config.results.result import Brief
@@ -47,6 +48,7 @@ class Hidden(Brief):
     """What is sealed: `salt, seed, dirty, effects, valve, floor_m`, and how far each effect is `visible`."""
 
 
+@kinds_held
 def hide(
     seed: int,
     *,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from config.arguments import kinds_held
 from config.drive import KINDS, Kind, KindName, Scale
 from config.recording import Column, Recording
 from config.results.block import Block, Table
@@ -188,6 +189,7 @@ class Comparison(Result):
         return figure
 
 
+@kinds_held
 def compare(recording: Recording, valve: ValveFile) -> Comparison:
     """Hold a valve against a recording.
 

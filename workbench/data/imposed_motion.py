@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.noise import position_noise_m
-from config.recording import Column, Recording, read_table
+from config.recording import Column, Recording, lines_of, read_table
 from config.results.result import Brief
 from config.valve_file import ValveParameters
 from workbench.data.motion import PARABOLA, acceleration_m_per_s2
@@ -84,13 +85,14 @@ def is_imposed(path: Path) -> bool:
             return False
     try:
         with path.open(encoding="utf-8") as file:
-            header = next((line for line in file if not line.startswith("#")), "")
-    except (OSError, UnicodeDecodeError):
+            header = next((line for line in lines_of(path, file) if not line.startswith("#")), "")
+    except (OSError, UnicodeDecodeError, InputError):
         return False
     names = {name.strip() for name in header.split(",")}
     return "command_pa" not in names and bool(names & {"load_n", "branch"})
 
 
+@kinds_held
 def read_imposed(path: Path | str) -> Recording:
     """Read a bench's recording, or a static curve, whose `branch` becomes +1 rising and -1 falling.
 
@@ -102,7 +104,7 @@ def read_imposed(path: Path | str) -> Recording:
         return Recording(*read_table(path, FORCES))
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            lines = [line for line in file if not line.startswith("#")]
+            lines = [line for line in lines_of(path, file) if not line.startswith("#")]
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:

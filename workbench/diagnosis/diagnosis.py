@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from os import cpu_count
 from typing import TYPE_CHECKING, NamedTuple
 
+from config.arguments import kinds_held
 from config.drive import Kind
 from config.recording import Recording
 from config.results.block import Block
@@ -181,6 +182,7 @@ def _by_reason(unseen: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 @linear_algebra_alone()
+@kinds_held
 def diagnose(
     recording: Recording | Sequence[Recording],
     valve: ValveFile,

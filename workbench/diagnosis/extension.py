@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.recording import Recording
 from config.results.block import Block, Table
@@ -120,6 +121,7 @@ BY_COMMAND = " by the command"
 """Of a floor: a measured pressure tells why the valve does not repeat itself."""
 
 
+@kinds_held
 def extend(
     recording: Recording | Sequence[Recording],
     valve: ValveFile,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from os import cpu_count
 from typing import TYPE_CHECKING, Literal
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.recording import Recording
 from config.results.block import Block
@@ -129,6 +130,7 @@ class Discovery(Result):
             axes.scatter(x, y, s=14, color=colours[way], label=words, alpha=0.7)  # type: ignore[attr-defined]
 
 
+@kinds_held
 def discover(
     recording: Recording | Sequence[Recording],
     valve: ValveFile,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from config.arguments import kinds_held
 from config.drive import Kind
 from config.recording import Column, Recording
 from config.results.block import Block
@@ -76,6 +77,7 @@ class Fit(Result):
         """Whether searches from more than one independent start came to the same cost and parameters."""
         return self.agreement > 1
 
+    @kinds_held
     def predict(self, recording: Recording) -> Column:
         """Return the indicated position of a free run, m; NaN in rows that are not simulated."""
         return self.indicated_m(ready(recording))
@@ -104,6 +106,7 @@ class Fit(Result):
         by = self.by.of(record, self.valve.valve)
         return FreeRun(composition, record, from_pressure=self.from_pressure, by=by), composition.theta
 
+    @kinds_held
     def score(self, recording: Recording) -> float:
         """Return 1 - ||measured - simulated|| / ||measured - mean||: 1 is perfect, below 0 worse than the mean."""
         record = ready(recording)

@@ -17,6 +17,7 @@ from functools import partial
 
 import numpy as np
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters
@@ -45,6 +46,7 @@ SWINGS = 1.5
 
 
 @linear_algebra_alone()
+@kinds_held
 def fit(
     recording: Recording,
     valve: ValveFile,

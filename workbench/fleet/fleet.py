@@ -6,6 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from config.arguments import kinds_held
 from config.errors import InputError
 from config.results.block import Block, Table
 from config.results.result import Result
@@ -106,6 +107,7 @@ class Fleet(Result):
         return figure
 
 
+@kinds_held
 def fleet(
     manifest: Path | str,
     out: Path | str,

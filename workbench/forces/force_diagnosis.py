@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from config.arguments import kinds_held
 from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
@@ -93,6 +94,7 @@ def _tried(each: ForceCandidate) -> Tried:
     return Tried(each.step, each.name, *errors, each.gain, each.rejection_reason)
 
 
+@kinds_held
 def diagnose_forces(
     recordings: Recording | Sequence[Recording], valve: ValveFile, *, test: Recording | None = None
 ) -> ForceDiagnosis:

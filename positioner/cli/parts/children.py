@@ -1,4 +1,4 @@
-"""Other positioner commands as processes of their own, which end with the command that started them."""
+"""Other positioner commands as processes of their own: they end with the command that started them, however it does."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,7 +25,7 @@ def running(command: str, config: Path, *options: str) -> Iterator[str]:
     words = (command, str(config), *options)
     with ended_by(_end):
         try:
-            child = ChildProcess("positioner.cli", *words, log=config.with_suffix(".log"))
+            child = ChildProcess("positioner.testing.tied", "positioner.cli", *words, log=config.with_suffix(".log"))
         except NotStarted as error:
             raise InputError(str(config), f"`positioner {command}` did not start: {error}") from None
         try:

@@ -21,7 +21,11 @@ class Unit:
         >>> LENGTHS["mm"].fine(4.8736e-05)
         '0.04874 mm'
         """
-        return f"{self.per_si * value_si:.4g} {self.name}" if math.isfinite(value_si) else f"{NO_NUMBER} {self.name}"
+        return f"{self.fine_number(value_si)} {self.name}"
+
+    def fine_number(self, value_si: float) -> str:
+        """Return the same without its unit."""
+        return f"{self.per_si * value_si:.4g}" if math.isfinite(value_si) else NO_NUMBER
 
     def text(self, value_si: float) -> str:
         """Return a value with its unit.

@@ -18,7 +18,7 @@ from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, find_valve, load_valve, valve_alone
 from config.writing import valve_toml, write_valve
-from positioner.pages.parts.units import Units
+from positioner.pages.parts.units import NO_NUMBER, Units
 from positioner.pages.workbench_page.background import Limits, Task, Work, effect_checked
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
@@ -32,6 +32,7 @@ from workbench.diagnosis.extension import Extension
 from workbench.diagnosis.extension_journal import Journal, write_extended
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
+from workbench.report.units import Quantity, Shown
 
 SAVED = "saved"
 """The line of a variant that a person keeps."""
@@ -106,6 +107,17 @@ class Desk:
     _before: list[dict[str, Any]] = field(default_factory=list)
     """What lay here before each of the last steps."""
     _written: int = 0
+
+    @property
+    def errors(self) -> Quantity:
+        """What errors of a position are of, in the unit that was chosen."""
+        unit = self.units.length_unit()
+
+        def shown(value_m: float | None) -> Shown:
+            text = NO_NUMBER if value_m is None else unit.fine_number(value_m)
+            return Shown(text, "" if value_m is None else f"{value_m:.6g} m")
+
+        return Quantity(shown, unit.per_si, unit.name, "m")
 
     def take_recording(self, opened: Opened) -> None:
         """Put a recording on the desk.

@@ -14,7 +14,6 @@ from positioner.pages.workbench_page.notebook import notebook
 from workbench.blind.sealing import reveal
 from workbench.report import Subject, report_comparison, report_diagnosis
 from workbench.report.ranking import error_reduction
-from workbench.report.units import OF_VALVE
 
 FALL_PX = 320
 
@@ -56,7 +55,7 @@ class JournalPanel:
             for name, (train_m, test_m) in step.extension.stages.items():
                 if number == 1 or name.startswith("with"):
                     stages.append((self._desk.plain(name), train_m, test_m))
-        return error_reduction(stages, self._desk.journal[-1].extension.split.floor_m, OF_VALVE.errors)
+        return error_reduction(stages, self._desk.journal[-1].extension.split.floor_m, self._desk.errors)
 
     async def _back(self) -> None:
         with errors_told():

@@ -23,7 +23,6 @@ from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
 from workbench.report.ranking import log_ticks
-from workbench.report.units import OF_VALVE
 
 LOOK_S = 0.2
 LEAST_BUDGET_S = 1.0
@@ -180,23 +179,23 @@ class SearchPanel:
     def _drawn(self) -> Figure:
         search, compared = self._desk.search, self._desk.compared
         race = {} if search is None else dict(sorted(search.race.items(), key=lambda each: -each[1]))
-        errors_mm = [1e3 * each for each in race.values()]
+        of = self._desk.errors
+        errors = [of.factor * each for each in race.values()]
         bars = {
-            "type": "bar", "orientation": "h", "x": errors_mm, "y": [self._desk.plain(each) for each in race],
+            "type": "bar", "orientation": "h", "x": errors, "y": [self._desk.plain(each) for each in race],
             "marker": {"color": EXTENDED},
-            "hovertemplate": "%{y}: %{x:.4~g} mm<extra></extra>",
+            "hovertemplate": f"%{{y}}: %{{x:.4~g}} {of.unit}<extra></extra>",
         }  # fmt: skip
-        floor_m = compared.floor_m if compared else None
-        shown_mm = errors_mm if floor_m is None else [*errors_mm, 1e3 * floor_m]
+        floors = [] if compared is None or compared.floor_m is None else [of.factor * compared.floor_m]
         step = search.step if search else 1
         return {
             "data": [bars],
             "layout": layout(
                 margin={"l": 10, "r": 10, "t": 8, "b": 40},
-                xaxis=axis(f"step {step}: fitted error, mm rms", type="log", **log_ticks(shown_mm)),
+                xaxis=axis(f"step {step}: fitted error, {of.unit} rms", type="log", **log_ticks([*errors, *floors])),
                 yaxis=axis("", tickfont={"size": 11}),
-                shapes=[] if floor_m is None else [marked(1e3 * floor_m, MEASURED)],
-                annotations=[] if floor_m is None else [_named_floor(floor_m)],
+                shapes=[marked(each, MEASURED) for each in floors],
+                annotations=[_named_floor(each) for each in floors],
                 showlegend=False,
             ),
         }
@@ -220,16 +219,16 @@ class SearchPanel:
             if diagnosis.experiment is not None:
                 ui.label(f"An experiment would tell them apart: {diagnosis.experiment.name}.")
             for number, step in enumerate(diagnosis.steps, start=1):
-                before = OF_VALVE.said(step.before.errors.test_rmse_m)
-                ui.label(f"step {number}: {before} held out before").classes("quiet")
+                before = self._desk.errors.shown(step.before.errors.test_rmse_m).text
+                ui.label(f"step {number}: {before} {self._desk.errors.unit} held out before").classes("quiet")
                 self._candidates(diagnosis, number, may_add=may_add)
 
     def _candidates(self, diagnosis: Diagnosis, number: int, *, may_add: bool) -> None:
-        step = diagnosis.steps[number - 1]
+        step, of = diagnosis.steps[number - 1], self._desk.errors
         heads = {
             "effect": "effect",
-            "fitted": "fitted, mm",
-            "test": "held out, mm",
+            "fitted": f"fitted, {of.unit}",
+            "test": f"held out, {of.unit}",
             "bic": "evidence",
             "outcome": "in the search",
         }
@@ -238,8 +237,8 @@ class SearchPanel:
             {
                 "effects": diagnosis.with_those_before(number, each.name),
                 "effect": self._desk.plain(each.name),
-                "fitted": OF_VALVE.length(each.train).text,
-                "test": OF_VALVE.length(each.test).text,
+                "fitted": of.shown(each.train).text,
+                "test": of.shown(each.test).text,
                 "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
                 "outcome": each.said,
             }
@@ -263,9 +262,9 @@ class SearchPanel:
             self._changed("journal")
 
 
-def _named_floor(floor_m: float) -> Figure:
-    """Return what stands over the line of the floor, on an axis in mm that is logarithmic."""
-    where = {"x": log10(1e3 * floor_m), "y": 1.0, "yref": "paper", "yanchor": "bottom"}
+def _named_floor(floor: float) -> Figure:
+    """Return what stands over the line of the floor, on an axis that is logarithmic."""
+    where = {"x": log10(floor), "y": 1.0, "yref": "paper", "yanchor": "bottom"}
     return {"text": "floor", "showarrow": False, **where}
 
 
