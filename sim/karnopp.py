@@ -33,7 +33,9 @@ is solved exactly, however stiff, by the response g to an impulse (g(0) = 0, g'(
     x(s) = h x + g v + I_0 n_0 + I_1 n_1 + I_2 n_2,     v(s) = -kappa g x + g' v + g n_0 + (I_0 n_1 + 2 I_1 n_2) / s
 
 for n = n_0 + n_1 tau / s + n_2 (tau / s)^2. On the bare valve beyond the Stribeck range n is a straight line: there a
-step has no error. The error estimate is what the quadratic term changes of v.
+step has no error. The error estimate is what the quadratic term changes of v. Where that is too much, another force may
+damp the stem, and lambda = -dv'/dv, there, if that is more, is tried before the sub-step is halved: n then lacks that
+damping too, and is as smooth. Of a stem damped so, steps are exponential down to DAMPED / lambda.
 
 The file is plain Python and runs as it stands: the bare valve. `sim.kernel` compiles this text, and in place of the
 functions at its end, which stand empty here, those that the effects of a valve file fill. All that is compiled must
@@ -60,6 +62,8 @@ SHORTEST_SUBSTEP = 2.0**-20
 EXPONENTIAL_ANGLE = 0.15
 """Angle, rad, of the undamped stem from which a sub-step is exponential: below it the pair is cheaper, and the closed
 form cancels."""
+MORE, DAMPED = 1.1, 0.5
+"""Damping, over that tried, that is worth another trial; lambda s from which a sub-step is exponential then."""
 FIRST_CHANGE = 0.2
 """Change of v, in |v| + v_s, that the first sub-step in the Stribeck range is made for: longer ones are refused."""
 BISECTIONS = 30
@@ -70,6 +74,8 @@ BREAKAWAY_FACTOR = 1.0 + 1e-10
 """F_s at break-away, in F_s at the end of a creep. Were they one, a stem pressed on a stop would creep for ever."""
 DIFFERENCE_M = 1e-7
 """Half-width of the central difference that gives the stiffness -dF_e/dx."""
+DIFFERENCE_V = 1e-3
+"""Of |v| + v_s, for the difference that gives the damping -dv'/dv."""
 SLIDE_S = 0.01
 """What a slide takes for the memories of friction,"""
 LONG_S = 100.0
@@ -231,8 +237,16 @@ def response(damping: float, kappa: float, s: float, g: float, slope: float) -> 
     return Response(g, slope, h, I_0, I_1, (1.0 - 2.0 * (I_0 * per_s + damping * I_1) * per_s) * per_kappa)
 
 
+def damping_at(valve: Karnopp, sigma: float, stem: Stem, a: float, q: Any, z: Any) -> float:
+    """Return lambda, 1/s, of a sliding stem with v' = a: of all that damps it; negative in the Stribeck range."""
+    dv = sigma * DIFFERENCE_V * (abs(stem.v) + valve.v_s)
+    faster = acceleration(valve, SLIP, sigma, Stem(stem.t, stem.x, stem.v + dv, stem.p), q, z)
+    return (a - faster) / dv
+
+
 def exponential_step(
     valve: Karnopp,
+    damping: float,
     sigma: float,
     drive: Drive,
     tau: float,
@@ -244,7 +258,7 @@ def exponential_step(
     z: Any,
 ) -> tuple[float, float, float, float]:
     """Slide over s from (x, v) with v' = a; return x, v, v' at its end and what the quadratic term changes of v."""
-    damping, kappa = valve.F_v * valve.per_m, valve.k_s * valve.per_m
+    kappa = valve.k_s * valve.per_m
     g, slope = impulse(damping, kappa, 0.5 * s)
     half = response(damping, kappa, 0.5 * s, g, slope)
     # Twice the half is the whole.
@@ -303,16 +317,21 @@ def move(
     s = h - tau
     if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST_CHANGE * (abs(v) + valve.v_s):
         s = max(FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a), SHORTEST_SUBSTEP * s)
+    damping = viscous = valve.F_v * valve.per_m
     shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
     while tau < h:
-        exponential = mode == SLIP and s > shortest_exponential
+        exponential = mode == SLIP and (s > shortest_exponential or (damping > viscous and damping * s > DAMPED))
         if exponential:
-            x1, v1, a1, error = exponential_step(valve, sigma, drive, tau, s, x, v, a, q, z)
+            x1, v1, a1, error = exponential_step(valve, damping, sigma, drive, tau, s, x, v, a, q, z)
         else:
             x1, v1, a1, error = bogacki_shampine(valve, mode, sigma, drive, tau, s, x, v, a, q, z)
         allowed = tolerance * (abs(v1) + valve.v_s)
         if error > allowed and s > SHORTEST_SUBSTEP * h:
-            s *= 0.5
+            there = damping_at(valve, sigma, stem_at(drive, tau, x, v), a, q, z) if exponential else damping
+            if there > MORE * damping:
+                damping = there
+            else:
+                s *= 0.5
             continue
         if margin(valve, mode, sigma, stem_at(drive, tau + s, x1, v1), q, z) < 0.0:
             if exponential:

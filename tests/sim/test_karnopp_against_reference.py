@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
+from sim import karnopp
 from sim.composition import Composition
 from sim.open_loop import at_rest, follow
 from sim.valve import Valve
@@ -124,6 +125,25 @@ def test_an_exponential_step_through_a_bent_force_is_checked() -> None:
         effect=(EffectTable.model_validate({"name": "spring_hardening", "cubic_n_per_m3": 3e7}),),
     )
     assert off_by_exponential_m(bent) < 5e-6
+
+
+def test_a_force_that_damps_the_stem_takes_as_few_sub_steps_as_viscous_friction(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The automaton as it stands, without compiler: 150 kN s/m, for which the pair would take 10 us."""
+    asked = []
+
+    def damping(_F: float, stem: karnopp.Stem, _q: object, _z: object) -> float:
+        asked.append(stem)
+        return -150e3 * stem.v
+
+    valve = karnopp.karnopp(Composition.from_file(changed(viscous_ns_per_m=2e3)).theta)
+    begin = (0.05, 0.02, karnopp.SLIP, 1.0, 1e-5, None, None)
+    drive = karnopp.Drive(0.0, 90e3, 0.0)
+    x, v, *_ = karnopp.step(valve._replace(F_v=152e3), drive, 0.01, *begin)
+    monkeypatch.setattr(karnopp, "force", damping)
+    assert karnopp.step(valve, drive, 0.01, *begin) == pytest.approx((x, v, karnopp.SLIP, 1.0), rel=1e-5)
+    assert len(asked) < 100
 
 
 def off_by_exponential_m(file: ValveFile) -> float:
