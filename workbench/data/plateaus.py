@@ -2,8 +2,8 @@
 
 Neighbours belong together while they differ by less than 5 sigma; a stretch of at least three is a plateau, unless its
 halves differ, as those of a stem that creeps do. What noise alone cuts in two is one: of a long rest here and there a
-sample differs from both its neighbours by more, and no slide ended behind it. How the stem came to it says the last
-sample before that was elsewhere, in motion or on the plateau before.
+sample differs from its neighbours by more, often so where a historian keeps what differs, and no slide ended behind it.
+How the stem came to it says the last sample before that was elsewhere, in motion or on the plateau before.
 """
 
 from typing import NamedTuple
@@ -40,10 +40,11 @@ def plateaus(position_m: Column, noise_m: float, offset: int = 0) -> tuple[Plate
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
     found: list[Plateau] = []
     begins = ended = 0
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for still_from, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         end = last + 1
-        if end - first < FEWEST or _creeps(x[first:end], noise_m):
+        if end - still_from < FEWEST or _creeps(x[still_from:end], noise_m):
             continue
+        first = _reached(x, ended, still_from, end, within_m)
         if found and _cut_by_noise(x[begins:ended], x[ended:first], x[first:end], noise_m):
             ended, over = end, offset + int(rows[end - 1]) + 1
             found[-1] = found[-1]._replace(end=over, position_m=float(np.mean(x[begins:end])))
@@ -58,8 +59,14 @@ def plateaus(position_m: Column, noise_m: float, offset: int = 0) -> tuple[Plate
     return tuple(found)
 
 
+def _reached(x: Column, ended: int, still_from: int, end: int, within_m: float) -> int:
+    """Return where a stem that is still from a row on was already near that place, after the rest that ended before."""
+    elsewhere = np.abs(x[ended:still_from] - np.mean(x[still_from:end])) > within_m
+    return ended + int(np.max(np.flatnonzero(elsewhere), initial=-1)) + 1
+
+
 def _cut_by_noise(before: Column, strays: Column, after: Column, noise_m: float) -> bool:
-    """Return whether two stretches, and the samples between them that are near no neighbour, are one rest.
+    """Return whether two stretches, and the samples between them, are one rest.
 
     Their means tell: halves of the whole would not show a short stretch elsewhere beside a long one.
     """
