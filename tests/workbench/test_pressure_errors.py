@@ -14,6 +14,7 @@ from tests.workbench.hand_made import LIBRARY, model_of
 from tests.workbench.valves import NOISE_M, PERIOD_S, drawn_valve, pressures, with_effect
 from workbench.data.held_out import split
 from workbench.diagnosis.diagnosis import diagnose
+from workbench.diagnosis.measured_pressure import ByMeasuredPressure
 from workbench.discover.discovery import discover
 from workbench.discover.form_search import FormSearch, SearchedForms
 from workbench.fit.fitting import fit
@@ -127,6 +128,25 @@ def test_what_the_i_p_hides_from_the_stem_is_no_friction() -> None:
     assert "But the measured pressure is not the model's" in found.sentence
     assert "coulomb_n" in found.sentence
     assert not found.nothing_off
+
+
+@pytest.mark.parametrize("worse", [False, True])
+def test_a_pressure_that_the_stem_follows_less_well_is_doubted(worse: bool) -> None:
+    model = model_of(error_m=1e-4)
+    others = (("coulomb_n", 90.0, 95.0),)
+    said = ByMeasuredPressure(200.0, 0.07, model, others, 4e-6, worse).sentence(model.fit.kind)
+    assert "coulomb_n 95, not 90" in said
+    assert ("; by the command it is 0.004 mm: noise of a transmitter" in said) == worse
+
+
+@pytest.mark.long
+def test_so_is_one_of_a_transmitter_whose_noise_hangs_together() -> None:
+    recording, noise = recorded(BARE), np.random.default_rng(4).standard_normal(COUNT)
+    wanders_pa = np.convolve(noise, 1e3 * np.exp(-np.arange(40) / 8.0), "same")
+    noisy = Recording({**recording.columns, "pressure_pa": recording.columns["pressure_pa"] + wanders_pa})
+    found = diagnose(noisy, BARE, effects=(), workers=1)
+    assert found.by_pressure is not None
+    assert found.by_pressure.worse
 
 
 @pytest.mark.long

@@ -42,7 +42,7 @@ def test_a_gap_a_clock_set_back_and_unrecorded_rows_begin_new_segments() -> None
     assert record.segments == ((0, 300), (300, 600), (600, 800), (800, 1000))
     assert [note.partition(":")[0] for note in record.notes] == [
         "before sample 301 a gap of 2.01 s",
-        "before sample 601 the clock is set back by 4.99 s",
+        "before sample 601 another recording begins, or the clock is set back by 4.99 s",
         "before sample 801 unrecorded rises by 3",
     ]
 

@@ -86,6 +86,12 @@ def test_a_plateau_knows_where_its_slide_came_from() -> None:
     assert not plateaus(np.linspace(0.0, 1.0, 300), 1e-3), "it creeps"
     cut = np.array([0.0, 1e-3, 0.0, -3e-3, 3e-3, 0.0, 1e-3, 0.0])
     assert [each[:2] for each in plateaus(cut, 1e-3)] == [(0, 8)], "two samples of noise make no slide"
+    stray = np.repeat([0.0, 1e-3, -4.5e-3, 1e-3, 0.0], [5, 1, 1, 1, 5])
+    assert [each[:2] for each in plateaus(stray, 1e-3)] == [(0, 13)], "nor does one that is far from both beside it"
+    early = np.repeat([1.0, 0.0, 4e-3, -2e-3, 0.0], [4, 1, 1, 1, 5])
+    assert [(each.first, each.direction) for each in plateaus(early, 1e-3)] == [(0, 0), (4, -1)], "nor soon after one"
+    short = np.repeat([0.0, 1e-2], [1000, 12])
+    assert [each[:2] for each in plateaus(short, 1e-3)] == [(0, 1000), (1000, 1012)], "one of its own beside a long one"
 
 
 def test_a_landing_under_a_moving_pressure_is_not_settled() -> None:

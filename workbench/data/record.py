@@ -416,7 +416,7 @@ def _segments(columns: Mapping[str, Column], notes: list[str]) -> Iterator[tuple
     longest_s = _longest_step_s(steps)
     breaks: dict[int, str] = {}
     for row in np.flatnonzero(steps <= 0).tolist():
-        breaks[row + 1] = f"the clock is set back by {-steps[row]:.6g} s"
+        breaks[row + 1] = f"another recording begins, or the clock is set back by {-steps[row]:.6g} s"
     for row in np.flatnonzero(steps > longest_s).tolist():
         breaks[row + 1] = f"a gap of {steps[row]:.6g} s"
     chosen = _rises(columns.get(STRETCH))

@@ -5,6 +5,9 @@ and the packing is called what it is not. Where the actuator's pressure was meas
 fitted once more from the measured pressure on, without the pressure path, and what is another then is said.
 
     A e_rms > 3 % of F_c      e as `pressure_errors` has it, without the transmitter's noise
+
+Noise of the transmitter that hangs together from sample to sample counts, too, and is not told from what the actuator
+does. But it moves no stem: where the stem follows the command better, that is said besides.
 """
 
 from dataclasses import dataclass
@@ -13,7 +16,7 @@ from config.drive import Kind
 from config.results.result import Brief
 from workbench.data.held_out import Split
 from workbench.fit.fitting import fit
-from workbench.select.effect_candidates import EvaluatedModel
+from workbench.select.effect_candidates import EvaluatedModel, outdoes
 from workbench.select.effect_search import Progress, evaluated
 
 MATTERS = 0.03
@@ -33,6 +36,10 @@ class ByMeasuredPressure(Brief):
     """From the measured pressure on."""
     others: tuple[tuple[str, float, float], ...]
     """Parameters that are others: name, from the command on, from the measured pressure on."""
+    commanded_rmse_m: float
+    """Held out, from the command on."""
+    worse: bool
+    """Whether the stem follows the command better."""
 
     def sentence(self, kind: Kind) -> str:
         """Say so."""
@@ -42,6 +49,15 @@ class ByMeasuredPressure(Brief):
         return kind.text(
             f"the measured {word} is not the model's: they differ by {read.said(self.off_pa)} rms, "
             f"{self.of_friction:.0%} of the friction; from the measured one on the held-out error is {error}{others}"
+            f"{self._doubt(kind)}"
+        )
+
+    def _doubt(self, kind: Kind) -> str:
+        if not self.worse:
+            return ""
+        return (
+            f"; by the command it is {kind.length.said(self.commanded_rmse_m)}: noise of a transmitter that hangs "
+            "together from sample to sample differs so, and moves no stem; then nothing of this is the stem's"
         )
 
 
@@ -71,7 +87,7 @@ def by_measured_pressure(
         for name, after in model.fit.parameters.items()
         if (before := best.fit.parameters.get(name)) and abs(after.value - before.value) > ANOTHER * abs(before.value)
     )
-    return ByMeasuredPressure(off_pa, of_friction, model, others)
+    return ByMeasuredPressure(off_pa, of_friction, model, others, best.errors.test_rmse_m, outdoes(best, model))
 
 
 def driven_otherwise(
