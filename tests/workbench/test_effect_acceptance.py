@@ -1,5 +1,6 @@
 """What a candidate is held against: block errors, the meter of structure, algebraic classes, what is held out."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -194,6 +195,16 @@ def test_a_missed_slip_is_not_structure_and_does_not_hide_it() -> None:
     slip_m[1500:1580] = 8e-3
     assert structure(record, noise(3000) + slip_m) < STRUCTURED
     assert structure(record, noise(3000) + NOISE_M * np.sign(np.gradient(record.command_pa)) + slip_m) > STRUCTURED
+
+
+def test_of_a_long_record_the_regressors_are_held_once() -> None:
+    record = ready(moving(60_000))
+    error = noise(60_000)
+    tracemalloc.start()
+    structure(record, error)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2 * 27 * error.nbytes
 
 
 def test_preload_and_sensor_offset_are_one_class_and_gain_is_the_spring() -> None:

@@ -36,16 +36,21 @@ def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> 
     rows = np.flatnonzero(np.isfinite(residual_m))
     if rows.size < FEWEST:
         return 0.0
-    matrix = _regressors(record)[rows]
-    error = clipped(residual_m[rows])
-    fold = np.arange(rows.size) * FOLDS // rows.size
+    matrix, error = _regressors(record, rows), clipped(residual_m[rows])
+    fifths = [slice(-(-k * rows.size // FOLDS), -(-(k + 1) * rows.size // FOLDS)) for k in range(FOLDS)]
+    # Sums over a fifth, taken from those over all, are the sums over the others: nothing is copied.
+    squares = [matrix[each].T @ matrix[each] for each in fifths]
+    products = [matrix[each].T @ error[each] for each in fifths]
+    sums = [matrix[each].sum(axis=0) for each in fifths]
     left = np.empty(rows.size)
     spread = np.empty(rows.size)
-    for k in range(FOLDS):
-        here, others = fold == k, fold != k
-        mean = error[others].mean()
-        left[here] = error[here] - mean - matrix[here] @ _ridge(matrix[others], error[others] - mean)
+    for k, here in enumerate(fifths):
+        n = rows.size - (here.stop - here.start)
+        mean = (error.sum() - error[here].sum()) / n
+        onto = sum(products) - products[k] - mean * (sum(sums) - sums[k])
+        slopes = np.linalg.solve(sum(squares) - squares[k] + RIDGE * n * np.eye(len(onto)), onto)
         spread[here] = error[here] - mean
+        left[here] = spread[here] - matrix[here] @ slopes
     total = float(np.sum(spread**2)) + rows.size * negligible_m**2
     return float(np.sum(spread**2) - np.sum(left**2)) / total if total > 0.0 else 0.0
 
@@ -57,28 +62,34 @@ def clipped(error_m: Column) -> Column:
     return np.clip(error_m - middle, -CLIPPED * deviation, CLIPPED * deviation)
 
 
-def _ridge(matrix: Matrix, error: Column) -> Column:
-    n, k = matrix.shape
-    return np.asarray(np.linalg.solve(matrix.T @ matrix + RIDGE * n * np.eye(k), matrix.T @ error))
+def _regressors(record: Record, rows: npt.NDArray[np.intp]) -> Matrix:
+    """Return the standardised state and its products at some rows of a record, (rows, 27), made one after another."""
+    state = _state(record)
+    pairs = list(combinations_with_replacement(range(state.shape[1]), 2))
+    found = np.empty((rows.size, state.shape[1] + len(pairs)), order="F")
+    found[:, : state.shape[1]] = state[rows]
+    for column, (i, j) in enumerate(pairs, start=state.shape[1]):
+        found[:, column] = _standard(state[:, i] * state[:, j])[rows]
+    return found
 
 
-def _regressors(record: Record) -> Matrix:
-    """Return the standardised state and its products, (n, 27)."""
-    state = np.zeros((len(record), 6))
+def _state(record: Record) -> Matrix:
+    """Return the standardised state, (n, 6)."""
+    state = np.zeros((len(record), 6), order="F")
     for first, end in record.segments:
-        rows = slice(first, end)
-        position_m = np.where(record.valid, record.position_m, np.nan)[rows]
-        time_s = record.time_s[rows]
+        part = slice(first, end)
+        position_m = np.where(record.valid, record.position_m, np.nan)[part]
+        time_s = record.time_s[part]
         way = directions(position_m, record.scale_m)
         last = np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))
         velocity = velocity_m_per_s(time_s, position_m)
-        change = np.gradient(record.command_pa[rows], time_s)
-        state[rows] = np.column_stack([position_m, velocity, way[last], record.command_pa[rows], change, time_s])
-    state = _standard(np.nan_to_num(state))
-    products = [state[:, i] * state[:, j] for i, j in combinations_with_replacement(range(6), 2)]
-    return _standard(np.column_stack([state, *products]))
+        change = np.gradient(record.command_pa[part], time_s)
+        state[part] = np.column_stack([position_m, velocity, way[last], record.command_pa[part], change, time_s])
+    for column in range(state.shape[1]):
+        state[:, column] = _standard(np.nan_to_num(state[:, column]))
+    return state
 
 
-def _standard(matrix: Matrix) -> Matrix:
-    spread = matrix.std(axis=0)
-    return np.asarray((matrix - matrix.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0))
+def _standard(column: Column) -> Column:
+    spread = float(column.std())
+    return np.asarray((column - column.mean()) / (spread if spread > 0.0 else 1.0))
