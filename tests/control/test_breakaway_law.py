@@ -132,6 +132,7 @@ def stepped(noise_pu: float) -> Loop:
     return deepcopy(_stepped(noise_pu))
 
 
+@pytest.mark.long
 def test_small_steps_end_where_they_should() -> None:
     errors, overshoots = made(identified(1e-4), STEPS_PU, 0.4)
     assert np.mean(errors <= 1e-3) >= 0.95
@@ -151,7 +152,7 @@ def test_small_steps_under_ten_times_the_noise() -> None:
     assert np.mean(errors <= 2.5e-3) >= 0.95
 
 
-@pytest.mark.parametrize("noise_pu", [1e-4, 1e-3])
+@pytest.mark.parametrize("noise_pu", few_always([1e-3, 1e-4]))
 def test_at_rest_nothing_happens(noise_pu: float) -> None:
     loop = stepped(noise_pu)
     loop.run(1.0)

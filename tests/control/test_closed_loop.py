@@ -20,6 +20,7 @@ from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.virtual.virtual_cycle import virtual_cycle
 from sim.slave.modbus_slave import device_of
+from tests.cases import few_always
 
 VALVE = load_valve(shipped_valve("seed")).valve
 STROKE_M = VALVE.stroke_m
@@ -63,7 +64,7 @@ class Plant:
         return self.cycle.snapshot.sample.position_m / STROKE_M
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few_always(range(4)))
 def test_identified_ratios_are_within_1_percent_and_steps_within_1_percent_of_the_stroke(seed: int) -> None:
     plant = Plant(seed)
     ratios = plant.identify().applied.ratios
@@ -121,7 +122,7 @@ def interrupted(index: int, sample: Sample) -> Sample:
     return replace(sample, quality=Quality.LOST, position_m=math.nan) if 300 <= index < 330 else sample
 
 
-@pytest.mark.parametrize("spoil", [spiked, dropped, repeated, interrupted])
+@pytest.mark.parametrize("spoil", few_always([spiked, interrupted, dropped, repeated], 2))
 def test_measurements_that_are_none_do_not_reach_the_estimators(spoil: Spoil) -> None:
     plant = Plant(2)
     seen: list[tuple[Sample, Requests]] = []

@@ -311,7 +311,7 @@ def free(loop: Loop) -> None:
 
 @pytest.mark.parametrize(
     "control",
-    [{}, {"excursion_limit": 0.08}, {"excursion_interval_s": 5.0}, {"law": "moves"}],
+    few_always([{}, {"excursion_limit": 0.08}, {"excursion_interval_s": 5.0}, {"law": "moves"}]),
     ids=["as shipped", "a short excursion", "an interval", "moves"],
 )
 def test_a_stem_that_nothing_breaks_loose_is_stuck_whichever_bound_is_met_first(control: dict[str, Any]) -> None:

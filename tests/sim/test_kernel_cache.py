@@ -100,6 +100,7 @@ def test_the_laws_are_compiled_once_for_all_kernels(filled: Path, monkeypatch: p
     assert valve.position_m > 0.0
 
 
+@pytest.mark.long
 def test_an_effect_is_compiled_once_wherever_it_stands(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Parameters and memories of effects lie elsewhere in each set of them."""
     asymmetric = {"name": "asymmetric_friction", "asymmetry": 0.2}

@@ -106,6 +106,7 @@ def force(v: float, q: Parameters) -> float:
 '''
 
 
+@pytest.mark.long
 def test_a_parameter_that_would_have_to_be_negative_is_not_physical(tmp_path: Path) -> None:
     (tmp_path / "push.py").write_text(PUSH)
     pushed = with_effect(BARE, str(tmp_path / "push.py"), push_ns2_per_m2=300.0)

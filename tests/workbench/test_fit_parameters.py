@@ -10,7 +10,6 @@ from config.recording import Recording
 from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import shipped_effect
-from tests.cases import few_always
 from tests.workbench.valves import SEED, drawn_valve, error_of, record_of, with_effect
 from workbench import fit
 from workbench.model.parameters import free_parameters
@@ -18,7 +17,8 @@ from workbench.model.parameters import free_parameters
 DATA = Path(__file__).parents[3] / "shared" / "data" / "servo_motor"
 
 
-@pytest.mark.parametrize(("seed", "dirty"), few_always([(5, True), (2, False)]))
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "dirty"), [(5, True), (2, False)])
 def test_the_error_of_the_truth_is_reached(seed: int, dirty: bool) -> None:
     truth = drawn_valve(np.random.default_rng(seed))
     recording = record_of(truth, seed, dirty=dirty)

@@ -9,6 +9,7 @@ from config.errors import InputError
 from config.recording import LONGEST_LINE, Column, Recording, write_recording
 from config.writing import valve_toml
 from positioner.cli.main import main
+from tests.cases import few_always
 from tests.workbench.benches import (
     AREA_M2,
     COULOMB_N,
@@ -62,7 +63,7 @@ def test_friction_that_grows_with_pressure_is_found_and_nothing_else() -> None:
     assert found.base.test_rms_n > 4.0
 
 
-@pytest.mark.parametrize(("growth_n", "exponent"), [(40.0, 0.5), (6.0, 2.0), (6.0, 3.0)])
+@pytest.mark.parametrize(("growth_n", "exponent"), few_always([(40.0, 0.5), (6.0, 2.0), (6.0, 3.0)]))
 def test_friction_that_grows_otherwise_than_pressure_is_told_from_one_that_grows_with_it(
     growth_n: float, exponent: float
 ) -> None:

@@ -100,6 +100,7 @@ def test_what_time_tells_is_a_zero_that_drifts_or_forces_that_change(parts: Spli
     assert by_friction.scatter_m < by_friction.unsteady_m
 
 
+@pytest.mark.long
 def test_a_zero_that_drifts_is_unexplained_and_when_is_said() -> None:
     valve = drawn_valve(np.random.default_rng(11))
     still = [record_of(valve, seed, 3000) for seed in (1, 2)]

@@ -14,7 +14,6 @@ from config.valve_file import EffectTable, ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import FINE_STEP_S
 from sim.open_loop import respond
-from tests.cases import few_always
 from workbench.fit.fitting import fit
 
 NOISE_M, FINE = 3e-5, 50
@@ -83,7 +82,8 @@ def answered(true: ValveFile, command_pa: Column, generator: np.random.Generator
     return Recording({"time_s": np.arange(float(count)), "command_pa": command_pa, "position_m": position_m})
 
 
-@pytest.mark.parametrize("seed", few_always([53, 23, 51]))
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [53, 23, 51])
 def test_the_true_effects_search_reaches_the_floor(seed: int) -> None:
     found = fit(staircase(seed), KNOWN, effects=("asymmetric_friction",), profile=False)
     assert found.by.slow
