@@ -118,7 +118,7 @@ def _open_what_is_closed() -> None:
 
 def _escape_what_cannot_be_shown() -> None:
     """Have standard output write as \\xe9 what its encoding lacks, as standard error does: a name, a sign of ours."""
-    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors in ("strict", "surrogateescape"):
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
