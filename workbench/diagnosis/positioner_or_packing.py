@@ -9,7 +9,8 @@ out.
     friction needed, dead band not      the packing
     dead band needed, friction not      the positioner
     the same, but the other may be      at least that one: a few moves do without much that is there
-    there, half as large
+    there, half as large, or what was
+    fitted speaks for it
     both needed                         both
     neither needed                      one stands in for the other, or none is there: not told
 
@@ -174,9 +175,13 @@ def _asked(
     if stem.from_pressure and play_m < WORTH * friction.with_m:
         friction = friction._replace(gain=NOTHING)
     found = cause(friction.gain, band.gain) if _found_twice(banded) else "not told"
-    if found == "packing" and not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split):
+    if found == "packing" and (
+        _is_evident(band.gain) or not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split)
+    ):
         found = "at least packing"
-    if found == "positioner" and not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split):
+    if found == "positioner" and (
+        _is_evident(friction.gain) or not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split)
+    ):
         found = "at least positioner"
     return PositionerOrPacking(
         found,
@@ -196,8 +201,12 @@ def _asked(
 
 def _excluded(other: Fit, found: Fit, split: Split) -> bool:
     """Whether the recording speaks against another valve, by as many of its samples as are independent."""
-    against = _worth(other, found, split).gain
-    return against.independent_share * against.bic > LEAST_BIC
+    return _is_evident(_worth(other, found, split).gain)
+
+
+def _is_evident(worth: Gain) -> bool:
+    """Whether what was fitted speaks for it, though what was held out may not: then it is not said to be none."""
+    return worth.independent_share * worth.bic > LEAST_BIC
 
 
 class _Worth(NamedTuple):
