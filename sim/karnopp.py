@@ -317,10 +317,10 @@ def move(
     s = h - tau
     if v * v < NEGLIGIBLE * valve.v_s * valve.v_s and abs(a) * s > FIRST_CHANGE * (abs(v) + valve.v_s):
         s = max(FIRST_CHANGE * (abs(v) + valve.v_s) / abs(a), SHORTEST_SUBSTEP * s)
-    damping = viscous = valve.F_v * valve.per_m
+    damping = valve.F_v * valve.per_m
     shortest_exponential = EXPONENTIAL_ANGLE / sqrt(valve.k_s * valve.per_m)
     while tau < h:
-        exponential = mode == SLIP and (s > shortest_exponential or (damping > viscous and damping * s > DAMPED))
+        exponential = mode == SLIP and s > shortest_exponential
         if exponential:
             x1, v1, a1, error = exponential_step(valve, damping, sigma, drive, tau, s, x, v, a, q, z)
         else:
@@ -329,7 +329,7 @@ def move(
         if error > allowed and s > SHORTEST_SUBSTEP * h:
             there = damping_at(valve, sigma, stem_at(drive, tau, x, v), a, q, z) if exponential else damping
             if there > MORE * damping:
-                damping = there
+                damping, shortest_exponential = there, min(shortest_exponential, DAMPED / there)
             else:
                 s *= 0.5
             continue

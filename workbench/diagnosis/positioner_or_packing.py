@@ -175,12 +175,14 @@ def _asked(
     if stem.from_pressure and play_m < WORTH * friction.with_m:
         friction = friction._replace(gain=NOTHING)
     found = cause(friction.gain, band.gain) if _found_twice(banded) else "not told"
+    # What was fitted may speak for the other, though what was held out does not: then it is not said to be none.
     if found == "packing" and (
-        _is_evident(band.gain) or not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split)
+        band.gain.independent_bic > LEAST_BIC or not _excluded(with_dead_band(HALF * play_m, 0.6), banded, split)
     ):
         found = "at least packing"
     if found == "positioner" and (
-        _is_evident(friction.gain) or not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split)
+        friction.gain.independent_bic > LEAST_BIC
+        or not _excluded(with_friction(HALF * band_m * n_per_m, 0.6), stem, split)
     ):
         found = "at least positioner"
     return PositionerOrPacking(
@@ -201,12 +203,7 @@ def _asked(
 
 def _excluded(other: Fit, found: Fit, split: Split) -> bool:
     """Whether the recording speaks against another valve, by as many of its samples as are independent."""
-    return _is_evident(_worth(other, found, split).gain)
-
-
-def _is_evident(worth: Gain) -> bool:
-    """Whether what was fitted speaks for it, though what was held out may not: then it is not said to be none."""
-    return worth.independent_share * worth.bic > LEAST_BIC
+    return _worth(other, found, split).gain.independent_bic > LEAST_BIC
 
 
 class _Worth(NamedTuple):

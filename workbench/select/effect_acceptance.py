@@ -36,14 +36,19 @@ class Gain:
     standard_errors: float
     """The same in its own standard errors."""
     independent_share: float
-    """Share of the samples that are independent: the evidence is worth so much of `bic`."""
+    """Share of the samples that are independent."""
     completes: bool = False
     """Whether the model before leaves more than the noise may be off by, and with the candidate nothing is left."""
 
     @property
+    def independent_bic(self) -> float:
+        """What the evidence is worth: by as many samples as are independent."""
+        return self.independent_share * self.bic
+
+    @property
     def overwhelming(self) -> bool:
         """Whether the fitted part leaves no doubt, and what was held out does not speak against it."""
-        return self.independent_share * self.bic > OVERWHELMING_BIC and self.held_out >= 0.0
+        return self.independent_bic > OVERWHELMING_BIC and self.held_out >= 0.0
 
     def rejection_reason(self, at_floor: bool) -> str:
         """Say what the candidate lacks to be accepted; empty if nothing.
@@ -57,10 +62,10 @@ class Gain:
         however_small = complete and self.standard_errors > LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
-        if at_floor and self.independent_share * self.bic <= LEAST_BIC:
+        if at_floor and self.independent_bic <= LEAST_BIC:
             return (
                 f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
-                f"are independent: {self.independent_share * self.bic:.2g}, more than {LEAST_BIC:g} needed"
+                f"are independent: {self.independent_bic:.2g}, more than {LEAST_BIC:g} needed"
             )
         if self.held_out <= LEAST_REDUCTION and not however_small:
             way = "falls" if self.held_out >= 0.0 else "rises"

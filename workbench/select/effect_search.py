@@ -183,7 +183,7 @@ class EffectSearch:
 
     def _with_tried(self, step: EffectStep, name: str) -> EffectStep:
         """Return a step with an effect among its candidates that waited for another to have evidence."""
-        models = {each.name: each.model or each.rejection_reason for each in step.candidates}
+        models = _models_of(step)
         if name in models:
             return step
         number = step.candidates[0].step
@@ -263,7 +263,7 @@ class EffectSearch:
         if has_evidence and not without.at_floor:
             return None
         self._known = _Known(steps[:i], without)
-        models = {each.name: each.model or each.rejection_reason for each in steps[i].candidates}
+        models = _models_of(steps[i])
         if has_evidence:
             models[added.name] = MAY_BE_NONE
         fits = {name: each.fit for name, each in models.items() if isinstance(each, EvaluatedModel)}
@@ -307,7 +307,7 @@ class EffectSearch:
         later = self._worth_trying_after(step)
         if not later:
             return step
-        models = {each.name: each.model or each.rejection_reason for each in step.candidates}
+        models = _models_of(step)
         models |= self._refitted(number, step.before, later)
         return self._judged_in_full(step.before, models, number)
 
@@ -358,7 +358,7 @@ class EffectSearch:
         for i, step in enumerate(steps[:-1]):
             effects = (*step.before.fit.valve.effect, *(each for each in valve.effect if each.name == last.name))
             alone = self.base(ValveFile(valve=valve.valve, effect=effects))
-            models = {each.name: each.model or each.rejection_reason for each in step.candidates}
+            models = _models_of(step)
             tried = models.get(last.name)
             if tried is None and not leads_farther(alone, _best(step)):
                 continue  # it comes after an effect that had no evidence there
@@ -505,6 +505,11 @@ def _rms_so_far_m(found: BegunFit | EvaluatedModel | str) -> float | None:
 
 def _best(step: EffectStep) -> EvaluatedModel:
     return step.added.model if step.added and step.added.model else step.before
+
+
+def _models_of(step: EffectStep) -> dict[str, EvaluatedModel | str]:
+    """Return the models of a step's candidates by name, or why one could not be fitted, as `judged_step` takes them."""
+    return {each.name: each.model or each.rejection_reason for each in step.candidates}
 
 
 def _leaves(share: float, before: EvaluatedModel, after: EvaluatedModel) -> bool:

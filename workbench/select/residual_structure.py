@@ -42,13 +42,14 @@ def structure(record: Record, residual_m: Column, negligible_m: float = 0.0) -> 
     squares = [matrix[each].T @ matrix[each] for each in fifths]
     products = [matrix[each].T @ error[each] for each in fifths]
     sums = [matrix[each].sum(axis=0) for each in fifths]
+    all_squares, all_products, all_sums = sum(squares), sum(products), sum(sums)
     left = np.empty(rows.size)
     spread = np.empty(rows.size)
     for k, here in enumerate(fifths):
         n = rows.size - (here.stop - here.start)
         mean = (error.sum() - error[here].sum()) / n
-        onto = sum(products) - products[k] - mean * (sum(sums) - sums[k])
-        slopes = np.linalg.solve(sum(squares) - squares[k] + RIDGE * n * np.eye(len(onto)), onto)
+        onto = all_products - products[k] - mean * (all_sums - sums[k])
+        slopes = np.linalg.solve(all_squares - squares[k] + RIDGE * n * np.eye(len(onto)), onto)
         spread[here] = error[here] - mean
         left[here] = spread[here] - matrix[here] @ slopes
     total = float(np.sum(spread**2)) + rows.size * negligible_m**2
