@@ -40,6 +40,18 @@ class Part(Brief):
     counted: Mask
 
 
+@dataclass(frozen=True, slots=True)
+class PressureScatter:
+    """How far the noise of a measured pressure moves the stem that it drives."""
+
+    noise_pa: float
+    """Standard deviation."""
+    typical_m: float
+    """In a typical second, rms."""
+    mistimed_m: float
+    """What it adds to that rms over all seconds: a stem that leaves at another time is off until it moves again."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Split(Brief):
     """What a candidate is fitted on, and what it is judged on: the other recording, or the end of the whole one."""
@@ -49,7 +61,9 @@ class Split(Brief):
     floor_m: float | None
     """The error that no model undercuts: the valve's repeatability where a command repeats, else the sensor's noise.
 
-    None: unknown."""
+    Besides, in a typical second, what the noise of a measured pressure does. None: unknown."""
+    by_pressure: PressureScatter | None = None
+    """Where the stem is driven by a measured pressure whose noise is known."""
 
     @property
     def scale_m(self) -> float:

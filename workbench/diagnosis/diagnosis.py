@@ -28,7 +28,7 @@ from workbench.diagnosis.positioner_or_packing import PositionerOrPacking, posit
 from workbench.diagnosis.pressure_scale import PressureScale, pressure_scale
 from workbench.diagnosis.stand_in import StandIn, stand_in
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name, verdict
-from workbench.diagnosis.verdict_sentence import verdict_line, verdict_sentence
+from workbench.diagnosis.verdict_sentence import floor_by_pressure, verdict_line, verdict_sentence
 from workbench.fit.breaking_off import BrokenOff, ending
 from workbench.fit.fit_result import Fit
 from workbench.fit.threads import linear_algebra_alone
@@ -45,7 +45,6 @@ from workbench.select.tangent_preview import TangentScore, preview
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-OF_COMMAND = "the floor is how well the valve repeats itself by its command: by the measured pressure less may be left"
 BEFORE_IT = "acts before the measured pressure, which drives the stem"
 
 
@@ -144,7 +143,7 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         said += [f"recording: {note}" for note in shortened([note for note in noted if note not in in_verdict])]
         said += [f"not tried: {', '.join(names)}: it {why}" for why, names in _by_reason(self.unseen).items()]
         if self.best.fit.from_pressure:
-            said.append(OF_COMMAND)
+            said += floor_by_pressure(self.split, self.kind)
         if self.positioner:
             said.append(self.positioner.sentence)
         length = self.kind.length
@@ -235,6 +234,7 @@ def diagnose(
     )
     with ending(over or (lambda: False)):
         base = search.base(valve)
+        parts = search.split
         scores: tuple[TangentScore, ...] = ()
         held = None
         try:

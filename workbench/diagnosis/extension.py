@@ -28,6 +28,7 @@ from workbench.fit.fitting import fit, profiled
 from workbench.model.free_run import FreeRun
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
+from workbench.select.pressure_scatter import with_pressure_scatter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +80,8 @@ class Extension(Result):
             for what, (train_m, test_m) in self.stages.items()
         ]
         floor = "unknown" if self.split.floor_m is None else length.number(self.split.floor_m, ".4g")
-        rows.append(("floor: what no model undercuts" + BY_COMMAND * self.extended.from_pressure, floor, floor))
+        by_command = self.extended.from_pressure and self.split.by_pressure is None
+        rows.append(("floor: what no model undercuts" + BY_COMMAND * by_command, floor, floor))
         scale = pressure_scale(self.split.train.record) if self.extended.from_pressure else None
         return [
             f"with {', '.join(self.effects)} the held-out error {falls} {length.number(before_m, '.4g')} to "
@@ -177,6 +179,7 @@ def extend(
         workers=workers,
         progress=lambda done: tell(f"fitting with {', '.join(effects)}", done),
     )
+    on = with_pressure_scatter(on, before)
     there_already = diagnosis.fit_with(effects) if diagnosis else None
     if there_already is not None and there_already.cost < after.cost:
         after = profiled(there_already, train)

@@ -20,6 +20,7 @@ NONE_ABOVE = 1.01
 """Static over sliding friction."""
 SCATTERS = 3.0
 """Times the noise: a valve that repeats itself no better scatters."""
+OF_COMMAND = "the floor is how well the valve repeats itself by its command: by the measured pressure less may be left"
 REPEAT = " If the valve itself scatters so much, a repeated segment of the command shows it."
 
 
@@ -71,6 +72,23 @@ def _said(
         said = f"Something is missing that {lacked}.{begun}"
         return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
+
+
+def floor_by_pressure(parts: Split, kind: Kind) -> list[str]:
+    """Say, of a stem that is driven by its measured pressure, what the floor has of that."""
+    scatter, word = parts.by_pressure, kind.command.word
+    said = [kind.text(OF_COMMAND)] if parts.repeats else []
+    if scatter is None:
+        return [*said, kind.text(f"the floor has nothing of the measured {word}'s noise, which does not show at rest")]
+    moved = kind.length.said(scatter.typical_m, ".2g")
+    noise = kind.command.read.said(scatter.noise_pa, ".2g")
+    return [
+        *said,
+        kind.text(
+            f"the noise of the measured {word}, {noise}, moves the stem by {moved} in a typical second: the floor "
+            "has that"
+        ),
+    ]
 
 
 def _no_break_away(found: Fit) -> str:
@@ -209,10 +227,13 @@ def _suspicion(suspected: Sequence[EffectCandidate]) -> str:
 
 
 def _scatter(parts: Split, length: Scale) -> str:
-    """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it."""
+    """Say that the valve scatters, where it does not repeat itself to within what its sensor would let it.
+
+    Of a floor that has the noise of a measured pressure that is not known.
+    """
     known = [each.record.noise_m for each in (parts.train, parts.test) if each.record.noise_m is not None]
     noise_m = max(known, default=None)
-    if noise_m is None or parts.floor_m is None or parts.floor_m < SCATTERS * noise_m:
+    if noise_m is None or parts.floor_m is None or parts.by_pressure or parts.floor_m < SCATTERS * noise_m:
         return ""
     return (
         f" The valve itself scatters: a repeated command repeats the position to {length.said(parts.floor_m)}, where "

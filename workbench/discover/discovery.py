@@ -167,6 +167,7 @@ def discover(
         parts, {}, valve.valve, seed=seed, workers=threads, progress=tell, from_pressure=from_pressure
     )
     base = search.base(valve)
+    parts = search.split
     if base.complete or parts.floor_m is None or parts.early:
         return Discovery("explained" if base.complete and not parts.early else "unjudged", base, (), (), (), parts, ())
     searched = searched_forms(

@@ -75,6 +75,8 @@ class BlockErrors(Brief):
     """The rms error held out without these."""
     rests: RestErrors | None = None
     """How far rests are off, where all else is at the floor and yet something may be left, or `with_rests`."""
+    mistimed_m: float = 0.0
+    """What the noise of a measured pressure adds to the rms besides a typical second (`pressure_scatter`)."""
 
     def at_floor(self, floor_m: float | None) -> bool:
         """Whether no model could do better: in the mean of what was fitted, and in most blocks of what was not.
@@ -85,16 +87,24 @@ class BlockErrors(Brief):
         if floor_m is None:
             return False
         mostly = max(self.train_block_m, self.test_block_m) <= AT_FLOOR * floor_m
-        return mostly and max(self.train_rmse_m, self.test_rest_rmse_m) <= RARELY_OFF * floor_m
+        return mostly and self.rms_floors(floor_m) <= RARELY_OFF
+
+    def rms_floors(self, floor_m: float) -> float:
+        """Return the rms, fitted or held out, whichever is more, over what it is at the floor."""
+        return max(self.train_rmse_m, self.test_rest_rmse_m) / self._rms_floor_m(floor_m)
+
+    def _rms_floor_m(self, floor_m: float) -> float:
+        return float(np.hypot(floor_m, self.mistimed_m))
 
     def floors_left(self, floor_m: float) -> float:
         """Return what is left, in floors: a typical second's error or the rms, fitted or held out, the most of them."""
-        return max(self.train_block_m, self.test_block_m, self.train_rmse_m, self.test_rest_rmse_m) / floor_m
+        return max(max(self.train_block_m, self.test_block_m) / floor_m, self.rms_floors(floor_m))
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
-        left_m = max(self.train_block_m, self.test_block_m, self.train_rmse_m)
-        return floor_m is not None and left_m <= NOTHING_LEFT * floor_m
+        if floor_m is None or self.train_rmse_m > NOTHING_LEFT * self._rms_floor_m(floor_m):
+            return False
+        return max(self.train_block_m, self.test_block_m) <= NOTHING_LEFT * floor_m
 
     def follows(self, motion_std_m: float) -> bool:
         """Whether a typical second's error is small against the motion, given by its standard deviation, m."""
@@ -129,6 +139,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         independent_share=independent_share(fitted_m),
         knife_edges=(),
         test_rest_rmse_m=test_rmse_m,
+        mistimed_m=split.by_pressure.mistimed_m if split.by_pressure and fit.from_pressure else 0.0,
     )
     floor_m = split.floor_m
     if floor_m is None or not replace(found, test_rest_rmse_m=0.0).at_floor(floor_m):

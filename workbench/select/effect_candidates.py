@@ -50,8 +50,7 @@ class EvaluatedModel(Brief):
     @property
     def structured(self) -> bool:
         """Whether the residual still hangs on the state, by more than it may of one that is as large as the floor."""
-        left_m = max(self.errors.train_rmse_m, self.errors.test_rest_rmse_m)
-        of_floor = 1.0 if self.floor_m is None else min(1.0, left_m / self.floor_m)
+        of_floor = 1.0 if self.floor_m is None else min(1.0, self.errors.rms_floors(self.floor_m))
         return self.errors.structure * of_floor**2 > STRUCTURED
 
     @property

@@ -51,6 +51,7 @@ from workbench.select.equivalence import algebraic_class, bare_imitation, classe
 from workbench.select.experiment import Experiment, experiment
 from workbench.select.forward_selection import MOST_ADDED, without_missing
 from workbench.select.pressure_errors import pressure_errors
+from workbench.select.pressure_scatter import with_pressure_scatter
 
 MOST_STEPS = 5
 """Steps made at most: a step that is judged anew is followed by others."""
@@ -127,7 +128,13 @@ class EffectSearch:
             progress=lambda done: self._progress("fitting the valve as it is", done),
         )
         self._by = found.by
+        self._split = with_pressure_scatter(self._split, found)
         return self._evaluated(found)
+
+    @property
+    def split(self) -> Split:
+        """What it searches in; behind a measured pressure, once a base is fitted, with what that one's noise does."""
+        return self._split
 
     def steps(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
         """Search from a fitted valve; a base that was fitted again, and better, stands in the first step."""

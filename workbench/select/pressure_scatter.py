@@ -1,0 +1,74 @@
+"""How far the noise of a measured pressure moves the stem that it drives in a simulation.
+
+Driven by a measured pressure, a stem obeys the transmitter's noise as well: it leaves at another time, and lands
+elsewhere. So a valve that is known exactly is off, and by as much as noise drawn once more moves it:
+
+    d = x(p + e) - x(p)      e white, of the standard deviation that the pressure shows at rest (`config.noise`)
+    typical = exp(median l_b of d)          over all draws; l_b as `block_errors` has it
+    mistimed^2 = mean d^2 - typical^2
+
+x is the valve as it was fitted first. What is typical is part of the floor; the rms may be more by what is mistimed.
+Noise that hangs together from sample to sample does not show at rest, nor is it told from what the supply does: then
+nothing is added.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from config.noise import position_noise_m
+from config.recording import Column
+from sim.composition import Composition
+from workbench.data.held_out import Part, PressureScatter, Split, residual_m
+from workbench.fit.fit_result import Fit
+from workbench.model.free_run import FreeRun
+from workbench.select.block_errors import block_logs, block_s
+
+DRAWS = 4
+
+
+def with_pressure_scatter(split: Split, fit: Fit) -> Split:
+    """Return a split whose floor holds what the noise of the measured pressure does to the stem of a fit.
+
+    As it is where the command drives that, or the noise of the position or of the pressure is unknown.
+    """
+    if split.floor_m is None or split.by_pressure or not fit.from_pressure:
+        return split
+    found = [_moved(part, fit, noise_pa) for part in (split.train, split.test) if (noise_pa := _noise_pa(part))]
+    if not found:
+        return split
+    noises_pa, logs, squares = zip(*found, strict=True)
+    typical_m = float(np.exp(np.median(np.concatenate(logs))))
+    mistimed_m = max(float(np.mean(np.concatenate(squares))) - typical_m**2, 0.0) ** 0.5
+    scatter = PressureScatter(max(noises_pa), typical_m, mistimed_m)
+    return replace(split, floor_m=float(np.hypot(split.floor_m, typical_m)), by_pressure=scatter)
+
+
+def _noise_pa(part: Part) -> float | None:
+    """Return the standard deviation of the measured pressure's noise, Pa; None where it does not tell."""
+    record = part.record
+    assert record.pressure_pa is not None
+    known_pa = (
+        record.pressure_pa
+        if record.pressure_known is None
+        else np.where(record.pressure_known, record.pressure_pa, np.nan)
+    )
+    return position_noise_m(known_pa, None if record.by_setpoint else record.command_pa)
+
+
+def _moved(part: Part, fit: Fit, noise_pa: float) -> tuple[float, Column, Column]:
+    """Return the noise, Pa, and of what it moves the stem by the log rms a block, and the squares, m^2; all draws."""
+    record, composition = part.record, Composition.from_file(fit.valve)
+    by = fit.by.of(record, fit.valve.valve)
+
+    def simulated_m(pressure_pa: Column) -> Column:
+        driven = replace(record, pressure_pa=pressure_pa)
+        return residual_m(part, FreeRun(composition, driven, from_pressure=True, by=by).position_m(composition.theta))
+
+    pressure_pa, generator = record.pressure_pa, np.random.default_rng(0)
+    assert pressure_pa is not None
+    bare_m = simulated_m(pressure_pa)
+    moved_m = [simulated_m(pressure_pa + generator.normal(0.0, noise_pa, len(record))) - bare_m for _ in range(DRAWS)]
+    logs = [block_logs(record.time_s, each, 0.0, block_s(part)) for each in moved_m]
+    squares = np.concatenate(moved_m) ** 2
+    return noise_pa, np.concatenate(logs), squares[np.isfinite(squares)]
