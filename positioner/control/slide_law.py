@@ -37,7 +37,7 @@ from math import isnan, nan
 
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_margins import NO_MARGINS, Margin
+from positioner.control.slide_margins import BESIDE, NO_MARGINS, Margin
 from positioner.control.slide_memory import (
     CREEP,
     DAY_S,
@@ -70,8 +70,8 @@ FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
 ROUNDED = 0.5
 """Quanta by which a position may be rounded."""
-SLOW = 2e-3
-"""Of the stroke between two samples: an excursion that creeps no faster has done its work."""
+SLOW, WHILE_S = 2e-3, 0.05
+"""Of the stroke: an excursion that will go no farther has done its work; in which time its speed is seen."""
 FAR = 2.0
 """Margins beyond which a stem that moves is sent the other way."""
 WITHIN_NOISE, WITHIN_QUANTUM = 2.5, 0.6
@@ -168,8 +168,8 @@ def step(
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
     if memory.excursion and observation.rest is None:
         memory = replace(memory, return_pa=_return_pa(memory, observation.position_m, balance, settings))
-    if memory.excursion:
-        memory = replace(memory, last_m=observation.position_m)
+    if memory.excursion and _seen_for_a_while(memory, observation):
+        memory = replace(memory, last_m=observation.position_m, last_s=observation.now_s)
     if observation.rest is None:
         return _waiting(_redirected(memory, observation, reference_m, balance, settings), observation, settings)
     if reference_m != memory.target_m:
@@ -195,15 +195,24 @@ def _asked_m(memory: SlideMemory, observation: StemObservation, settings: SlideS
 
 
 def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: float, settings: SlideSettings) -> bool:
-    """Whether the first of two slides has done its work: then the stem need not rest there."""
-    if not memory.excursion or isnan(memory.last_m):
+    """Whether the first of two slides has done its work: then the stem need not rest there.
+
+    What follows a slow pressure goes on, at a speed v, for about as long as it has taken until now: by v t.
+    """
+    if not memory.excursion or not _seen_for_a_while(memory, observation):
         return False
-    s, slow_m = memory.direction, SLOW * settings.stroke_m + observation.quantum_m
+    s, went_m = memory.direction, abs(observation.position_m - memory.last_m)
+    goes_on = (observation.now_s - memory.slide_s) / (observation.now_s - memory.last_s)
     beyond_m = min(s * (each - reference_m) for each in (observation.position_m, memory.last_m))
     return (
         beyond_m > _way_m(memory, memory.margins.of(-s, turning=True), settings)
-        and abs(observation.position_m - memory.last_m) < slow_m
+        and (went_m - observation.quantum_m) * goes_on < SLOW * settings.stroke_m
     )
+
+
+def _seen_for_a_while(memory: SlideMemory, observation: StemObservation) -> bool:
+    """Whether where the stem was is known from long enough ago to tell how fast it goes; by rounding, not quite."""
+    return observation.now_s - memory.last_s > (1.0 - 1e-6) * WHILE_S
 
 
 def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSettings) -> SlideMemory:
@@ -243,6 +252,8 @@ def _learnt(
     A stem that breaks loose lands where it is to. One that goes not half as far, and no farther than a packing gives
     way, did not. One that lands elsewhere, as behind a slow I/P, has slid, and its way says nothing of the margin. If
     that is not half as far, friction has grown: nor do the slides before it that held, by a balance that is no more.
+    What may be either, for it went elsewhere, is a slide where its way has been seen to break loose; of a stem that
+    turns round it was too short, for a soft packing gives way, where a longer one has landed.
     """
     s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
@@ -258,10 +269,14 @@ def _learnt(
     hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
     known = memory.learnt if slid and short else memory.margins
     margin = known.own(s, turning=turning)
+    if not slid and 0.0 < margin.seen_m <= way_m and s * (to_m - anchor.position_m) > GAVE_WAY * way_m:
+        return replace(memory, held=NONE_HELD, anchor=Anchor(to_m, s))
     if not slid:
         return _after_holding(replace(memory, anchor=anchor), s, way_m)
     if hit and anchor.direction:
         margin = margin.after_breaking(s * (to_m - anchor.position_m))
+    elif turning and not short and BESIDE * way_m < margin.seen_m:
+        margin = margin.after_holding(way_m)
     margins = known.replaced(s, margin, turning=turning)
     return replace(memory, margins=margins, held=NONE_HELD, anchor=Anchor(to_m, s))
 
@@ -462,7 +477,7 @@ def _excursion(
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     low_m, high_m = balance.stops_m
-    for direction, by_m in ways:
+    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m)):
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)
@@ -473,7 +488,7 @@ def _excursion(
         if 0.0 < settings.budget_m_per_s * DAY_S < spent_m and not left_away:
             why = InhibitReason.EXCURSION_BUDGET_SPENT
             continue
-        memory = replace(memory, excursion_s=now_s, spent_m=spent_m, last_m=observation.position_m)
+        memory = replace(memory, excursion_s=now_s, spent_m=spent_m, last_m=observation.position_m, last_s=now_s)
         memory = _slide(memory, now_s, by_m, direction, balance, settings, excursion=True)
         return replace(memory, return_pa=_return_pa(memory, memory.anchor.position_m, balance, settings))
     if why is InhibitReason.EXCURSION_BUDGET_SPENT:

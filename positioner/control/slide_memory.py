@@ -110,7 +110,9 @@ class SlideMemory:
     slide_s: float = -inf
     """... and when the last was."""
     last_m: float = nan
-    """The sample before."""
+    """Of the first of two, where the stem was a while before ..."""
+    last_s: float = -inf
+    """... and when."""
     margins: Margins = NO_MARGINS
     held: Held = NONE_HELD
     """Of the last slides, those that broke nothing loose."""

@@ -609,8 +609,9 @@ def test_one_that_goes_farther_than_a_packing_gives_way_broke_loose_and_those_be
     assert learnt.margins == known
 
 
-def test_one_that_goes_too_far_broke_loose_the_balance_is_at_fault() -> None:
-    assert after(0.058).margins.turning_down.held_m == 0.0
+def test_one_that_goes_on_too_far_broke_loose_the_balance_is_at_fault() -> None:
+    assert after(0.058, anchored=-1).margins.onward_down.held_m == 0.0
+    assert after(0.058, anchored=-1).anchor == Anchor(0.058, -1)
     assert after(0.058).anchor == Anchor(0.058, -1)
 
 
@@ -814,3 +815,62 @@ def test_no_excursion_goes_where_the_pressures_allowed_do_not_bring_it_back_from
     memory = SlideMemory(anchor=Anchor(target_m + 0.003, -1), margins=KNOWN, level_pa=5e3)
     after = rested(target_m + 0.003, memory, target_m)
     assert (after.level_pa, after.inhibit_reason) == (5e3, InhibitReason.LAW_BEYOND_LIMITS)
+
+
+def on_its_way(speed_m_per_s: float, since_s: float, period_s: float) -> SlideMemory:
+    """Return what the law does with the first of two slides, up and beyond its margin, that goes on at a speed."""
+    memory = SlideMemory(target_m=0.06, direction=1, excursion=True, aim_m=0.07, anchor=Anchor(0.0599, 1))
+    memory = replace(memory, margins=KNOWN, course=STOOD, slide_s=1.0 - since_s, last_s=1.0 - since_s, last_m=0.0599)
+    for k in range(round(0.1 / period_s) + 1):
+        at_s = 1.0 + k * period_s
+        memory = within(0.0665 + speed_m_per_s * k * period_s, at_s, False, memory)
+        if not memory.excursion:
+            break
+    return memory
+
+
+@pytest.mark.parametrize("period_s", [0.002, 0.05])
+def test_a_slide_that_a_slow_pressure_drives_on_is_not_sent_back_half_way(period_s: float) -> None:
+    """At 2 ms it went too little from sample to sample to be seen: so it was sent back from where it was not yet."""
+    assert on_its_way(0.01, 0.5, period_s).excursion
+    assert not on_its_way(0.0, 0.5, period_s).excursion
+
+
+def test_an_excursion_goes_by_the_shorter_way_round() -> None:
+    """By its side it would have to go on by 1 % of the stroke; round the other it turns, by half of that."""
+    margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
+    after = rested(0.0595, SlideMemory(anchor=Anchor(0.0595, 1), margins=margins))
+    assert (after.excursion, after.direction) == (True, -1)
+    assert after.level_pa == pytest.approx(BALANCE.pressure_pa(0.06 - 0.0055, -1))
+    even = replace(margins, onward_up=Margin(0.0049, 0.005))
+    assert rested(0.0595, SlideMemory(anchor=Anchor(0.0595, 1), margins=even)).direction == 1
+
+
+def test_a_slide_that_stuck_short_behind_a_slow_pressure_is_none_that_held() -> None:
+    """It went three quarters of a way that breaks loose: what makes it no landing makes it no stem that was held."""
+    known = Margins(*(4 * [Margin(broke_m=0.0045)]))
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.0655, 1), margins=known)
+    came = SlideOutcome(1.0, -1, 0.0655, 27e3, 0.0614, 1e-6, moved=False, landing=False)
+    after = step(memory, StemObservation(1.0, 0.0614, False, None, 0.0, came), 0.06, BALANCE, SETTINGS)
+    assert after is memory, "an unusable sample teaches nothing"
+    after = step(memory, StemObservation(1.0, 0.0614, True, None, 0.0, came), 0.06, BALANCE, SETTINGS)
+    assert after.margins == known
+    assert after.anchor == Anchor(0.0614, -1)
+
+
+def test_a_packing_that_gives_way_farther_than_a_short_way_makes_that_no_margin() -> None:
+    """Turning round by 0.8 % a soft packing gave way by 1.2 %: so short a way lands nowhere, and was tried for ever."""
+    known = Margins(*(4 * [Margin(broke_m=0.0095)]))
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.068, 1), margins=known)
+    came = SlideOutcome(1.0, -1, 0.068, 27e3, 0.0573, 1e-6, moved=True, landing=True)
+    after = step(memory, StemObservation(1.0, 0.0573, True, None, 0.0, came), 0.06, BALANCE, SETTINGS)
+    assert after.margins.turning_down.held_m == pytest.approx(0.008)
+    assert after.margins.turning_down.broke_m == 0.0095
+    onward = step(
+        replace(memory, anchor=Anchor(0.068, -1)),
+        StemObservation(1.0, 0.0573, True, None, 0.0, came),
+        0.06,
+        BALANCE,
+        SETTINGS,
+    )
+    assert onward.margins == known
