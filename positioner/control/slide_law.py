@@ -13,10 +13,11 @@ With the stem at rest at x, e = r - x and s = sign(e):
                                                   M = max(1.02 m_-s, m_s - abs(e))
 
 The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
-farther than m_-s beyond r and slow, it need not rest. An excursion goes the other way round, by r - s M with
-M = max(1.02 m_s, m_-s + abs(e)), where one of the two would leave the travel or the pressure limits. To 1.02 m comes
-what sensor and device round: a first slide that fell so much short would leave no way back. Only resting times depend
-on the period of the loop, not where the stem lands.
+farther than m_-s beyond r and will go no farther, it need not rest. An excursion goes the other way round, by r - s M
+with M = max(1.02 m_s, m_-s + abs(e)), where that is shorter, for the margins of turning and of going on differ, or
+where one of the two would leave the travel or the pressure limits. To 1.02 m comes what sensor and device round: a
+first slide that fell so much short would leave no way back. Only resting times depend on the period of the loop, not
+where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. A
 stem that does not come to rest, off its reference, is not moved, and that is said.
