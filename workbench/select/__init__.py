@@ -6,6 +6,7 @@ Its files:
     forward_selection, candidate_table            shared with the balance of forces; what was tried, shown
     effect_acceptance, block_errors               the rule by which an effect is accepted; its statistics
     pressure_errors                               how far a fit's pressure is off the measured one
+    pressure_scatter                              what the noise of a measured pressure moves a stem by: of the floor
     knife_edges                                   held-out slips that are narrowly mistimed, by name
     equivalence                                   what no recording tells apart
     tangent_preview                               the quick first ranking
