@@ -71,7 +71,7 @@ FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
 ROUNDED = 0.5
 """Quanta by which a position may be rounded."""
-SLOW, WHILE_S = 2e-3, 0.05
+SLOW, WHILE_S = 2e-3, 0.02
 """Of the stroke: an excursion that will go no farther has done its work; in which time its speed is seen."""
 FAR = 2.0
 """Margins beyond which a stem that moves is sent the other way."""
