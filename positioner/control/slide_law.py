@@ -270,16 +270,16 @@ def _learnt(
     hit = slid and missed_m <= max(MISSED * way_m, unsure_m)
     known = memory.learnt if slid and short else memory.margins
     margin = known.own(s, turning=turning)
-    if not slid and 0.0 < margin.seen_m <= way_m and s * (to_m - anchor.position_m) > GAVE_WAY * way_m:
-        return replace(memory, held=NONE_HELD, anchor=Anchor(to_m, s))
+    landed, went_m = replace(memory, held=NONE_HELD, anchor=Anchor(to_m, s)), s * (to_m - anchor.position_m)
+    if not slid and 0.0 < margin.seen_m <= way_m and went_m > GAVE_WAY * way_m:
+        return landed
     if not slid:
         return _after_holding(replace(memory, anchor=anchor), s, way_m)
     if hit and anchor.direction:
-        margin = margin.after_breaking(s * (to_m - anchor.position_m))
+        margin = margin.after_breaking(went_m)
     elif turning and not short and BESIDE * way_m < margin.seen_m:
         margin = margin.after_holding(way_m)
-    margins = known.replaced(s, margin, turning=turning)
-    return replace(memory, margins=margins, held=NONE_HELD, anchor=Anchor(to_m, s))
+    return replace(landed, margins=known.replaced(s, margin, turning=turning))
 
 
 def _after_holding(memory: SlideMemory, direction: int, way_m: float) -> SlideMemory:

@@ -88,6 +88,13 @@ class Record(Brief):
     """How much the stem moves before its command: their clocks differ, and no verdict may rest on it."""
 
     @property
+    def measured_pa(self) -> Column | None:
+        """The measured pressure, Pa, (n,), NaN where it was not measured; None: nowhere."""
+        if self.pressure_pa is None or self.pressure_known is None:
+            return self.pressure_pa
+        return np.where(self.pressure_known, self.pressure_pa, np.nan)
+
+    @property
     def floor_m(self) -> float | None:
         """The error that no model undercuts; None: unknown."""
         known = [each for each in (self.noise_m, self.repeatability_m) if each is not None]

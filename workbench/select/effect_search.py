@@ -127,8 +127,9 @@ class EffectSearch:
             profile=False,
             progress=lambda done: self._progress("fitting the valve as it is", done),
         )
+        if self._by is None:
+            self._split = with_pressure_scatter(self._split, found)
         self._by = found.by
-        self._split = with_pressure_scatter(self._split, found)
         return self._evaluated(found)
 
     @property

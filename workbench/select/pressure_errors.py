@@ -64,9 +64,9 @@ def _structured_pa(errors_pa: Sequence[Column]) -> float:
 
 def _measured_pa(part: Part) -> Column:
     """Return the measured pressure, Pa, (n,), NaN where it does not count, or none was measured."""
-    assert part.record.pressure_pa is not None
-    assert part.record.pressure_known is not None
-    return np.where(part.counted & part.record.pressure_known, part.record.pressure_pa, np.nan)
+    measured_pa = part.record.measured_pa
+    assert measured_pa is not None
+    return np.where(part.counted, measured_pa, np.nan)
 
 
 def _error_pa(fit: Fit, part: Part) -> Column:

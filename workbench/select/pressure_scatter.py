@@ -18,13 +18,12 @@ import numpy as np
 
 from config.noise import position_noise_m
 from config.recording import Column
-from sim.composition import Composition
 from workbench.data.held_out import Part, PressureScatter, Split, residual_m
 from workbench.fit.fit_result import Fit
-from workbench.model.free_run import FreeRun
 from workbench.select.block_errors import block_logs, block_s
 
 DRAWS = 4
+"""Of the noise, for each part."""
 
 
 def with_pressure_scatter(split: Split, fit: Fit) -> Split:
@@ -47,28 +46,20 @@ def with_pressure_scatter(split: Split, fit: Fit) -> Split:
 def _noise_pa(part: Part) -> float | None:
     """Return the standard deviation of the measured pressure's noise, Pa; None where it does not tell."""
     record = part.record
-    assert record.pressure_pa is not None
-    known_pa = (
-        record.pressure_pa
-        if record.pressure_known is None
-        else np.where(record.pressure_known, record.pressure_pa, np.nan)
-    )
-    return position_noise_m(known_pa, None if record.by_setpoint else record.command_pa)
+    assert record.measured_pa is not None
+    return position_noise_m(record.measured_pa, None if record.by_setpoint else record.command_pa)
 
 
 def _moved(part: Part, fit: Fit, noise_pa: float) -> tuple[float, Column, Column]:
     """Return the noise, Pa, and of what it moves the stem by the log rms a block, and the squares, m^2; all draws."""
-    record, composition = part.record, Composition.from_file(fit.valve)
-    by = fit.by.of(record, fit.valve.valve)
+    record, generator = part.record, np.random.default_rng(0)
 
-    def simulated_m(pressure_pa: Column) -> Column:
-        driven = replace(record, pressure_pa=pressure_pa)
-        return residual_m(part, FreeRun(composition, driven, from_pressure=True, by=by).position_m(composition.theta))
+    def simulated_m(noise_pa: Column | float) -> Column:
+        assert record.pressure_pa is not None
+        return residual_m(part, fit.indicated_m(replace(record, pressure_pa=record.pressure_pa + noise_pa)))
 
-    pressure_pa, generator = record.pressure_pa, np.random.default_rng(0)
-    assert pressure_pa is not None
-    bare_m = simulated_m(pressure_pa)
-    moved_m = [simulated_m(pressure_pa + generator.normal(0.0, noise_pa, len(record))) - bare_m for _ in range(DRAWS)]
+    bare_m = simulated_m(0.0)
+    moved_m = [simulated_m(generator.normal(0.0, noise_pa, len(record))) - bare_m for _ in range(DRAWS)]
     logs = [block_logs(record.time_s, each, 0.0, block_s(part)) for each in moved_m]
     squares = np.concatenate(moved_m) ** 2
     return noise_pa, np.concatenate(logs), squares[np.isfinite(squares)]
