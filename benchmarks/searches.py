@@ -13,8 +13,10 @@ A line of JSON is kept a search, so that a campaign can be broken off and taken 
     python -m benchmarks.searches --effects backlash --kind poor
     python -m benchmarks.searches --table                        runs nothing, prints what is there
 
-The figures are the share of searches that found the least; of those that did not and were trusted; and of cases whose
-best search misses the cost of the true parameters by more than 1 %.
+    python -m benchmarks.searches --cases 22 --searches 1 --kind full poor --first-seed SEED     1012 cases: an hour
+
+The figures are the share of searches that found the least; how many did not, and of those how many were trusted; and
+how many come to more than 1 % above the cost of the true parameters, of which at most one in a thousand is allowed.
 """
 
 import argparse
@@ -48,8 +50,9 @@ AFTER_LAST_S = 0.5
 """What is kept after the last slip of a poor record."""
 DISTURBED = 1e-12
 WITHIN = 1.01
+TARGET = 0.999
 STARTS = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
-HEAD = f"  {'':<22}{'cases':>6}{'searches':>9}{'found':>8}{'wrong':>6}{'trusted wrong':>14}{'off truth':>10}{'s':>6}"
+HEAD = f"  {'':<22}{'cases':>6}{'searches':>9}{'found':>8}{'wrong':>6}{'trusted wrong':>14}{'above truth':>12}{'s':>6}"
 FILE = Path("build/searches.jsonl")
 
 
@@ -68,12 +71,12 @@ class Task(NamedTuple):
     number: int
 
 
-def cases(effects: Sequence[str], cases_each: int, kinds: Sequence[Kind]) -> list[Case]:
-    """Return the first seeds with which the generator draws each effect."""
+def cases(effects: Sequence[str], cases_each: int, kinds: Sequence[Kind], first_seed: int) -> list[Case]:
+    """Return the first seeds from one on with which the generator draws each effect."""
     return [
         Case(effect, seed, kind)
         for effect in effects
-        for seed in islice((seed for seed in count(FIRST_SEED) if drawn(seed) == effect), cases_each)
+        for seed in islice((seed for seed in count(first_seed) if drawn(seed) == effect), cases_each)
         for kind in kinds
     ]
 
@@ -160,6 +163,9 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
             if own:
                 yield _row(effect, own)
         yield _row("all", chosen)
+    if lines:
+        within = sum(each["cost"] <= WITHIN * each["true_cost"] for each in lines)
+        yield f"{within} of {len(lines)} searches within 1 % of the cost of the true parameters; target {TARGET:.1%}"
 
 
 def _row(name: str, lines: Sequence[Line]) -> str:
@@ -167,12 +173,10 @@ def _row(name: str, lines: Sequence[Line]) -> str:
     best = {case: min(each["cost"] for each in own) for case, own in by_case.items()}
     wrong = [each for each in lines if each["cost"] > WITHIN * best[_case(each)]]
     trusted = sum(each["trusted"] for each in wrong)
-    off = sum(best[case] > WITHIN * own[0]["true_cost"] for case, own in by_case.items())
+    above = sum(each["cost"] > WITHIN * each["true_cost"] for each in lines)
     found = 1.0 - len(wrong) / len(lines)
-    seconds = float(np.mean([each["seconds"] for each in lines]))
-    return (
-        f"  {name:<22}{len(by_case):>6}{len(lines):>9}{found:>8.1%}{len(wrong):>6}{trusted:>14}{off:>10}{seconds:>6.1f}"
-    )
+    counts = f"{len(by_case):>6}{len(lines):>9}{found:>8.1%}{len(wrong):>6}{trusted:>14}{above:>12}"
+    return f"  {name:<22}{counts}{float(np.mean([each['seconds'] for each in lines])):>6.1f}"
 
 
 def _case(line: Line) -> tuple[str, int, str]:
@@ -192,13 +196,16 @@ def main() -> None:
     parser.add_argument("--kind", nargs="*", choices=get_args(Kind), default=["full"])
     parser.add_argument("--cases", type=int, default=1, help="of each effect (1)")
     parser.add_argument("--searches", type=int, default=10, help="of each case (10)")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"of the generator ({FIRST_SEED})")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (one a core)")
     parser.add_argument("--out", type=Path, default=FILE, help=f"where a line a search is kept ({FILE})")
     parser.add_argument("--table", action="store_true", help="run nothing, print the table")
     arguments = parser.parse_args()
     lines = kept(arguments.out)
     there = {(*_case(each), each["number"]) for each in lines}
-    posed_cases = [] if arguments.table else cases(arguments.effects, arguments.cases, arguments.kind)
+    posed_cases = (
+        [] if arguments.table else cases(arguments.effects, arguments.cases, arguments.kind, arguments.first_seed)
+    )
     tasks = [Task(case, number) for case in posed_cases for number in range(arguments.searches)]
     todo = [each for each in tasks if (*each.case, each.number) not in there]
     lines += run(arguments.out, searched, [(each,) for each in todo], arguments.workers)

@@ -115,17 +115,21 @@ def _state_size(effects: Sequence[Effect]) -> int:
 
 
 def _of(
-    effects: Sequence[Effect], files: Sequence[Path], entries: Mapping[str, tuple[int, ...]]
+    effects: Sequence[Effect], files: tuple[Path, ...], entries: Mapping[str, tuple[int, ...]]
 ) -> tuple[str, bytes, dict[str, Any]]:
     """Return the digest, the bitcode and the entries, by name, of the kernel of these laws and effects.
 
     The compiled entries are kept by the texts, for an effect that was edited is another one.
     """
-    texts = [KARNOPP_IMPORT.sub("", each.read_text(encoding="utf-8")) for each in files]
-    laws = _with_head("\n".join(texts))
     parts = tuple((each.path, each.source, _text(each)) for each in effects)
     filled = tuple((place, tuple(each)) for place, each in fillings(effects).items())
-    return _compiled(laws, parts, filled, tuple(entries.items()))
+    return _compiled(_text_of_laws(files), parts, filled, tuple(entries.items()))
+
+
+@cache
+def _text_of_laws(files: tuple[Path, ...]) -> str:
+    texts = [KARNOPP_IMPORT.sub("", each.read_text(encoding="utf-8")) for each in files]
+    return _with_head("\n".join(texts))
 
 
 @cache
@@ -261,15 +265,16 @@ def _text(effect: Effect) -> str:
 
 def _with_head(text: str) -> str:
     """Return a text after a line of what compiles it."""
-    return f"# numba {version('numba')}, {_compilers()}\n{text}\n"
+    return f"# {_compilers()}\n{text}\n"
 
 
 @cache
-def _compilers() -> dict[str, str]:
-    """Return the digests of the files that compile, and of the elements that effects share."""
+def _compilers() -> str:
+    """Return numba's version and the digests of the files that compile, and of the elements that effects share."""
     modules = (kernel_linker, machine_code, *SHARED)
     files = (__file__, str(COMPILER), *(str(each.__file__) for each in modules))
-    return {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
+    digests = {Path(each).name: hashlib.sha256(Path(each).read_bytes()).hexdigest() for each in files}
+    return f"numba {version('numba')}, {digests}"
 
 
 def _digest(text: str) -> str:

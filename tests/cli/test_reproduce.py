@@ -148,6 +148,7 @@ def test_the_worst_reading_of_a_single_friction_value_is_no_better_than_the_last
     assert seed.last_error_pu == pytest.approx(abs(slow.k_over_c.last) * 1423.4 / (52538 * STROKE_M))
 
 
+@pytest.mark.long
 def test_command_writes_figures_and_numbers_and_says_what_does_not_hold(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -98,6 +98,7 @@ def besieged(port: int, clients: int) -> Iterator[None]:
             each.join(10.0)
 
 
+@pytest.mark.long
 def test_the_dcs_is_served_and_memory_is_bounded_whoever_else_comes(tmp_path: Path) -> None:
     with ExitStack() as stack:
         slave = stack.enter_context(running("sim", slave_file(tmp_path), "--port", "0"))

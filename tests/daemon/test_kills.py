@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.kills import KEPT, Counts, Seen, Site, kill_daemon, kill_dcs, kill_device, kill_refiner
 
-pytestmark = pytest.mark.patient
+pytestmark = [pytest.mark.patient, pytest.mark.long]
 
 
 def test_whoever_is_killed_nothing_kept_is_lost_and_nothing_moves(tmp_path: Path) -> None:

@@ -162,6 +162,7 @@ def export_of(case: Path, path: Path) -> None:
     path.write_text("\n".join(";".join(each) for each in [["Zeit", "Hub", "Stellsignal [Pa]"], *told]))
 
 
+@pytest.mark.long
 def test_another_tab_sees_none_of_it_and_a_bad_file_is_told(address: str, case: Path, tmp_path: Path) -> None:
     rubbish = tmp_path / "rubbish.csv"
     rubbish.write_bytes(b"\x00\x01 no recording")

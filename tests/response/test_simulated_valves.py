@@ -68,6 +68,7 @@ def test_without_small_steps_it_is_told_so() -> None:
         assert figure.reason.startswith("this recording does not hold a series of small steps")
 
 
+@pytest.mark.long
 def test_a_played_run_is_cut_at_its_excitation_and_named_step_by_step(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -101,6 +101,7 @@ def test_a_recording_that_takes_too_long_is_listed_and_tried_again(
 
 
 @pytest.mark.patient
+@pytest.mark.long
 def test_a_killed_worker_and_then_a_killed_client_lose_nothing(site: Path, tmp_path: Path, without_dask: None) -> None:
     out = tmp_path / "out"
     small = Path(shutil.copy(site.with_name("small.csv"), site.with_name("killed.csv")))

@@ -59,9 +59,12 @@ UNITS_PA = {"bar": 1e5, "psi": 6894.757, "kPa": 1e3, "mbar": 1e2}
 Mask = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Record(Brief):
-    """n samples ready for simulation; `segments` are half-open ranges of rows, the others are not simulated."""
+    """n samples ready for simulation; `segments` are half-open ranges of rows, the others are not simulated.
+
+    It equals nothing but itself.
+    """
 
     time_s: Column
     command_pa: Column

@@ -22,6 +22,7 @@ An indicated position is taken back through the sensor's effects, which see a sl
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +62,8 @@ CONTRADICTED_N = 20.0
 """Distance of static friction from a break-away's interval at which the contradiction counts half."""
 FEWEST = 4
 NOT_IN_LANDINGS = (VISCOUS, STATIC)
+RECORDS = 4
+"""Whose rests are kept: every effect that is fitted to a record asks for them."""
 
 
 class Rest(NamedTuple):
@@ -115,8 +118,9 @@ class Loaded:
         return replace(self, landings=landings)
 
 
+@lru_cache(maxsize=RECORDS)
 def rests(record: Record) -> tuple[Rest, ...]:
-    """Return the rests of a record, in order."""
+    """Return the rests of a record, in order; of the last few records they are kept."""
     return tuple(
         rest
         for first, end in record.segments
