@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from sim.composition import Composition
 from sim.karnopp import Vector
-from workbench.fit.agreement import Place, agreeing
+from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
@@ -23,6 +23,11 @@ from workbench.model.parameters import Parameter
 
 LEAVES = 0.6
 """Cost a sample above which a fit leaves something to explain; that of white residuals of the noise is 0.485."""
+
+STIRRED = 100
+"""Places about an end from which a search goes on,"""
+LIKELY = 1.5
+"""and times the least cost up to which an end is gone on from beside the best."""
 
 Progress = Callable[[float], None]
 T = TypeVar("T")
@@ -135,9 +140,27 @@ class BegunFit:
             here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
         here = here.shot()
         best = here.ends[0].z
-        if here._rounds(best) and here._shows(best):
-            here = replace(here, ends=proved(here.error, here.ends))
+        if here._shows(best):
+            here = replace(here, ends=proved(here.error, here.ends)) if here._rounds(best) else here.stirred()
         return here.judged(profile=profile)
+
+    def stirred(self) -> "BegunFit":
+        """Go on from the lowest of the places strewn about the best end; where that leads lower, about others too.
+
+        The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them.
+        """
+
+        def stirred(end: Place) -> Place:
+            near = strewn(self.error, end.z, STIRRED)
+            return end if near is end.z else replace(end, z=settled(self.error, near, self.effort.improves_below))
+
+        best, *others = self.ends
+        here = replace(self, ends=self._ordered([stirred(best), *others]))
+        if self.cost <= WITHIN * here.cost:
+            return here
+        likely = min(sum(self.error.cost(end.z) <= LIKELY * here.cost for end in others), self.effort.agreeing)
+        found = _each(stirred, others[:likely], self.workers, lambda _: None)
+        return replace(self, ends=self._ordered([stirred(best), *found, *others[likely:]]))
 
     def shot(self) -> "BegunFit":
         """Search from starts by multiple shooting too, where the best end leaves something to explain."""
