@@ -38,6 +38,7 @@ from sim.effect import first_effects
 from workbench.blind.hiding import drawn_effects, hide
 from workbench.data.motion import slips
 from workbench.data.record import ready
+from workbench.data.stretches import informative
 from workbench.fit.fitting import fit
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
@@ -144,9 +145,9 @@ def searched(task: Task) -> Line:
 
 
 def true_cost(recording: Recording, truth: ValveFile) -> float:
-    """Return the cost of the true parameters."""
+    """Return the cost of the true parameters, over what of the recording is fitted."""
     composition = Composition.from_file(truth)
-    error = SimulationError(FreeRun(composition, ready(recording)), composition, (), composition.theta)
+    error = SimulationError(FreeRun(composition, ready(informative(recording))), composition, (), composition.theta)
     return error.cost(np.zeros(0))
 
 

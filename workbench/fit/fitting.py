@@ -213,6 +213,7 @@ def _error(
     from_pressure: bool,
     by: Sampling,
     scale: ValveParameters | None = None,
+    known: ValveParameters | None = None,
 ) -> SimulationError:
     run = FreeRun(composition, record, from_pressure=from_pressure, by=by)
     reached = [
@@ -225,7 +226,7 @@ def _error(
     of_base = list(FREE_BY_SETPOINT if record.by_setpoint and not from_pressure else FREE[by.motion])
     if composition.theta[SPRING] == 0.0 and BASE[SPRING] in of_base:
         of_base.remove(BASE[SPRING])
-    parameters = free_parameters(composition, [*of_base, *reached] if free is None else free, scale)
+    parameters = free_parameters(composition, [*of_base, *reached] if free is None else free, scale, known)
     return SimulationError(run, composition, parameters, composition.theta)
 
 
@@ -295,7 +296,7 @@ def _begun(
     """Search with effects added to a base fit, as far as through the wide scale."""
     composition = _extended(base.valve, effects, valve.valve)
     _require_shown(composition.effects[len(base.valve.effect) :], base.by)
-    error = _error(composition, record, free, base.from_pressure, base.by, _scale(base, valve.valve))
+    error = _error(composition, record, free, base.from_pressure, base.by, _scale(base, valve.valve), valve.valve)
     names = {each.name for each in find_effects(effects, "effects")}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]

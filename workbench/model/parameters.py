@@ -23,7 +23,7 @@ DEFAULT = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
 AT_REST, LANDED = ("spring_n_per_m", "coulomb_n", "static_n"), ("spring_n_per_m", "coulomb_n")
 """The same where the stem has no inertia, and where only its landings are judged."""
 FACTOR = 50.0
-"""A base parameter is sought within this factor of the valve file's."""
+"""A base parameter is sought within this factor of the valve file's, and of where it was fitted without an effect."""
 MOST_STATIC = 5.0
 """F_s / F_c at most."""
 MOST_GRID = 48
@@ -77,7 +77,10 @@ class Parameter:
 
 
 def free_parameters(
-    composition: Composition, free: Sequence[str], scale: ValveParameters | None = None
+    composition: Composition,
+    free: Sequence[str],
+    scale: ValveParameters | None = None,
+    known: ValveParameters | None = None,
 ) -> tuple[Parameter, ...]:
     """Return the named parameters, Coulomb before static friction.
 
@@ -85,6 +88,8 @@ def free_parameters(
         composition: the valve.
         free: names.
         scale: of what the effects' starts are in units, by default the composition's valve.
+        known: the valve file's, by default the composition's valve. What was fitted without an effect may be far from
+            what it is beside it: base parameters are sought about both.
 
     Raises:
         InputError: an unknown name, the area, or a stem without Coulomb friction.
@@ -97,11 +102,11 @@ def free_parameters(
             raise InputError(
                 composition.source, "free: diaphragm_area_m2 cannot be fitted: only ratios of forces are in a recording"
             )
-    unit = scale or composition.valve
-    return tuple(_parameter(composition, names.index(name), unit) for name in names if name in free)
+    unit, known = scale or composition.valve, known or composition.valve
+    return tuple(_parameter(composition, names.index(name), unit, known) for name in names if name in free)
 
 
-def _parameter(composition: Composition, index: int, scale: ValveParameters) -> Parameter:
+def _parameter(composition: Composition, index: int, scale: ValveParameters, known: ValveParameters) -> Parameter:
     name = composition.names[index]
     if index == STATIC:
         return Parameter(name, index, 1.0, MOST_STATIC)
@@ -110,7 +115,8 @@ def _parameter(composition: Composition, index: int, scale: ValveParameters) -> 
         if value == 0.0:
             problem = f"{name} is 0 on a drive without spring: it must be more than 0 for a fit to begin from"
             raise InputError(composition.source, problem)
-        return Parameter(name, index, value / FACTOR, value * FACTOR)
+        about = value, getattr(known, name) or value
+        return Parameter(name, index, min(about) / FACTOR, max(about) * FACTOR)
     effect, _, key = name.partition(".")
     declared = next(each for each in composition.effects if each.name == effect).parameters[key]
     starts = declared.starts_for(scale)
