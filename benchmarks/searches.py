@@ -132,7 +132,7 @@ def searched(task: Task) -> Line:
         "number": task.number,
         "cost": found.cost,
         "rms_m": found.rms_m,
-        "true_cost": true_cost(recording, truth),
+        "true_cost": true_cost(stirred, truth),
         "base_cost": base.cost,
         "count": found.count,
         "trusted": found.trusted,
