@@ -91,9 +91,10 @@ class BlockErrors(Brief):
 
     def rms_floors(self, floor_m: float) -> float:
         """Return the rms, fitted or held out, whichever is more, over what it is at the floor."""
-        return max(self.train_rmse_m, self.test_rest_rmse_m) / self._rms_floor_m(floor_m)
+        return max(self.train_rmse_m, self.test_rest_rmse_m) / self.rms_floor_m(floor_m)
 
-    def _rms_floor_m(self, floor_m: float) -> float:
+    def rms_floor_m(self, floor_m: float) -> float:
+        """Return what the rms is at the floor, m: behind a measured pressure its noise mistimes a few slips."""
         return float(np.hypot(floor_m, self.mistimed_m))
 
     def floors_left(self, floor_m: float) -> float:
@@ -102,7 +103,7 @@ class BlockErrors(Brief):
 
     def leaves_nothing(self, floor_m: float | None) -> bool:
         """Whether what is left of a record that is explained is the floor, so that another effect has no room in it."""
-        if floor_m is None or self.train_rmse_m > NOTHING_LEFT * self._rms_floor_m(floor_m):
+        if floor_m is None or self.train_rmse_m > NOTHING_LEFT * self.rms_floor_m(floor_m):
             return False
         return max(self.train_block_m, self.test_block_m) <= NOTHING_LEFT * floor_m
 
@@ -146,7 +147,7 @@ def block_errors(fit: Fit, split: Split) -> BlockErrors:
         return found
     if found.floors_left(floor_m) > NOTHING_LEFT:
         found = replace(found, rests=rest_errors(split, fitted_m, held_out_m))
-    if test_rmse_m <= NOISE_KNOWN_TO * floor_m:
+    if test_rmse_m <= NOISE_KNOWN_TO * found.rms_floor_m(floor_m):
         return found
     edges = knife_edges(fit.valve, train, test, held_out_m, floor_m, from_pressure=fit.from_pressure)
     if not edges:
