@@ -1,12 +1,14 @@
-"""The last of a search where a sensor rounds: places strewn about its end, gone over to whichever is lower.
+"""The last of a search: places strewn about its end, gone over to whichever is lower.
 
     z' = z + 10^u s w      u uniform in -1.5 to 1.5, s deviations by `uncertainty.deviations`, w standard normal, each
                            coordinate its own; in every other static friction moves by 10^t w more, t in -4 to -1.7
+    z' = z + 10^u V S w    every third: S deviations along the axes V of the valley, whose floor all coordinates follow
 
 Static friction shows in the instants of break-aways alone: its derivative says nothing.
 
-The stairs of a rounded record run across all coordinates at once: a scan of each alone ends on one, as does a descent.
-Searches of several origins may end on the same one. So before they are believed, more places are strewn about the best.
+The stairs of a record run across all coordinates at once: a scan of each alone ends on one, as does a descent. Where a
+sensor rounds, searches of several origins may end on the same one: before they are believed, more places are strewn
+about the best.
 """
 
 from collections.abc import Sequence
@@ -18,7 +20,7 @@ from sim.composition import STATIC
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place
 from workbench.fit.objective import SimulationError
-from workbench.fit.uncertainty import deviations
+from workbench.fit.uncertainty import along_axes, of_coordinates
 
 STREWN, PROVING = 400, 1200
 """Places about each end, and about the best of all."""
@@ -26,18 +28,22 @@ NEAREST, FARTHEST = -1.5, 1.5
 """Of the decimal logarithm of the distance, in deviations."""
 SURE, UNSURE = 1e-5, 3e-3
 """Least and most of a deviation, of a log-parameter: on stairs the derivatives may say anything."""
+UNSURE_ALONG = 3e-2
+"""The same along an axis, where a step is right for all coordinates or for none."""
 STATIC_NEAREST, STATIC_FARTHEST = -4.0, -1.7
 
 
 def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
     """Return the lowest of so many places about z, which itself decides what is drawn: no two ends draw the same."""
     generator = np.random.default_rng(z.view(np.uint32))
-    deviation = np.clip(deviations(error, z), SURE, UNSURE)
+    along, axes = along_axes(error, z)
+    deviation, along = np.clip(of_coordinates(along, axes), SURE, UNSURE), np.clip(along, SURE, UNSURE_ALONG)
     static = np.array([each.index == STATIC for each in error.parameters] or np.zeros(z.size), np.float64)
     for i in range(count):
-        away = 10.0 ** generator.uniform(NEAREST, FARTHEST) * deviation
+        far = 10.0 ** generator.uniform(NEAREST, FARTHEST)
         stair = 10.0 ** generator.uniform(STATIC_NEAREST, STATIC_FARTHEST) * static
-        way = (away + i % 2 * stair) * generator.standard_normal(z.size)
+        w = generator.standard_normal(z.size)
+        way = far * axes @ (along * w) if i % 3 == 2 else (far * deviation + i % 2 * stair) * w
         z = error.least((z, np.clip(z + way, error.lower, error.upper)))
     return z
 

@@ -149,8 +149,18 @@ def information(error: SimulationError, z: Vector) -> tuple[Vector, NDArray[np.f
 
 def deviations(error: SimulationError, z: Vector) -> Vector:
     """Return s at z, (parameters,): s_i^2 = sum_k kappa v_ki^2 / lambda_k."""
+    return of_coordinates(*along_axes(error, z))
+
+
+def along_axes(error: SimulationError, z: Vector) -> tuple[Vector, NDArray[np.float64]]:
+    """Return the deviations sqrt(kappa / lambda_k) at z along the eigenvectors v_k, (n,), and these, by columns."""
     values, vectors, kappa = information(error, z)
-    return np.asarray(np.sqrt(vectors**2 @ _variances(values, kappa)))
+    return np.sqrt(_variances(values, kappa)), vectors
+
+
+def of_coordinates(along: Vector, vectors: NDArray[np.float64]) -> Vector:
+    """Return the deviations of the coordinates, (n,), of those along the eigenvectors."""
+    return np.asarray(np.sqrt(vectors**2 @ along**2))
 
 
 def _variances(values: Vector, kappa: float) -> Vector:
