@@ -17,7 +17,7 @@ from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
 from workbench.fit.starts import moved_starts
-from workbench.fit.strewing import proved, strewn
+from workbench.fit.strewing import broken_loose, proved, strewn
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import Parameter
 
@@ -151,7 +151,7 @@ class BegunFit:
         """
 
         def stirred(end: Place) -> Place:
-            near = strewn(self.error, end.z, STIRRED)
+            near = strewn(self.error, broken_loose(self.error, end.z), STIRRED)
             return end if near is end.z else replace(end, z=settled(self.error, near, self.effort.improves_below))
 
         best, *others = self.ends

@@ -19,6 +19,7 @@ import numpy as np
 from sim.composition import STATIC
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place
+from workbench.fit.descent import scanned
 from workbench.fit.objective import SimulationError
 from workbench.fit.uncertainty import along_axes, of_coordinates
 
@@ -31,6 +32,15 @@ SURE, UNSURE = 1e-5, 3e-3
 UNSURE_ALONG = 3e-2
 """The same along an axis, where a step is right for all coordinates or for none."""
 STATIC_NEAREST, STATIC_FARTHEST = -4.0, -1.7
+
+TREADS = np.geomspace(1e-4, 0.15, 150)
+"""Distances at which static friction is tried: each 5 % farther than the last."""
+
+
+def broken_loose(error: SimulationError, z: Vector) -> Vector:
+    """Return z with static friction on the lowest of the stairs about it: of some the treads are very narrow."""
+    static = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
+    return scanned(error, z, static[0], TREADS) if static else z
 
 
 def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
