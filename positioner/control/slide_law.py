@@ -217,10 +217,17 @@ def _seen_for_a_while(memory: SlideMemory, observation: StemObservation) -> bool
 
 
 def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSettings) -> SlideMemory:
-    """Return the memory of the first of two slides where it is sent back: it has slid, though no rest will say so."""
+    """Return the memory of the first of two slides where it is sent back: no rest will say so, but it has slid."""
     s, from_m = memory.direction, memory.anchor.position_m
-    slid = s * (position_m - from_m) > min(CREEP * settings.stroke_m, GAVE_WAY * s * (memory.aim_m - from_m))
-    return replace(memory, held=NONE_HELD if slid else memory.held, anchor=Anchor(position_m, s))
+    way_m, went_m = s * (memory.aim_m - from_m), s * (position_m - from_m)
+    sent_back = replace(memory, anchor=Anchor(position_m, s))
+    if not went_m > min(CREEP * settings.stroke_m, GAVE_WAY * way_m):
+        return sent_back
+    if not memory.anchor.direction or not went_m > (1.0 - MISSED) * way_m:
+        return replace(sent_back, held=NONE_HELD)
+    turning = s != memory.anchor.direction
+    margin = memory.margins.own(s, turning=turning).after_breaking(went_m)
+    return replace(sent_back, held=NONE_HELD, margins=memory.margins.replaced(s, margin, turning=turning))
 
 
 def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSettings) -> SlideMemory:
@@ -451,7 +458,7 @@ def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> floa
     tried.
     """
     surely = memory.slides >= TRIED and margin.seen_m <= settings.excursion_limit_m
-    return max(margin.sure_m if surely else margin.way_m, LEAST * settings.stroke_m)
+    return max(min(margin.sure_m, UNLIKE * margin.way_m) if surely else margin.way_m, LEAST * settings.stroke_m)
 
 
 def _excursion(

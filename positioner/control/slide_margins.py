@@ -18,6 +18,8 @@ from math import sqrt
 
 LOWER, RAISE = 0.5, 1.3
 """Factors on a margin as long as no slide has held, and as long as none has broken loose."""
+GROWS = 2.0
+"""Factor, at most, from what held to what is tried next: what broke loose may have been far longer than it had to be."""
 CLOSE = 1.1
 """Broke over held: near enough."""
 BESIDE = 1.05
@@ -47,7 +49,8 @@ class Margin:
             return LOWER * self.broke_m
         if not self.broke_m:
             return RAISE * self.held_m
-        return sqrt(self.held_m * self.broke_m) if self.broke_m > CLOSE * self.held_m else self.broke_m
+        between_m = min(sqrt(self.held_m * self.broke_m), GROWS * self.held_m)
+        return between_m if self.broke_m > CLOSE * self.held_m else self.broke_m
 
     @property
     def sure_m(self) -> float:
@@ -114,6 +117,8 @@ class Margins:
             like = self.own(s, turning=t)
             if like.broke_m > own.held_m and (not own.broke_m or CLOSE * like.way_m < own.broke_m):
                 return Margin(max(like.held_m, own.held_m), like.broke_m, guessed=like.guessed)
+            if own.held_m < like.held_m < own.broke_m:
+                return replace(own, held_m=like.held_m)
         return own
 
     def replaced(self, direction: int, margin: Margin, *, turning: bool) -> "Margins":

@@ -193,7 +193,7 @@ def test_excursions_keep_their_interval() -> None:
 
 def test_excursions_cost_no_more_than_the_budget_of_a_day() -> None:
     """A day's travel may be spent at once: after two excursions there is nothing left for a third."""
-    loop = Loop(0.2, excursion_budget_strokes_per_day=0.35)
+    loop = Loop(0.2, excursion_budget_strokes_per_day=0.36)
     loop.step_to(0.6)
     moved = [np.ptp(loop.step_to(at)) > LEAST for at in (0.604, 0.608, 0.612, 0.616)]
     assert moved == [True, True, False, False]
