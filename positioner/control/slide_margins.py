@@ -19,7 +19,9 @@ from math import sqrt
 LOWER, RAISE = 0.5, 1.3
 """Factors on a margin as long as no slide has held, and as long as none has broken loose."""
 GROWS = 2.0
-"""Factor, at most, from what held to what is tried next: what broke loose may have been far longer than it had to be."""
+"""Factor, at most, from what held to what is tried next: what broke loose may have been far longer than needed."""
+ALIKE = 1.25
+"""Factor by which margins of kin may differ."""
 CLOSE = 1.1
 """Broke over held: near enough."""
 BESIDE = 1.05
@@ -118,7 +120,7 @@ class Margins:
             if like.broke_m > own.held_m and (not own.broke_m or CLOSE * like.way_m < own.broke_m):
                 return Margin(max(like.held_m, own.held_m), like.broke_m, guessed=like.guessed)
             if own.held_m < like.held_m < own.broke_m:
-                return replace(own, held_m=like.held_m)
+                return replace(own, held_m=like.held_m / ALIKE)
         return own
 
     def replaced(self, direction: int, margin: Margin, *, turning: bool) -> "Margins":
