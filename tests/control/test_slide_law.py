@@ -884,6 +884,17 @@ def test_a_slide_that_stuck_short_behind_a_slow_pressure_is_none_that_held() -> 
     assert after.anchor == Anchor(0.0614, -1)
 
 
+def test_a_stem_that_rests_where_it_was_to_has_slid_though_it_seemed_to_creep_there() -> None:
+    """Behind an I/P of 0.13 s one came there to 0.3 %: its way was told "held", and margins were a third too long."""
+    known = Margins(*(4 * [Margin(broke_m=0.011)]))
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.0675, 1), margins=known)
+    came = SlideOutcome(1.0, -1, 0.0675, 27e3, 0.06002, 1e-4, moved=False, landing=False)
+    after = step(memory, StemObservation(1.0, 0.06002, True, None, 0.0, came), 0.06, BALANCE, SETTINGS)
+    assert after.margins.turning_down.held_m == 0.0
+    assert after.margins.turning_down.broke_m == pytest.approx(0.00748)
+    assert after.anchor == Anchor(0.06002, -1)
+
+
 def test_a_packing_that_gives_way_farther_than_a_short_way_makes_that_no_margin() -> None:
     """Turning round by 0.8 % a soft packing gave way by 1.2 %: so short a way lands nowhere, and was tried for ever."""
     known = Margins(*(4 * [Margin(broke_m=0.0095)]))
