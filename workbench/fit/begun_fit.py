@@ -14,10 +14,11 @@ from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
+from workbench.fit.landings import by_break_aways
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
 from workbench.fit.starts import moved_starts
-from workbench.fit.strewing import broken_loose, proved, strewn
+from workbench.fit.strewing import on_lowest_tread, proved, strewn
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import Parameter
 
@@ -151,8 +152,9 @@ class BegunFit:
         """
 
         def stirred(end: Place) -> Place:
-            near = strewn(self.error, broken_loose(self.error, end.z), STIRRED)
-            return end if near is end.z else replace(end, z=settled(self.error, near, self.effort.improves_below))
+            near = strewn(self.error, on_lowest_tread(self.error, end.z), STIRRED), by_break_aways(self.error, end.z)
+            found = [settled(self.error, z, self.effort.improves_below) for z in near if z is not end.z]
+            return replace(end, z=min([end.z, *found], key=self.error.cost))
 
         best, *others = self.ends
         here = replace(self, ends=self._ordered([stirred(best), *others]))

@@ -194,6 +194,15 @@ class Solved:
     left: float
 
 
+def by_break_aways(error: SimulationError, z: Vector) -> Vector:
+    """Return z as `Landings.broken_loose` moves it; itself where nothing shows in break-aways but static friction."""
+    if error.run.by.slow:
+        return z
+    theta = error.theta(z)
+    found = Landings(error, rests(error.run.record)).broken_loose(theta, error.run.run(theta).pressure_pa)
+    return z if found is theta else error.coordinates(found)
+
+
 class Landings:
     """The landings of a record and the balance of forces at them, for one composition."""
 
@@ -231,7 +240,7 @@ class Landings:
         found = self._error.theta(z)
         if any(each.index == STATIC for each in self._error.parameters):
             found[STATIC] = self._static_n(found, pressure_pa)
-            found = self._broken_loose(found, pressure_pa)
+            found = self.broken_loose(found, pressure_pa)
         return Solved(found, float(np.median(np.abs(left))))
 
     def _gauss_newton(self, z: Vector, pressure_pa: Column, free: Sequence[int]) -> tuple[Vector, Vector]:
@@ -318,7 +327,7 @@ class Landings:
         contradicted = (below / (1.0 + below)).sum(axis=1) + (above / (1.0 + above)).sum(axis=1)
         return float(middles[np.argmin(contradicted)])
 
-    def _broken_loose(self, theta: Vector, pressure_pa: Column) -> Vector:
+    def broken_loose(self, theta: Vector, pressure_pa: Column) -> Vector:
         """Return theta with static friction, and what shows in break-aways alone, where these contradict it least.
 
         A random search from theta on, which itself decides what is drawn: each break-away is a stair in all of them.

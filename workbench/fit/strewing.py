@@ -37,7 +37,7 @@ TREADS = np.geomspace(1e-4, 0.15, 150)
 """Distances at which static friction is tried: each 5 % farther than the last."""
 
 
-def broken_loose(error: SimulationError, z: Vector) -> Vector:
+def on_lowest_tread(error: SimulationError, z: Vector) -> Vector:
     """Return z with static friction on the lowest of the stairs about it: of some the treads are very narrow."""
     static = [i for i, each in enumerate(error.parameters) if each.index == STATIC]
     return scanned(error, z, static[0], TREADS) if static else z
