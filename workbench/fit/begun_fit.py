@@ -25,8 +25,8 @@ from workbench.model.parameters import Parameter
 LEAVES = 0.6
 """Cost a sample above which a fit leaves something to explain; that of white residuals of the noise is 0.485."""
 
-STIRRED = 100
-"""Places about an end from which a search goes on,"""
+STIRRED, MOST_STIRRED = 100, 6
+"""Places about an end from which a search goes on; how often more, at most, as long as that leads lower,"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
 
@@ -151,10 +151,18 @@ class BegunFit:
         The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them.
         """
 
+        def gone_on(z: Vector) -> Vector:
+            near = strewn(self.error, on_lowest_tread(self.error, z), STIRRED), by_break_aways(self.error, z)
+            found = [settled(self.error, each, self.effort.improves_below) for each in near if each is not z]
+            return min([z, *found], key=self.error.cost)
+
         def stirred(end: Place) -> Place:
-            near = strewn(self.error, on_lowest_tread(self.error, end.z), STIRRED), by_break_aways(self.error, end.z)
-            found = [settled(self.error, z, self.effort.improves_below) for z in near if z is not end.z]
-            return replace(end, z=min([end.z, *found], key=self.error.cost))
+            before, here = end.z, gone_on(end.z)
+            for _ in range(MOST_STIRRED):
+                if self.error.cost(before) <= WITHIN * self.error.cost(here):
+                    break
+                before, here = here, gone_on(here)
+            return replace(end, z=here)
 
         best, *others = self.ends
         here = replace(self, ends=self._ordered([stirred(best), *others]))
