@@ -378,6 +378,7 @@ HEAD = (
     "  excursion  changes  strokes"
 )
 GROUPS_S = ((0.0, 5e-3), (5e-3, 20e-3), (20e-3, 60e-3), (60e-3, 1.0))
+ALL_S = GROUPS_S[0][0], GROUPS_S[-1][1]
 
 
 def line(seed: int, each: Drawn, found: Outcome) -> str:
@@ -404,7 +405,7 @@ def together(results: list[tuple[Drawn, Outcome]]) -> Iterator[str]:
     wrong = sum(found.worst > DEVIATIONS for found in accepted)
     yield f"accepted, and off by more than three deviations somewhere: {wrong} valves"
     yield f"changed their command while left alone: {sum(found.changes > 0 for found in accepted)} valves"
-    for low_s, high_s in GROUPS_S:
+    for low_s, high_s in (*GROUPS_S, ALL_S):
         group = [found for each, found in results if found.landed and low_s <= each.period_s < high_s]
         if not group:
             continue

@@ -62,6 +62,8 @@ def test_an_effect_that_is_not_there_never_makes_it_worse() -> None:
                 (90108, "poor", "friction_drift"),
                 (100398, "poor", "backlash"),
                 (110387, "full", "area_variation"),
+                (120443, "poor", "asymmetric_friction"),
+                (120490, "full", "dwell_stiction"),
                 (90309, "full", "ip_lag"),
             )
         ),

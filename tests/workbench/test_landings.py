@@ -8,7 +8,7 @@ from config.valve_file import ValveFile
 from sim.composition import BASE, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
-from workbench.fit.landings import Landings, rests
+from workbench.fit.landings import Landings, by_break_aways, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import DEFAULT, free_parameters
@@ -56,6 +56,37 @@ def test_the_landings_alone_give_spring_friction_and_a_static_effect(name: str, 
     assert solved.theta[VISCOUS] == pytest.approx(composition.theta[VISCOUS]), "does not stand in a landing"
     index = composition.names.index(fitted)
     assert solved.theta[index] == pytest.approx(next(iter(values.values())), rel=0.05)
+
+
+def test_break_aways_tell_static_friction_that_grows_with_the_rest() -> None:
+    """It stands in no landing: half as strong, three times as slow, it broke loose at other rests than the stem."""
+    growth_n, time_constant_s = 200.0, 0.4
+    truth = with_effect(VALVE, "dwell_stiction", growth_n=growth_n, time_constant_s=time_constant_s)
+    record = ready(record_of(truth, 1, 6000))
+    known = with_effect(VALVE, "dwell_stiction", growth_n=0.5 * growth_n, time_constant_s=3.0 * time_constant_s)
+    composition = Composition.from_file(known)
+    parameters = free_parameters(composition, [*DEFAULT, "dwell_stiction.growth_n", "dwell_stiction.time_constant_s"])
+    error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+    begin = error.coordinates(composition.theta)
+    theta = error.theta(by_break_aways(error, begin))
+
+    def off_n(theta: Column) -> float:
+        dwell_s = np.geomspace(0.1, 2.0, 9)
+        strength_n, slowness_s = theta[-2:]
+        static_n = theta[STATIC] + strength_n * (1.0 - np.exp(-dwell_s / slowness_s))
+        true_n = VALVE.valve.static_n + growth_n * (1.0 - np.exp(-dwell_s / time_constant_s))
+        return float(np.abs(static_n - true_n).max())
+
+    assert off_n(theta) < 0.7 * off_n(composition.theta)
+
+
+def test_without_such_an_effect_break_aways_move_nothing() -> None:
+    composition = Composition.from_file(with_effect(VALVE, "preload", force_n=100.0))
+    record = ready(record_of(VALVE, 1, 3000))
+    parameters = free_parameters(composition, [*DEFAULT, "preload.force_n"])
+    error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+    begin = error.coordinates(composition.theta)
+    assert by_break_aways(error, begin) is begin
 
 
 def test_a_rest_knows_where_its_slide_came_from_and_where_the_next_one_goes() -> None:
