@@ -8,7 +8,8 @@ from config.valve_file import ValveFile
 from sim.composition import BASE, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
-from workbench.fit.landings import Landings, by_break_aways, rests
+from workbench.fit.break_aways import by_break_aways
+from workbench.fit.landings import Landings, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import DEFAULT, free_parameters

@@ -11,7 +11,8 @@ Its files:
     landings           the balance of forces where slides end in rest, from which searches begin too
     objective          what they lower
     descent            how: trust region, and a scan of the stairs
-    strewing           what is left where a sensor rounds: places about the end
+    strewing           what is left of it: places about the end, treads of static friction
+    break_aways        what shows in break-aways alone, sought where these contradict it least
     agreement          which of them came to the same
     threads            searches side by side
     breaking_off       how all of them end early

@@ -11,10 +11,10 @@ from typing import TypeVar
 from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN, Place, agreeing
+from workbench.fit.break_aways import by_break_aways
 from workbench.fit.descent import MIDDLING, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
-from workbench.fit.landings import by_break_aways
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
 from workbench.fit.starts import moved_starts

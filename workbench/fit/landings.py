@@ -60,11 +60,6 @@ OUTLIER = 3.0
 """Standard deviations, or median deviations, from which the loss is linear."""
 CONTRADICTED_N = 20.0
 """Distance of static friction from a break-away's interval at which the contradiction counts half."""
-SURELY_N = 3.0
-"""The same where what shows in break-aways alone is sought with it: they must be told from each other."""
-TRIED, REACH_STATIC, DISTANCES, SHOWN_BY = 200, 0.15, (-3.0, 0.0), 0.1
-"""Places tried then; reach of the logarithm of static friction, of others 1; its decimal logarithm, and by how much a
-parameter is moved to see what it shows in."""
 FEWEST = 4
 NOT_IN_LANDINGS = (VISCOUS, STATIC)
 RECORDS = 4
@@ -194,15 +189,6 @@ class Solved:
     left: float
 
 
-def by_break_aways(error: SimulationError, z: Vector) -> Vector:
-    """Return z as `Landings.broken_loose` moves it; itself where nothing shows in break-aways but static friction."""
-    if error.run.by.slow:
-        return z
-    theta = error.theta(z)
-    found = Landings(error, rests(error.run.record)).broken_loose(theta, error.run.run(theta).pressure_pa)
-    return z if found is theta else error.coordinates(found)
-
-
 class Landings:
     """The landings of a record and the balance of forces at them, for one composition."""
 
@@ -240,7 +226,6 @@ class Landings:
         found = self._error.theta(z)
         if any(each.index == STATIC for each in self._error.parameters):
             found[STATIC] = self._static_n(found, pressure_pa)
-            found = self.broken_loose(found, pressure_pa)
         return Solved(found, float(np.median(np.abs(left))))
 
     def _gauss_newton(self, z: Vector, pressure_pa: Column, free: Sequence[int]) -> tuple[Vector, Vector]:
@@ -326,43 +311,6 @@ class Landings:
         above = np.maximum(middles[:, None] - upper, 0.0) / CONTRADICTED_N
         contradicted = (below / (1.0 + below)).sum(axis=1) + (above / (1.0 + above)).sum(axis=1)
         return float(middles[np.argmin(contradicted)])
-
-    def broken_loose(self, theta: Vector, pressure_pa: Column) -> Vector:
-        """Return theta with static friction, and what shows in break-aways alone, where these contradict it least.
-
-        A random search from theta on, which itself decides what is drawn: each break-away is a stair in all of them.
-        """
-        error, z = self._error, self._error.coordinates(theta)
-        holding, breaking = self.holding(pressure_pa), self.breaking(pressure_pa)
-        (landed, _) = self.landed(theta, pressure_pa)
-
-        def beyond_n(z: Vector) -> tuple[Vector, Vector]:
-            there = error.theta(z)
-            return self.beyond_static_n(there, holding), -self.beyond_static_n(there, breaking)
-
-        def contradicted(z: Vector) -> float:
-            off = [np.maximum(each, 0.0) / SURELY_N for each in beyond_n(z)]
-            return float(sum((each / (1.0 + each)).sum() for each in off))
-
-        def alone(i: int) -> bool:
-            there = z.copy()
-            there[i] += SHOWN_BY if z[i] + SHOWN_BY <= error.upper[i] else -SHOWN_BY
-            balanced = np.array_equal(self.balance_n(error.theta(there), landed), self.balance_n(theta, landed))
-            return balanced and not np.array_equal(beyond_n(there), beyond_n(z))
-
-        shown = [i for i, each in enumerate(error.parameters) if each.index not in NOT_IN_LANDINGS and alone(i)]
-        if not shown:
-            return theta
-        generator, least = np.random.default_rng(z.view(np.uint32)), contradicted(z)
-        reach = np.array(
-            [REACH_STATIC if each.index == STATIC else float(i in shown) for i, each in enumerate(error.parameters)]
-        )
-        for _ in range(TRIED):
-            way = 10.0 ** generator.uniform(*DISTANCES) * reach * generator.standard_normal(z.size)
-            there = np.clip(z + way, error.lower, error.upper)
-            if (by := contradicted(there)) < least:
-                z, least = there, by
-        return error.theta(z)
 
     def holding(self, pressure_pa: Column) -> Loaded:
         """Return each rest under the highest and the lowest pressure that it bore."""

@@ -27,6 +27,7 @@ from sim.karnopp import Vector
 from workbench.data.motion import directions, velocity_m_per_s
 from workbench.data.record import Record
 from workbench.fit.agreement import Place
+from workbench.fit.break_aways import broken_loose
 from workbench.fit.descent import MIDDLING, WIDE, descended, scanned
 from workbench.fit.guesses import guessed_values
 from workbench.fit.landings import Landings, Rest, rests
@@ -233,15 +234,15 @@ def told_starts(
             solved.append((there.cost(z), there.theta(z)))
     least = min((cost for cost, _ in solved), default=0.0)
     best = [theta for cost, theta in solved if cost <= AS_GOOD * least]
-    broken_loose = [
+    loose = [
         _breaking_loose(error, z)
         for theta in best
         for z in error.screened([error.coordinates(scaled(theta, STATIC, each)) for each in STATIC_FACTORS], count)
     ]
-    if broken_loose:
-        least_z = error.least(broken_loose, MIDDLE)
-        broken_loose += [_along(error, run, least_z, each, best) for each in _not_told(best, added)]
-    return [Place(z, "landings") for z in _apart(error, broken_loose, count)]
+    if loose:
+        least_z = error.least(loose, MIDDLE)
+        loose += [_along(error, run, least_z, each, best) for each in _not_told(best, added)]
+    return [Place(z, "landings") for z in _apart(error, loose, count)]
 
 
 def _breaking_loose(error: SimulationError, z: Vector) -> Vector:
@@ -327,7 +328,8 @@ def _landed(
             begin[[each.index for each in added]] = values
             solved = landings.solved(begin, kept)
             if solved:
-                viscous = [scaled(solved.theta, VISCOUS, factor) for factor in VISCOUS_FACTORS]
+                loose = broken_loose(error, landings, solved.theta)
+                viscous = [scaled(loose, VISCOUS, factor) for factor in VISCOUS_FACTORS]
                 found += [_smoothed(error, z) for z in error.screened(map(error.coordinates, viscous), 1)]
     return found
 
