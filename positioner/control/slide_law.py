@@ -61,6 +61,8 @@ UNLIKE = 2.0
 """Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
 MISSED, SURELY, GAVE_WAY = 0.05, 2.0, 0.5
 """Of its way, and of the deviation of landings: by which a slide may miss its aim; of its way: beyond it was none."""
+GONE_ON = 1.25
+"""Of its way: a stem that is sent back from farther has crept there, or been pushed."""
 LEAST = 5.1e-3
 """Of the stroke: a slide shorter than this would not be seen for one."""
 TRIED = 2
@@ -223,7 +225,7 @@ def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSetting
     sent_back = replace(memory, anchor=Anchor(position_m, s))
     if not went_m > min(CREEP * settings.stroke_m, GAVE_WAY * way_m):
         return sent_back
-    if not memory.anchor.direction or not went_m > (1.0 - MISSED) * way_m:
+    if not memory.anchor.direction or not (1.0 - MISSED) * way_m < went_m < GONE_ON * way_m:
         return replace(sent_back, held=NONE_HELD)
     turning = s != memory.anchor.direction
     margin = memory.margins.own(s, turning=turning).after_breaking(went_m)

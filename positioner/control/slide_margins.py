@@ -114,11 +114,15 @@ class Margins:
         own = self.own(direction, turning=turning)
         if own.held_m and own.broke_m:
             return own
-        kin = ((direction, not turning), (-direction, turning), (-direction, not turning))
-        for s, t in kin:
-            like = self.own(s, turning=t)
-            if like.broke_m > own.held_m and (not own.broke_m or CLOSE * like.way_m < own.broke_m):
+        kin = [
+            self.own(s, turning=t)
+            for s, t in ((direction, not turning), (-direction, turning), (-direction, not turning))
+        ]
+        for like in kin:
+            shorter = CLOSE * (like.way_m if like.held_m else like.broke_m) < own.broke_m
+            if like.broke_m > own.held_m and (shorter or not own.broke_m):
                 return Margin(max(like.held_m, own.held_m), like.broke_m, guessed=like.guessed)
+        for like in kin:
             if own.held_m < like.held_m < own.broke_m:
                 return replace(own, held_m=like.held_m / ALIKE)
         return own
