@@ -27,6 +27,8 @@ LEAVES = 0.6
 
 STIRRED, MOST_STIRRED = 100, 6
 """Places about an end from which a search goes on; how often more, at most, as long as that leads lower,"""
+LOWER = 1.002
+"""by more than this factor;"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
 
@@ -159,7 +161,7 @@ class BegunFit:
         def stirred(end: Place) -> Place:
             before, here = end.z, gone_on(end.z)
             for _ in range(MOST_STIRRED):
-                if self.error.cost(before) <= WITHIN * self.error.cost(here):
+                if self.error.cost(before) <= LOWER * self.error.cost(here):
                     break
                 before, here = here, gone_on(here)
             return replace(end, z=here)
