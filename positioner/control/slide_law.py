@@ -264,7 +264,7 @@ def _learnt(
     that is not half as far, friction has grown: nor do the slides before it that held, by a balance that is no more.
     One that rests where it was to has slid, though it came there so slowly that it seemed to creep.
     What may be either, for it went elsewhere, is a slide where its way has been seen to break loose; of a stem that
-    turns round it was too short, for a soft packing gives way, where a longer one has landed.
+    turns round it was too short, for a soft packing gives way, where a longer one has landed; however far landings scatter.
     """
     s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
@@ -286,10 +286,11 @@ def _learnt(
         return landed
     if not slid:
         return _after_holding(replace(memory, anchor=anchor), s, way_m)
-    if hit and anchor.direction:
-        margin = margin.after_breaking(went_m)
-    elif turning and not short and BESIDE * way_m < margin.seen_m:
+    beside = not short and missed_m > max(MISSED * way_m, settings.dead_band_m, quantum_m)
+    if turning and beside and BESIDE * way_m < margin.seen_m:
         margin = margin.after_holding(way_m)
+    elif hit and anchor.direction:
+        margin = margin.after_breaking(went_m)
     return replace(landed, margins=known.replaced(s, margin, turning=turning))
 
 
