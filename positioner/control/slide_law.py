@@ -264,7 +264,8 @@ def _learnt(
     that is not half as far, friction has grown: nor do the slides before it that held, by a balance that is no more.
     One that rests where it was to has slid, though it came there so slowly that it seemed to creep.
     What may be either, for it went elsewhere, is a slide where its way has been seen to break loose; of a stem that
-    turns round it was too short, for a soft packing gives way, where a longer one has landed; however far landings scatter.
+    turns round it was too short, for a soft packing gives way, where a longer one has landed; and that however far
+    landings scatter.
     """
     s, to_m = outcome.direction, outcome.position_m
     if outcome.moved and not outcome.landing:
