@@ -38,7 +38,7 @@ from math import isnan, nan
 
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_margins import BESIDE, NO_MARGINS, Margin
+from positioner.control.slide_margins import BESIDE, GROWS, NO_MARGINS, Margin
 from positioner.control.slide_memory import (
     CREEP,
     DAY_S,
@@ -464,7 +464,7 @@ def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> floa
     tried.
     """
     surely = memory.slides >= TRIED and margin.seen_m <= settings.excursion_limit_m
-    return max(min(margin.sure_m, UNLIKE * margin.way_m) if surely else margin.way_m, LEAST * settings.stroke_m)
+    return max(min(margin.sure_m, GROWS * margin.way_m) if surely else margin.way_m, LEAST * settings.stroke_m)
 
 
 def _excursion(

@@ -6,11 +6,12 @@
 F_s, F_c of the direction. So there are four: up and down, going on and turning round. None of what stands above is
 known; what is, are the longest way that held the stem and the shortest that broke it loose:
 
-    held < m <= broke                 tried next: sqrt(held broke), until broke is within 10 % of held; then broke
+    held < m <= broke                 tried next: sqrt(held broke), at most 2 held, until broke is within 10 % of held;
+                                      then broke
 
 A way that holds though it has broken loose before is believed for the move: the next is longer by `RAISE`. When that
 has broken loose, `held` is what it was, so that a margin that luck has made too long comes back within a few moves.
-A margin of which little is known is taken for its next of kin.
+A margin of which little is known is taken for its next of kin, or what held that one, less a fifth, says what holds it.
 """
 
 from dataclasses import dataclass, replace

@@ -1,5 +1,5 @@
 """A fit on its way: searches at the wide scale, the best of them at the middling one, the best of those to where they
-stay, until searches from independent starts have come to the same.
+stay, until searches from independent starts have come to the same; then on from there, off the stairs.
 """
 
 from collections.abc import Callable, Sequence
@@ -166,13 +166,13 @@ class BegunFit:
                 before, here = here, gone_on(here)
             return replace(end, z=here)
 
-        best, *others = self.ends
-        here = replace(self, ends=self._ordered([stirred(best), *others]))
+        best, *others = stirred(self.ends[0]), *self.ends[1:]
+        here = replace(self, ends=self._ordered([best, *others]))
         if self.cost <= WITHIN * here.cost:
             return here
         likely = min(sum(self.error.cost(end.z) <= LIKELY * here.cost for end in others), self.effort.agreeing)
         found = _each(stirred, others[:likely], self.workers, lambda _: None)
-        return replace(self, ends=self._ordered([stirred(best), *found, *others[likely:]]))
+        return replace(self, ends=self._ordered([best, *found, *others[likely:]]))
 
     def shot(self) -> "BegunFit":
         """Search from starts by multiple shooting too, where the best end leaves something to explain."""
