@@ -32,6 +32,9 @@ class Begun:
     way: Fit
     first: Fit
     best: Fit
+    all_of: list[str]
+    """Effects whose searches have all begun."""
+    workers: int = 1
 
     @property
     def screening_cost(self) -> float:
@@ -45,7 +48,8 @@ class Begun:
     def rms_m(self) -> float:
         return self.first.rms_m
 
-    def landed(self) -> "Begun":
+    def all_begun(self) -> "Begun":
+        self.all_of.extend(each.name for each in self.best.valve.effect)
         return self
 
     def carried(self) -> "Begun":
@@ -80,6 +84,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         way: float = 1.0,
         first: float = 1.0,
         from_landings: list[tuple[str, bool]] | None = None,
+        all_of: list[str] | None = None,
         strengths: Mapping[str, Fitted] | None = None,
     ) -> tuple[EffectStep, ...]:
         def made(valve: ValveFile, effects: Sequence[str]) -> Fit:
@@ -97,7 +102,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
             on_the_way, of_first = (
                 replace(best, cost=part * best.cost, rms_m=part * best.rms_m) for part in (way * first, first)
             )
-            return Begun(on_the_way, of_first, best)
+            return Begun(on_the_way, of_first, best, [] if all_of is None else all_of)
 
         def block_errors(found: Fit, _: object) -> BlockErrors:
             return errors_of(found.rms_m)
@@ -398,8 +403,12 @@ def test_what_is_far_behind_is_not_searched_further(searched: Callable[..., tupl
 
 def test_what_is_far_behind_on_the_way_waits_there(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
     floors = {"ip_lag": 1.0, "backlash": 18.0, "stribeck": 9.0}
-    (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, way=2.0)
+    begun: list[str] = []
+    (step,) = searched(
+        lambda _, added: min((floors[each] for each in added), default=100.0), *floors, way=2.0, all_of=begun
+    )
     assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 2.0 * 18.0})
+    assert set(begun) == {"ip_lag", "stribeck"}
 
 
 def test_what_waits_is_searched_on_where_something_is_left(searched: Callable[..., tuple[EffectStep, ...]]) -> None:

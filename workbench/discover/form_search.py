@@ -156,7 +156,7 @@ class FormSearch:
 
         def begun(each: Proposal) -> BegunFit | str:
             try:
-                return begun_fit(train, self.valve, (each.name,), base.fit, points=each.points).landed()
+                return begun_fit(train, self.valve, (each.name,), base.fit, points=each.points).all_begun()
             except InputError as error:
                 return error.problem
 
@@ -228,7 +228,7 @@ class FormSearch:
             point = tuple(v for v, each in zip(theta[bare.size :].tolist(), declared, strict=True) if not each.given)
             ground = replace(base.fit, seeds=(bare, *base.fit.seeds[-2:]))
             begun = begun_fit(self.split.train.record, self.valve, (name,), ground, points=[point])
-            found = begun.landed().carried().settled(2).judged(profile=False)
+            found = begun.all_begun().carried().settled(2).judged(profile=False)
             return evaluated(found, self.split) if found.cost < here.cost else fitted[name]
 
         self.tell(f"taking {len(nearest)} forms further", 0.0)

@@ -17,7 +17,6 @@ from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
-from workbench.fit.starts import moved_starts
 from workbench.fit.strewing import on_lowest_tread, proved, strewn
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import Parameter
@@ -31,6 +30,9 @@ LOWER = 1.002
 """by more than this factor;"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
+
+FAR_OFF = 5.0
+"""Cost a sample above which what a valve lacks is not a stair beside its end."""
 
 Progress = Callable[[float], None]
 T = TypeVar("T")
@@ -69,8 +71,8 @@ class BegunFit:
     """Where what is added makes next to nothing of the base."""
     added: Sequence[Parameter] = ()
     """The parameters of what is added."""
-    waiting: Sequence[Place] = ()
-    """Starts from landings that no search has begun at."""
+    others: Callable[[], Sequence[Place]] = tuple
+    """Finds the starts that no search has begun at."""
     strengths: Sequence[Sequence[Vector]] = ()
     """Coordinates of each strength of what is added, from which multiple shooting begins."""
     through: bool = False
@@ -92,11 +94,9 @@ class BegunFit:
         assert self.weakest is not None
         return self.screening_cost / self.error.rough.cost(self.weakest.z, MIDDLE)
 
-    def landed(self) -> "BegunFit":
-        """Begin the searches from landings, which take more to begin than others, if they are not there yet."""
-        if not self.waiting:
-            return self
-        return replace(widely(self, moved_starts(self.error, self.waiting, self.added)), waiting=())
+    def all_begun(self) -> "BegunFit":
+        """Begin the other searches too, if they are not there yet."""
+        return replace(widely(self, self.others()), others=tuple)
 
     def carried(self) -> "BegunFit":
         """Carry the searches from the wide scale through the middling one, if they are not there yet."""
@@ -150,8 +150,11 @@ class BegunFit:
     def stirred(self) -> "BegunFit":
         """Go on from the lowest of the places strewn about the best end; where that leads lower, about others too.
 
-        The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them.
+        The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them. Far
+        above the floor it stays where it is.
         """
+        if self.cost > FAR_OFF * self.error.count:
+            return self
 
         def gone_on(z: Vector) -> Vector:
             near = strewn(self.error, on_lowest_tread(self.error, z), STIRRED), by_break_aways(self.error, z)

@@ -32,7 +32,7 @@ from workbench.fit.fit_result import Fit, with_profile
 from workbench.fit.objective import SimulationError
 from workbench.fit.setpoint_starts import FREE as FREE_BY_SETPOINT
 from workbench.fit.setpoint_starts import setpoint_starts
-from workbench.fit.starts import base_starts, effect_starts, forces_regressed, moved_starts, weakest_start
+from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
@@ -87,7 +87,7 @@ def fit(
             recording, valve, seed=seed, workers=workers, from_pressure=from_pressure, free=_of_base(free), by=by
         )
         begun = _begun(record, valve, effects, ground, free, workers, progress)
-        return begun.landed().carried().finished(profile=profile)
+        return begun.all_begun().carried().finished(profile=profile)
     searched = partial(_base, record, valve, free, seed, workers, from_pressure, profile=profile)
     found = searched(by or sampling(record, valve.valve), progress or (lambda _: None))
     if by is None and free is None and _may_swing(found, record):
@@ -177,9 +177,9 @@ def begun_fit(
 ) -> BegunFit:
     """Fit a valve with effects added to a base fit of the same record, on one thread, as far as through the wide scale.
 
-    Searches that begin at landings are begun by `BegunFit.landed`. Without `landed` there are none: those of an earlier
-    base fit were the same. With `points`, values of what is fitted of the effects, searches begin at these in place of
-    where the effects declare it.
+    The first searches are; the others are begun by `BegunFit.all_begun`. Without `landed` none begins at landings:
+    those of an earlier base fit were the same. With `points`, values of what is fitted of the effects, searches begin
+    at these in place of where the effects declare it.
 
     Raises:
         InputError: an unknown effect, or one that the record cannot show.
@@ -312,9 +312,8 @@ def _begun(
         workers,
         tell,
         weakest=weakest,
-        waiting=starts.at_landings[1:],
+        others=starts.others,
         added=added,
         strengths=starts.strengths,
     )
-    # Viscous friction stands in no landing: where it is far off, a start from there is far off until it is moved.
-    return widely(begun, [*starts.begins, *moved_starts(error, starts.at_landings[:1], added)])
+    return widely(begun, starts.first)

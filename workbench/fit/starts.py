@@ -1,9 +1,10 @@
 """Where searches begin: for the bare valve, and with an effect added.
 
 The bare valve begins at landings, at the valve file's values, at a regression of forces over the moving samples, and at
-draws round both. An effect begins at landings with each of its strengths, and on a grid of strengths at base fits, at
-none of them too, so that the extended valve is never worse than the base it extends. What the record's positions
-suggest is in `guesses`.
+draws round both. An effect begins at landings with each of its strengths, and on a grid of strengths at the best base
+fit and the valve file's values, at none of them too, so that the extended valve is never worse than the base it
+extends; then, where it is still in the race, at the other landings and base fits. What the record's positions suggest
+is in `guesses`.
 
     A p + load = k_s x + F_v v + F_c sign(v)      least squares over the moving samples, m v' neglected, k_s = 0 stays;
                                                   where these say nothing of v (`sampling`), over the landings,
@@ -14,7 +15,7 @@ scanned with the rest kept. Every other rest and those between solve for themsel
 measurement.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import accumulate
 from typing import NamedTuple
@@ -47,6 +48,8 @@ SLOWER = 10.0
 STATIC_FACTORS = (1.0, 1.05, 1.2, 1.5)
 EXCESSES = (1.0, 0.5, 0.1)
 """Of F_s - F_c of a base fit, with which strengths are tried: what the base took for it may be the effect."""
+BEST_BASE, LANDINGS = "base fit 1", "landings"
+"""Origins."""
 AT_BEST, EACH_SEED = 2, 1
 """Strengths begun at the best base fit, and at each other."""
 AS_GOOD = 1.1
@@ -70,11 +73,11 @@ STATIC_SHIFTS = (1.0, 0.0, -1.0)
 class EffectStarts(NamedTuple):
     """Where searches with effects begin."""
 
-    begins: list[Place]
-    at_landings: list[Place]
-    """For `moved_starts` to finish."""
+    first: list[Place]
     strengths: list[list[Vector]]
-    """Coordinates of each strength at the best base fit, from which the first of `begins` were chosen."""
+    """Coordinates of each strength at the best base fit, from which most of `first` were chosen."""
+    others: Callable[[], list[Place]]
+    """Finds the others, which nobody needs where the first fall far behind another effect's."""
 
 
 def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, count: int) -> list[Place]:
@@ -89,8 +92,10 @@ def base_starts(error: SimulationError, origins: Sequence[Vector], seed: int, co
     generator = np.random.default_rng(seed)
     theta, regressed = origins
     drawn = [*_drawn(regressed, DRAWS_REGRESSED, generator), *_drawn(theta, DRAWS_FILE, generator)]
+    halves = landed_halves(error)
+    at_landings = [z for half in halves for z in landed_starts(error, half, (theta,), [()], (), LANDED_BASE)]
     return [
-        *moved_starts(error, landed_starts(error, (theta,), [()], (), LANDED_BASE), ()),
+        *moved_starts(error, at_landings, ()),
         Place(error.coordinates(theta), "valve file"),
         Place(error.coordinates(regressed), "regression"),
         *(Place(z, f"draw {i}") for i, z in enumerate(error.screened(map(error.coordinates, drawn), count))),
@@ -122,18 +127,36 @@ def effect_starts(
     # The positions show a quantum so well that landings begin with the likeliest alone, and keep it.
     rounds = any(each.guess == "quantum" for each in added)
     solved = (rounds and guesses[:1]) or points
-    at_landings = landed_starts(error, seeds[-2:][:1], solved, added, LANDED_EFFECT) if landed else []
-    starts = [weakest_start(error, added, seeds[0])]
-    grids = [
-        [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
-        for theta in seeds
+
+    def at_landings(half: Half) -> list[Place]:
+        return landed_starts(error, half, seeds[-2:][:1], solved, added, LANDED_EFFECT)
+
+    def grid(theta: Vector) -> list[Vector]:
+        return [_with(error, _sticking(theta, part), added, values) for part in EXCESSES for values in points]
+
+    halves = landed_halves(error) if landed else []
+    at_first_half = [place for half in halves[:1] for place in at_landings(half)]
+    at_best = [_smoothed(error, z) for z in grid(seeds[0])]
+    plays = with_plays(seeds[0], added)
+    of_file = {len(seeds) - 2} - {0, -1}
+
+    def at_base_fits(chosen: Iterable[int]) -> list[Place]:
+        return [Place(z, f"base fit {i + 1}") for i in chosen for z in error.screened(grid(seeds[i]), EACH_SEED)]
+
+    first = [
+        *(Place(z, BEST_BASE) for z in error.screened(at_best, AT_BEST)),
+        *(Place(z, BEST_BASE) for band in plays for z in error.screened(map(error.coordinates, band), 1)),
+        *at_base_fits(of_file),
+        # Viscous friction stands in no landing: where it is far off, a start from there is far off until it is moved.
+        *moved_starts(error, at_first_half[:1], added),
     ]
-    grids[0] = [_smoothed(error, z) for z in grids[0]]
-    for number, grid in enumerate(grids, 1):
-        starts += [Place(z, f"base fit {number}") for z in error.screened(grid, EACH_SEED if number > 1 else AT_BEST)]
-    for band in with_plays(seeds[0], added):
-        starts += [Place(z, "base fit 1") for z in error.screened(map(error.coordinates, band), 1)]
-    return EffectStarts(starts, at_landings, [grids[0][i :: len(points)] for i in range(len(points))])
+
+    def others() -> list[Place]:
+        landed = [*at_first_half[1:], *(place for half in halves[1:] for place in at_landings(half))]
+        further = sorted({*range(1, len(seeds))} - of_file)
+        return [weakest_start(error, added, seeds[0]), *at_base_fits(further), *moved_starts(error, landed, added)]
+
+    return EffectStarts(first, [at_best[i :: len(points)] for i in range(len(points))], others)
 
 
 def _slower(parameter: Parameter, value: float) -> float:
@@ -161,11 +184,27 @@ def weakest_start(error: SimulationError, added: Sequence[Parameter], seed: Vect
         tuple(nothing.get(each.name, each.most) for each in added),
     ]
     places = (error.coordinates(seed), *(_with(error, seed, added, values) for values in ends))
-    return Place(min(places, key=error.cost), "base fit 1")
+    return Place(min(places, key=error.cost), BEST_BASE)
+
+
+class Half(NamedTuple):
+    """Half of the landings, all where there are too few, from which searches begin."""
+
+    origin: str
+    chosen: Sequence[Rest]
+
+
+def landed_halves(error: SimulationError) -> list[Half]:
+    """Return every other rest, and those between, where there are enough for both: they share no measurement."""
+    found = () if error.run.by.slow else rests(error.run.record)
+    if len(found) < 2 * ENOUGH_RESTS:
+        return [Half(LANDINGS, found)]
+    return [Half(f"even {LANDINGS}", found[::2]), Half(f"odd {LANDINGS}", found[1::2])]
 
 
 def landed_starts(
     error: SimulationError,
+    half: Half,
     seeds: Sequence[Vector],
     points: Sequence[tuple[float, ...]],
     added: Sequence[Parameter],
@@ -177,6 +216,7 @@ def landed_starts(
 
     Args:
         error: by whose screening cost they are compared.
+        half: of the landings.
         seeds: theta from which the landings are solved.
         points: values of the added parameters to begin with.
         added: the parameters of the effects to be added.
@@ -184,11 +224,8 @@ def landed_starts(
     """
     if error.run.by.slow:
         return told_starts(error, seeds, points, added, count)
-    return [
-        Place(z, origin)
-        for origin, chosen in _halves(rests(error.run.record)).items()
-        for z in error.screened(_landed(error, Landings(error, chosen), seeds, points, added), count)
-    ]
+    landed = _landed(error, Landings(error, half.chosen), seeds, points, added)
+    return [Place(z, half.origin) for z in error.screened(landed, count)]
 
 
 def moved_starts(error: SimulationError, landed: Sequence[Place], added: Sequence[Parameter]) -> list[Place]:
@@ -242,7 +279,7 @@ def told_starts(
     if loose:
         least_z = error.least(loose, MIDDLE)
         loose += [_along(error, run, least_z, each, best) for each in _not_told(best, added)]
-    return [Place(z, "landings") for z in _apart(error, loose, count)]
+    return [Place(z, LANDINGS) for z in _apart(error, loose, count)]
 
 
 def _breaking_loose(error: SimulationError, z: Vector) -> Vector:
@@ -304,13 +341,6 @@ def _changed(theta: Vector, added: Iterable[Parameter], values: Iterable[float])
     for parameter, value in zip(added, values, strict=True):
         changed[parameter.index] = value
     return changed
-
-
-def _halves(found: Sequence[Rest]) -> dict[str, Sequence[Rest]]:
-    """Return every other rest, and those between, where there are enough for both: they share no measurement."""
-    if len(found) < 2 * ENOUGH_RESTS:
-        return {"landings": found}
-    return {"even landings": found[::2], "odd landings": found[1::2]}
 
 
 def _landed(

@@ -1,17 +1,17 @@
 """The forward search by simulation: every effect of the library refitted, step by step.
 
-A step fits the valve with each effect added. They race: one that is far behind another at the wide scale or at the
-middling one waits there, and is searched on only if what the step adds leaves something to explain. One whose first
-search ends far behind another's is not searched further, unless the step would name it. An effect that comes after
-another (`AFTER` in its file) is fitted only where that one has evidence, or is in the model already, and what the step
-would add leaves something to explain. Before they are judged, the valve without is fitted once more from the base
-parameters of the best of those with: an optimiser's failure must not look like physics. Steps go on until the added
-model explains all and leaves no room for another effect, nothing more is accepted, or three effects are added. Where
-two steps leave something to explain, the first is tried with each of its runners-up added, too, and taken back if that
-leads farther; not where they leave most of what was there before them. Where the second brings next to nothing, the
-search ends: what is missing is none of the library. Of three effects, one that is not needed beside the others has
-stood in for them, and is taken out. Where several explain all, what had evidence in an earlier step is asked again
-beside what was added later.
+A step fits the valve with each effect added. They race: one that is far behind another at the wide scale, with its
+first searches or with all, or at the middling one waits there, and is searched on only if what the step adds leaves
+something to explain. One whose first search ends far behind another's is not searched further, unless the step would
+name it. An effect that comes after another (`AFTER` in its file) is fitted only where that one has evidence, or is in
+the model already, and what the step would add leaves something to explain. Before they are judged, the valve without is
+fitted once more from the base parameters of the best of those with: an optimiser's failure must not look like physics.
+Steps go on until the added model explains all and leaves no room for another effect, nothing more is accepted, or three
+effects are added. Where two steps leave something to explain, the first is tried with each of its runners-up added,
+too, and taken back if that leads farther; not where they leave most of what was there before them. Where the second
+brings next to nothing, the search ends: what is missing is none of the library. Of three effects, one that is not
+needed beside the others has stood in for them, and is taken out. Where several explain all, what had evidence in an
+earlier step is asked again beside what was added later.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -435,7 +435,7 @@ class EffectSearch:
         """Refit the effects that are not far behind another on the way; return their models, and those that wait."""
         refused: dict[str, BegunFit | str] = {name: each for name, each in racers.items() if isinstance(each, str)}
         fast, waiting = _parted({name: each for name, each in racers.items() if not isinstance(each, str)})
-        for further in (lambda each: each.landed(), lambda each: each.carried()):
+        for further in (lambda each: each.all_begun(), lambda each: each.carried()):
             fast, slower = _parted(self._each(number, "searching", further, fast, 0.5, 0.6))
             waiting |= slower
         return self._settled(number, refused | fast), waiting
@@ -444,9 +444,14 @@ class EffectSearch:
         self, number: int, racers: Mapping[str, BegunFit | str], *, racing: bool = True
     ) -> dict[str, EvaluatedModel | str]:
         """Bring searches to where they stay; one of each effect where that is far behind another's."""
+        workers = max(1, self._workers // max(1, len(racers)))
+        # Where one effect is left alone, the searches of its own share the threads.
+        together = 2 if len(racers) == 1 else 1
 
         def first(each: BegunFit | str) -> BegunFit | str:
-            return each if isinstance(each, str) else each.landed().carried().settled(1)
+            if isinstance(each, str):
+                return each
+            return replace(each, workers=workers).all_begun().carried().settled(together)
 
         fits = self._each(number, "refitting", first, racers, 0.6, 0.8)
         least = min((each.cost for each in fits.values() if not isinstance(each, str)), default=inf)
