@@ -1,5 +1,6 @@
 """A fit on its way: searches at the wide scale, the best of them at the middling one, the best of those to where they
-stay, until searches from independent starts have come to the same; then on from there, off the stairs.
+stay, until searches from independent starts have come to the same; then on from there, off the stairs; and where they
+have not come to the same, between them and beyond.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +13,8 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.descent import MIDDLING, WIDE, descended, settled
+from workbench.fit.crossing import crossed
+from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
@@ -28,6 +30,8 @@ STIRRED, MOST_STIRRED = 100, 6
 """Places about an end from which a search goes on; how often more, at most, as long as that leads lower,"""
 LOWER = 1.002
 """by more than this factor;"""
+IN_VAIN = 2
+"""Rounds of crossing that lead no lower, after which it ends;"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
 
@@ -144,17 +148,39 @@ class BegunFit:
         here = here.shot()
         best = here.ends[0].z
         if here._shows(best):
-            here = replace(here, ends=proved(here.error, here.ends)) if here._rounds(best) else here.stirred()
+            here = replace(here, ends=proved(here.error, here.ends)) if here._rounds(best) else here.gone_on()
         return here.judged(profile=profile)
+
+    def gone_on(self) -> "BegunFit":
+        """Go on from where the searches stay, unless that is far above the floor."""
+        if self.cost > FAR_OFF * self.error.count:
+            return self
+        here = self.stirred()
+        if agreeing(here.error, here.ends) >= here.effort.agreeing:
+            return here
+        lower = here.crossed()
+        return lower.stirred() if here.cost > LOWER * lower.cost else lower
+
+    def crossed(self) -> "BegunFit":
+        """Search on from between the ends and beyond the best, until two rounds in a row lead no lower."""
+
+        def down(start: Vector) -> Vector:
+            return descended(self.error, descended(self.error, start, COARSE), NARROW)
+
+        cost = self.error.cost
+        pool, in_vain = [end.z for end in self.ends], 0
+        while in_vain < IN_VAIN:
+            least, begins = cost(pool[0]), crossed(self.error, pool)
+            pool = sorted([*pool, *_each(down, begins, self.workers, lambda _: None)], key=cost)[: len(begins)]
+            in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
+        best = self.ends[0]
+        return replace(self, ends=self._ordered([replace(best, z=settled(self.error, pool[0])), *self.ends]))
 
     def stirred(self) -> "BegunFit":
         """Go on from the lowest of the places strewn about the best end; where that leads lower, about others too.
 
-        The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them. Far
-        above the floor it stays where it is.
+        The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them.
         """
-        if self.cost > FAR_OFF * self.error.count:
-            return self
 
         def gone_on(z: Vector) -> Vector:
             near = strewn(self.error, on_lowest_tread(self.error, z), STIRRED), by_break_aways(self.error, z)

@@ -4,6 +4,8 @@
                            coordinate its own; in every other static friction moves by 10^t w more, t in -4 to -1.7
     z' = z + 10^u V S w    every third: S deviations along the axes V of the valley, whose floor all coordinates follow
 
+In every fourth about half of the coordinates stay.
+
 Static friction shows in the instants of break-aways alone: its derivative says nothing.
 
 The stairs of a record run across all coordinates at once: a scan of each alone ends on one, as does a descent. Where a
@@ -53,6 +55,8 @@ def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
         far = 10.0 ** generator.uniform(NEAREST, FARTHEST)
         stair = 10.0 ** generator.uniform(STATIC_NEAREST, STATIC_FARTHEST) * static
         w = generator.standard_normal(z.size)
+        if i % 4 == 3:
+            w *= generator.random(z.size) < 0.5
         way = far * axes @ (along * w) if i % 3 == 2 else (far * deviation + i % 2 * stair) * w
         z = error.least((z, np.clip(z + way, error.lower, error.upper)))
     return z
