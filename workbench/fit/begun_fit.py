@@ -13,7 +13,7 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.crossing import crossed
+from workbench.fit.crossing import MOST, crossed
 from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
@@ -156,8 +156,6 @@ class BegunFit:
         if self.cost > FAR_OFF * self.error.count:
             return self
         here = self.stirred()
-        if agreeing(here.error, here.ends) >= here.effort.agreeing:
-            return here
         lower = here.crossed()
         return lower.stirred() if here.cost > LOWER * lower.cost else lower
 
@@ -171,7 +169,7 @@ class BegunFit:
         pool, in_vain = [end.z for end in self.ends], 0
         while in_vain < IN_VAIN:
             least, begins = cost(pool[0]), crossed(self.error, pool)
-            pool = sorted([*pool, *_each(down, begins, self.workers, lambda _: None)], key=cost)[: len(begins)]
+            pool = sorted([*pool, *_each(down, begins, self.workers, lambda _: None)], key=cost)[:MOST]
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         best = self.ends[0]
         return replace(self, ends=self._ordered([replace(best, z=settled(self.error, pool[0])), *self.ends]))
