@@ -6,6 +6,7 @@ have not come to the same, between them and beyond.
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from typing import TypeVar
 
@@ -14,7 +15,7 @@ from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.break_aways import by_break_aways
 from workbench.fit.crossing import MOST, crossed
-from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
+from workbench.fit.descent import MIDDLING, WIDE, brought_down, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
@@ -161,18 +162,17 @@ class BegunFit:
 
     def crossed(self) -> "BegunFit":
         """Search on from between the ends and beyond the best, until two rounds in a row lead no lower."""
-
-        def down(start: Vector) -> Vector:
-            return descended(self.error, descended(self.error, start, COARSE), NARROW)
-
-        cost = self.error.cost
+        cost, down = self.error.cost, partial(brought_down, self.error)
         pool, in_vain = [end.z for end in self.ends], 0
         while in_vain < IN_VAIN:
-            least, begins = cost(pool[0]), crossed(self.error, pool)
-            pool = sorted([*pool, *_each(down, begins, self.workers, lambda _: None)], key=cost)[:MOST]
+            least = cost(pool[0])
+            found = _each(down, crossed(self.error, pool), self.workers, lambda _: None)
+            pool = sorted([*pool, *found], key=cost)[:MOST]
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
-        best = self.ends[0]
-        return replace(self, ends=self._ordered([replace(best, z=settled(self.error, pool[0])), *self.ends]))
+        if pool[0] is self.ends[0].z:
+            return self
+        best = replace(self.ends[0], z=settled(self.error, pool[0]))
+        return replace(self, ends=self._ordered([best, *self.ends[1:]]))
 
     def stirred(self) -> "BegunFit":
         """Go on from the lowest of the places strewn about the best end; where that leads lower, about others too.
@@ -180,17 +180,17 @@ class BegunFit:
         The stairs run across all coordinates at once: a descent and scans of each alone may end on one of them.
         """
 
-        def gone_on(z: Vector) -> Vector:
+        def off_stairs(z: Vector) -> Vector:
             near = strewn(self.error, on_lowest_tread(self.error, z), STIRRED), by_break_aways(self.error, z)
             found = [settled(self.error, each, self.effort.improves_below) for each in near if each is not z]
             return min([z, *found], key=self.error.cost)
 
         def stirred(end: Place) -> Place:
-            before, here = end.z, gone_on(end.z)
+            before, here = end.z, off_stairs(end.z)
             for _ in range(MOST_STIRRED):
                 if self.error.cost(before) <= LOWER * self.error.cost(here):
                     break
-                before, here = here, gone_on(here)
+                before, here = here, off_stairs(here)
             return replace(end, z=here)
 
         best, *others = stirred(self.ends[0]), *self.ends[1:]
