@@ -36,9 +36,6 @@ IN_VAIN = 2
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
 
-FAR_OFF = 5.0
-"""Cost a sample above which what a valve lacks is not a stair beside its end."""
-
 Progress = Callable[[float], None]
 T = TypeVar("T")
 S = TypeVar("S")
@@ -54,6 +51,8 @@ class Effort:
     """of those at most so many, two at a time, are brought to where they stay,"""
     agreeing: int
     """until searches from so many origins have come to the same."""
+    near: float
+    """Cost a sample up to which the ends are gone on from: above it, what a valve lacks is no stair beside them."""
     improves_below: float = inf
     """Cost above which an effect makes nothing better than the base: such ends are not scanned for stairs, and do not
     agree, as the place where the effect is off can be reached from everywhere."""
@@ -154,7 +153,7 @@ class BegunFit:
 
     def gone_on(self) -> "BegunFit":
         """Go on from where the searches stay, unless that is far above the floor."""
-        if self.cost > FAR_OFF * self.error.count:
+        if self.cost > self.effort.near * self.error.count:
             return self
         here = self.stirred()
         lower = here.crossed()
