@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.searches import Case, posed, true_cost
+from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN
-from workbench.fit.crossing import PARTNERS, crossed
+from workbench.fit.crossing import PARTNERS, crossed, leaves_noise, unlike
 from workbench.fit.fitting import fit
 
 
@@ -27,9 +28,36 @@ def test_no_place_lies_outside_the_bounds_and_of_many_ends_the_best_are_crossed(
     assert found.max() == 1.0
 
 
-@pytest.mark.parametrize("case", [Case("flow_force", 140479, "poor"), Case("backlash", 140198, "poor")])
+def test_of_ends_that_have_come_to_the_same_one_counts() -> None:
+    best, same, apart = np.array([0.1, 0.2]), np.array([0.1, 0.2005]), np.array([0.1, 0.21])
+    assert [each.tolist() for each in unlike([best, same, apart])] == [best.tolist(), apart.tolist()]
+
+
+class Left:
+    """What a search has left."""
+
+    def __init__(self, left: Vector) -> None:
+        self.residuals = lambda _: left
+
+
+def test_where_noise_is_left_there_is_nothing_to_go_on_for() -> None:
+    noise = np.random.default_rng(2).standard_normal(3000)
+    late = noise + 6.0 * (np.arange(3000) == 1000)
+    slow = noise + 0.5 * np.sin(0.01 * np.arange(3000))
+    verdicts = [leaves_noise(Left(left), np.zeros(2)) for left in (noise, 0.5 * noise, late, slow)]  # type: ignore[arg-type]
+    assert verdicts == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case("flow_force", 140479, "poor"),
+        Case("backlash", 140198, "poor"),
+        Case("asymmetric_friction", 150255, "poor"),
+    ],
+)
 def test_searches_that_end_apart_in_one_valley_come_to_its_floor(case: Case) -> None:
-    """Of twelve slips, 4 and 5 % above the truth: walls so steep that no derivative on the floor points along it."""
+    """Of twelve slips, 4 % to 41 times above the truth: walls so steep that no derivative on the floor points along."""
     recording, valve, truth = posed(case)
     base = fit(recording, valve, workers=1, profile=False)
     found = fit(recording, valve, effects=(case.effect,), workers=1, base=base, profile=False)

@@ -6,7 +6,6 @@ have not come to the same, between them and beyond.
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import partial
 from math import inf
 from typing import TypeVar
 
@@ -14,8 +13,8 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.crossing import MOST, crossed
-from workbench.fit.descent import MIDDLING, WIDE, brought_down, descended, settled
+from workbench.fit.crossing import crossed, leaves_noise, unlike
+from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
@@ -31,7 +30,7 @@ STIRRED, MOST_STIRRED = 100, 6
 """Places about an end from which a search goes on; how often more, at most, as long as that leads lower,"""
 LOWER = 1.002
 """by more than this factor;"""
-IN_VAIN = 2
+IN_VAIN = 3
 """Rounds of crossing that lead no lower, after which it ends;"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
@@ -156,17 +155,24 @@ class BegunFit:
         if self.cost > self.effort.near * self.error.count:
             return self
         here = self.stirred()
+        if leaves_noise(here.error, here.ends[0].z):
+            return here
         lower = here.crossed()
         return lower.stirred() if here.cost > LOWER * lower.cost else lower
 
     def crossed(self) -> "BegunFit":
         """Search on from between the ends and beyond the best, until two rounds in a row lead no lower."""
-        cost, down = self.error.cost, partial(brought_down, self.error)
-        pool, in_vain = [end.z for end in self.ends], 0
+        cost = self.error.cost
+
+        def down(start: Vector) -> Vector:
+            z = descended(self.error, start, COARSE)
+            return z if cost(z) > LIKELY * self.cost else descended(self.error, z, NARROW)
+
+        pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
         while in_vain < IN_VAIN:
             least = cost(pool[0])
             found = _each(down, crossed(self.error, pool), self.workers, lambda _: None)
-            pool = sorted([*pool, *found], key=cost)[:MOST]
+            pool = unlike(sorted([*pool, *found], key=cost))
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:
             return self
