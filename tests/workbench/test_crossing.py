@@ -24,12 +24,12 @@ def test_places_lie_between_the_ends_and_beyond_the_best() -> None:
 def test_no_place_lies_outside_the_bounds_and_of_many_ends_the_best_are_crossed() -> None:
     ends = [np.full(2, 0.9), *(np.full(2, -0.1 * i) for i in range(9))]
     found = np.array(crossed(Box(), ends))  # type: ignore[arg-type]
-    assert len(found) == 3 * PARTNERS
+    assert len(found) == 3 * PARTNERS + PARTNERS * (PARTNERS - 1)
     assert found.max() == 1.0
 
 
 def test_of_ends_that_have_come_to_the_same_one_counts() -> None:
-    best, same, apart = np.array([0.1, 0.2]), np.array([0.1, 0.2005]), np.array([0.1, 0.21])
+    best, same, apart = np.array([0.1, 0.2]), np.array([0.1, 0.20005]), np.array([0.1, 0.21])
     assert [each.tolist() for each in unlike([best, same, apart])] == [best.tolist(), apart.tolist()]
 
 
