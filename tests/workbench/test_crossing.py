@@ -52,8 +52,8 @@ def test_where_noise_is_left_there_is_nothing_to_go_on_for() -> None:
     "case",
     [
         Case("flow_force", 140479, "poor"),
-        Case("backlash", 140198, "poor"),
-        Case("asymmetric_friction", 150255, "poor"),
+        pytest.param(Case("backlash", 140198, "poor"), marks=pytest.mark.long),
+        pytest.param(Case("asymmetric_friction", 150255, "poor"), marks=pytest.mark.long),
     ],
 )
 def test_searches_that_end_apart_in_one_valley_come_to_its_floor(case: Case) -> None:
