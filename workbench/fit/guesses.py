@@ -1,6 +1,7 @@
 """What a record suggests for a parameter of an effect: stops at the positions' ends, quanta of their rests, delays.
 
-S(q) = |sum exp(2 pi i x_j / q)|      x_j median position of the j-th rest, where the noise is small; q quantum, m
+S(q) = sum w_j cos(2 pi x_j / q)      x_j median position of the j-th rest, where the noise is small, a multiple of the
+                                      quantum q, m; w_j its samples, at most 60
 
 Where rests are few, samples spread over the record stand in for them: these show a quantum of four noises and more.
 
@@ -31,7 +32,11 @@ LIKELY_QUANTA = 8
 THE_SAME = 1e-3
 """Rise of the cost that is none."""
 FINEST, COARSEST = 2.0, 8.0
-"""A quantum is sought from so many noises to the swept positions divided by so many."""
+"""A quantum is sought from so many noises to the swept positions divided by so many;"""
+FINEST_OF_RESTS = 0.8
+"""in rests, whose noise is less, from so many on."""
+SURE_OF_REST = 60
+"""Samples of a rest from which on it counts no more than another: its noise is no longer what matters."""
 PER_LOBE = 8.0
 MOVED = 5.0
 """Noises from one sample to the next that are a move."""
@@ -135,33 +140,36 @@ def likely_delays_s(record: Record) -> list[float]:
 
 def likely_quanta_m(record: Record) -> list[float]:
     """Return the steps, m, of which the positions look most to be multiples, of the highest S(q) first."""
-    places_m = _rests_m(record)
+    places_m, weights = _rests_m(record)
+    finest = FINEST_OF_RESTS
     if places_m.size < FEWEST_RESTS:
         samples_m = record.position_m[record.valid]
         places_m = samples_m[:: 1 + samples_m.size // MOST_SAMPLES]
+        weights, finest = np.ones(places_m.size), FINEST
     swept_m = float(np.ptp(places_m))
     if swept_m < 2.0 * COARSEST * FINEST * record.scale_m:
         return []
-    frequency = np.arange(COARSEST / swept_m, 1.0 / (FINEST * record.scale_m), 1.0 / (PER_LOBE * swept_m))
-    height = np.abs(np.exp(2j * np.pi * np.outer(frequency, places_m)).sum(axis=1))
+    farthest_m = float(np.abs(places_m).max())
+    frequency = np.arange(COARSEST / swept_m, 1.0 / (finest * record.scale_m), 1.0 / (PER_LOBE * farthest_m))
+    height = np.cos(2.0 * np.pi * np.outer(frequency, places_m)) @ weights
     peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]))
     likeliest = peaks[np.argsort(-height[peaks])[:LIKELY_QUANTA]]
     half = frequency[1] - frequency[0]
-    return [1.0 / _summit(float(each), half, places_m) for each in frequency[likeliest]]
+    return [1.0 / _summit(float(each), half, places_m, weights) for each in frequency[likeliest]]
 
 
-def _summit(frequency: float, half: float, places_m: Column) -> float:
+def _summit(frequency: float, half: float, places_m: Column, weights: Column) -> float:
     """Return where S is highest within half a width of a frequency, 1/m."""
 
     def depth(there: float) -> float:
-        return -float(np.abs(np.exp(2j * np.pi * there * places_m).sum()))
+        return -float(np.cos(2.0 * np.pi * there * places_m) @ weights)
 
     return float(minimize_scalar(depth, bounds=(frequency - half, frequency + half), method="bounded").x)
 
 
-def _rests_m(record: Record) -> Column:
-    """Return the median position of each rest long enough: a sample of the next quantum does not move it."""
-    places = []
+def _rests_m(record: Record) -> tuple[Column, Column]:
+    """Return the median position of each rest long enough, which a sample of the next quantum does not move, and w."""
+    places, weights = [], []
     for first, end in record.segments:
         position_m = np.where(record.valid, record.position_m, np.nan)[first:end]
         way = directions(position_m, record.scale_m)
@@ -169,4 +177,5 @@ def _rests_m(record: Record) -> Column:
         for begin, over in pairwise(edges):
             if way[begin] == 0 and over - begin >= LEAST_REST:
                 places.append(float(np.nanmedian(position_m[begin:over])))
-    return np.array(places)
+                weights.append(min(over - begin, SURE_OF_REST) / SURE_OF_REST)
+    return np.array(places), np.array(weights)

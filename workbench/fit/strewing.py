@@ -27,6 +27,8 @@ from workbench.fit.uncertainty import along_axes, of_coordinates
 
 STREWN, PROVING = 400, 1200
 """Places about each end, and about the best of all."""
+MOST_PROVED, LOWER = 4, 1.002
+"""How often more, at most, as long as that leads lower by this factor."""
 NEAREST, FARTHEST = -1.5, 1.5
 """Of the decimal logarithm of the distance, in deviations."""
 SURE, UNSURE = 1e-5, 3e-3
@@ -68,4 +70,9 @@ def proved(error: SimulationError, ends: Sequence[Place]) -> tuple[Place, ...]:
     Where that is lower by more than searches may differ, the others do not agree with it any more.
     """
     best, *others = ends
-    return replace(best, z=strewn(error, best.z, PROVING)), *others
+    before, here = best.z, strewn(error, on_lowest_tread(error, best.z), PROVING)
+    for _ in range(MOST_PROVED):
+        if error.cost(before) <= LOWER * error.cost(here):
+            break
+        before, here = here, strewn(error, on_lowest_tread(error, here), PROVING)
+    return replace(best, z=here), *others
