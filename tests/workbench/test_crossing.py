@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 from benchmarks.searches import Case, posed, true_cost
+from sim.composition import COULOMB, STATIC
 from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN
-from workbench.fit.crossing import PARTNERS, crossed, leaves_noise, unlike
+from workbench.fit.crossing import FAR, PARTNERS, crossed, leaves_noise, sticking, unlike
 from workbench.fit.fitting import fit
+from workbench.model.parameters import Parameter
 
 
 class Box:
-    """The bounds of two coordinates."""
+    """The bounds of two coordinates, and whose they are."""
 
     lower, upper = np.array([-1.0, -1.0]), np.array([1.0, 1.0])
+    parameters: tuple[Parameter, ...] = ()
 
 
 def test_places_lie_between_the_ends_and_beyond_the_best() -> None:
@@ -46,6 +49,16 @@ def test_where_noise_is_left_there_is_nothing_to_go_on_for() -> None:
     slow = noise + 0.5 * np.sin(0.01 * np.arange(3000))
     verdicts = [leaves_noise(Left(left), np.zeros(2)) for left in (noise, 0.5 * noise, late, slow)]  # type: ignore[arg-type]
     assert verdicts == [True, True, False, False]
+
+
+def test_static_friction_is_tried_on_other_treads_and_nothing_where_it_is_kept() -> None:
+    box = Box()
+    box.parameters = (Parameter("coulomb_n", COULOMB, 1.0, 2.0), Parameter("static_n", STATIC, 1.0, 5.0))
+    places = np.array(sticking(box, np.array([0.1, 0.5])))  # type: ignore[arg-type]
+    assert (places[:, 0] == 0.1).all()
+    assert np.sort(places[:, 1] - 0.5) == pytest.approx(np.sort([*FAR, *-FAR]))
+    box.parameters = box.parameters[:1]
+    assert sticking(box, np.array([0.1])) == []  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

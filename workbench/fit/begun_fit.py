@@ -13,7 +13,7 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import WITHIN, Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.crossing import crossed, leaves_noise, unlike
+from workbench.fit.crossing import crossed, leaves_noise, sticking, unlike
 from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
@@ -169,9 +169,10 @@ class BegunFit:
             return z if cost(z) > LIKELY * self.cost else descended(self.error, z, NARROW)
 
         pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
+        begins = sticking(self.error, pool[0])
         while in_vain < IN_VAIN:
-            least = cost(pool[0])
-            found = _each(down, crossed(self.error, pool), self.workers, lambda _: None)
+            least, begins = cost(pool[0]), [*begins, *crossed(self.error, pool)]
+            found, begins = _each(down, begins, self.workers, lambda _: None), []
             pool = unlike(sorted([*pool, *found], key=cost))
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:

@@ -16,6 +16,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import ndtri
 
+from sim.composition import STATIC
 from sim.karnopp import Vector
 from workbench.fit.objective import SimulationError
 
@@ -23,10 +24,20 @@ PARTNERS, MOST = 3, 8
 """Ends besides the best that are crossed with it; of those that are there so many are kept."""
 BETWEEN, BEYOND, BESIDE = 0.5, (-0.5, -2.0), (1.0, -1.0)
 """f"""
+FAR = np.array([0.01, 0.03, 0.06, 0.12])
+"""Of log(F_s/F_c): to treads that none of the ends is on."""
 APART = 0.2
 """How often one of the samples of noise lies farther off than what counts as apart."""
 ALIKE = 1e-4
 """By how much two ends differ at most, in each coordinate, that have come to the same."""
+
+
+def sticking(error: SimulationError, z: Vector) -> list[Vector]:
+    """Return z with static friction farther off, either way: no derivative says that all else should go along."""
+    static = np.array([each.index == STATIC for each in error.parameters])
+    if not static.any():
+        return []
+    return [np.asarray(np.clip(z + far * static, error.lower, error.upper)) for far in (*FAR, *-FAR)]
 
 
 def leaves_noise(error: SimulationError, z: Vector) -> bool:
