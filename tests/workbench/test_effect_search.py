@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -35,6 +36,9 @@ class Begun:
     all_of: list[str]
     """Effects whose searches have all begun."""
     workers: int = 1
+    up_to: float = np.inf
+    """Cost up to which its ends are gone on from."""
+    error = SimpleNamespace(count=AT_FLOOR / 0.5)
 
     @property
     def screening_cost(self) -> float:
@@ -55,6 +59,9 @@ class Begun:
     def carried(self) -> "Begun":
         return self
 
+    def near(self, cost: float) -> "Begun":
+        return replace(self, up_to=cost)
+
     def settled(self, _: int) -> "Begun":
         return self
 
@@ -65,7 +72,7 @@ class Begun:
         return self.first
 
     def finished(self, **_: object) -> Fit:
-        return self.best
+        return self.best if self.cost <= self.up_to else self.first
 
 
 def names(step: EffectStep) -> list[str]:
@@ -399,6 +406,14 @@ def test_what_is_far_behind_is_not_searched_further(searched: Callable[..., tupl
     floors = {"ip_lag": 1.0, "backlash": 18.0, "stribeck": 9.0}
     (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.5)
     assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 1.5 * 18.0})
+
+
+def test_what_is_behind_one_that_leaves_nothing_is_not_gone_on_from(
+    searched: Callable[..., tuple[EffectStep, ...]],
+) -> None:
+    floors = {"ip_lag": 1.0, "backlash": 4.0, "stribeck": 1.9}
+    (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.05)
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 1.05 * 4.0})
 
 
 def test_what_is_far_behind_on_the_way_waits_there(searched: Callable[..., tuple[EffectStep, ...]]) -> None:

@@ -150,6 +150,10 @@ class BegunFit:
             here = replace(here, ends=proved(here.error, here.ends)) if here._rounds(best) else here.gone_on()
         return here.judged(profile=profile)
 
+    def near(self, cost: float) -> "BegunFit":
+        """Let its ends be gone on from up to a cost only."""
+        return replace(self, effort=replace(self.effort, near=min(self.effort.near, cost / self.error.count)))
+
     def gone_on(self) -> "BegunFit":
         """Go on from where the searches stay, unless that is far above the floor."""
         if self.cost > self.effort.near * self.error.count:
@@ -161,7 +165,7 @@ class BegunFit:
         return lower.stirred() if here.cost > LOWER * lower.cost else lower
 
     def crossed(self) -> "BegunFit":
-        """Search on from between the ends and beyond the best, until two rounds in a row lead no lower."""
+        """Search on from between the ends and beyond the best, until a few rounds in a row lead no lower."""
         cost = self.error.cost
 
         def down(start: Vector) -> Vector:

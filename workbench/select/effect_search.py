@@ -26,7 +26,7 @@ from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import Split
-from workbench.fit.begun_fit import BegunFit
+from workbench.fit.begun_fit import LEAVES, BegunFit
 from workbench.fit.descent import NARROW, descended
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import begun_fit, fit, profiled
@@ -62,7 +62,9 @@ MOST, NEARLY_ALL = 0.5, 0.8
 LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
 OUT_OF_RACE = 10.0
-"""Factor on the cost of the best search of a step, above which an effect is not searched further."""
+"""Factor on the cost of the best search of a step, above which an effect is not searched further;"""
+BESIDE = 2.0
+"""above which, where that best one leaves nothing, another's searches are not gone on from where they stay."""
 
 Progress = Callable[[str, float], None]
 Race = Callable[[int, str, float], None]
@@ -460,6 +462,7 @@ class EffectSearch:
             if isinstance(each, str):
                 return each
             lost = racing and each.cost > OUT_OF_RACE * least
+            each = each.near(BESIDE * least) if least <= LEAVES * each.error.count else each
             try:
                 return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
             except InputError as error:
