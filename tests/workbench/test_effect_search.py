@@ -59,7 +59,7 @@ class Begun:
     def carried(self) -> "Begun":
         return self
 
-    def near(self, cost: float) -> "Begun":
+    def gone_on_up_to(self, cost: float) -> "Begun":
         return replace(self, up_to=cost)
 
     def settled(self, _: int) -> "Begun":

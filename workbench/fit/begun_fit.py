@@ -1,6 +1,6 @@
 """A fit on its way: searches at the wide scale, the best of them at the middling one, the best of those to where they
-stay, until searches from independent starts have come to the same; then on from there, off the stairs; and where they
-have not come to the same, between them and beyond.
+stay, until searches from independent starts have come to the same; then on from there, off the stairs; and where more
+than noise is left, between them and beyond.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
-from workbench.fit.strewing import on_lowest_tread, proved, strewn
+from workbench.fit.strewing import LOWER, on_lowest_tread, proved, strewn, while_lower
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import Parameter
 
@@ -27,11 +27,9 @@ LEAVES = 0.6
 """Cost a sample above which a fit leaves something to explain; that of white residuals of the noise is 0.485."""
 
 STIRRED, MOST_STIRRED = 100, 6
-"""Places about an end from which a search goes on; how often more, at most, as long as that leads lower,"""
-LOWER = 1.002
-"""by more than this factor;"""
+"""Places about an end from which a search goes on; how often more, at most, as long as that leads clearly lower;"""
 IN_VAIN = 3
-"""Rounds of crossing that lead no lower, after which it ends;"""
+"""rounds of crossing that do not, after which it ends;"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
 
@@ -150,7 +148,7 @@ class BegunFit:
             here = replace(here, ends=proved(here.error, here.ends)) if here._rounds(best) else here.gone_on()
         return here.judged(profile=profile)
 
-    def near(self, cost: float) -> "BegunFit":
+    def gone_on_up_to(self, cost: float) -> "BegunFit":
         """Let its ends be gone on from up to a cost only."""
         return replace(self, effort=replace(self.effort, near=min(self.effort.near, cost / self.error.count)))
 
@@ -173,11 +171,11 @@ class BegunFit:
             return z if cost(z) > LIKELY * self.cost else descended(self.error, z, NARROW)
 
         pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
-        begins = sticking(self.error, pool[0])
+        more = sticking(self.error, pool[0])
         while in_vain < IN_VAIN:
-            least, begins = cost(pool[0]), [*begins, *crossed(self.error, pool)]
-            found, begins = _each(down, begins, self.workers, lambda _: None), []
-            pool = unlike(sorted([*pool, *found], key=cost))
+            least = cost(pool[0])
+            found = _each(down, [*more, *crossed(self.error, pool)], self.workers, lambda _: None)
+            pool, more = unlike(sorted([*pool, *found], key=cost)), []
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:
             return self
@@ -196,12 +194,7 @@ class BegunFit:
             return min([z, *found], key=self.error.cost)
 
         def stirred(end: Place) -> Place:
-            before, here = end.z, off_stairs(end.z)
-            for _ in range(MOST_STIRRED):
-                if self.error.cost(before) <= LOWER * self.error.cost(here):
-                    break
-                before, here = here, off_stairs(here)
-            return replace(end, z=here)
+            return replace(end, z=while_lower(self.error, end.z, off_stairs, MOST_STIRRED))
 
         best, *others = stirred(self.ends[0]), *self.ends[1:]
         here = replace(self, ends=self._ordered([best, *others]))

@@ -85,11 +85,6 @@ def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
     return there if error.cost(there, stage.scale) < error.cost(z, stage.scale) else z
 
 
-def brought_down(error: SimulationError, z: Vector) -> Vector:
-    """Return the coordinates of the least that the last two stages reach from z, without a scan."""
-    return descended(error, descended(error, z, COARSE), NARROW)
-
-
 def settled(error: SimulationError, z: Vector, scanned_below: float = inf) -> Vector:
     """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower.
 
@@ -110,7 +105,7 @@ def settled(error: SimulationError, z: Vector, scanned_below: float = inf) -> Ve
 def _at_rest(error: SimulationError, z: Vector, scanned_below: float = inf) -> Vector:
     """Return where descents and scans by turns leave z as it is."""
     for _ in range(ROUNDS):
-        z = brought_down(error, z)
+        z = descended(error, descended(error, z, COARSE), NARROW)
         at_rest = error.cost(z)
         if at_rest > scanned_below:
             break

@@ -32,7 +32,7 @@ from workbench.fit.fit_result import Fit, with_profile
 from workbench.fit.objective import SimulationError
 from workbench.fit.setpoint_starts import FREE as FREE_BY_SETPOINT
 from workbench.fit.setpoint_starts import setpoint_starts
-from workbench.fit.starts import base_starts, effect_starts, forces_regressed, weakest_start
+from workbench.fit.starts import base_starts, effect_starts, forces_regressed
 from workbench.fit.threads import linear_algebra_alone
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
@@ -303,7 +303,6 @@ def _begun(
     effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
     starts = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint, points=points)
     tell = progress or (lambda _: None)
-    weakest = weakest_start(error, added, seeds[0])
     begun = BegunFit(
         composition,
         error,
@@ -311,7 +310,7 @@ def _begun(
         effort,
         workers,
         tell,
-        weakest=weakest,
+        weakest=starts.weakest,
         others=starts.others,
         added=added,
         strengths=starts.strengths,

@@ -76,6 +76,7 @@ class EffectStarts(NamedTuple):
     first: list[Place]
     strengths: list[list[Vector]]
     """Coordinates of each strength at the best base fit, from which most of `first` were chosen."""
+    weakest: Place
     others: Callable[[], list[Place]]
     """Finds the others, which nobody needs where the first fall far behind another effect's."""
 
@@ -138,7 +139,8 @@ def effect_starts(
     at_first_half = [place for half in halves[:1] for place in at_landings(half)]
     at_best = [_smoothed(error, z) for z in grid(seeds[0])]
     plays = with_plays(seeds[0], added)
-    of_file = {len(seeds) - 2} - {0, -1}
+    of_file = [i for i in (len(seeds) - 2,) if i > 0]
+    weakest = weakest_start(error, added, seeds[0])
 
     def at_base_fits(chosen: Iterable[int]) -> list[Place]:
         return [Place(z, f"base fit {i + 1}") for i in chosen for z in error.screened(grid(seeds[i]), EACH_SEED)]
@@ -153,10 +155,10 @@ def effect_starts(
 
     def others() -> list[Place]:
         landed = [*at_first_half[1:], *(place for half in halves[1:] for place in at_landings(half))]
-        further = sorted({*range(1, len(seeds))} - of_file)
-        return [weakest_start(error, added, seeds[0]), *at_base_fits(further), *moved_starts(error, landed, added)]
+        further = [i for i in range(1, len(seeds)) if i not in of_file]
+        return [weakest, *at_base_fits(further), *moved_starts(error, landed, added)]
 
-    return EffectStarts(first, [at_best[i :: len(points)] for i in range(len(points))], others)
+    return EffectStarts(first, [at_best[i :: len(points)] for i in range(len(points))], weakest, others)
 
 
 def _slower(parameter: Parameter, value: float) -> float:

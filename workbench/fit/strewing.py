@@ -13,7 +13,7 @@ sensor rounds, searches of several origins may end on the same one: before they 
 about the best.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from workbench.fit.uncertainty import along_axes, of_coordinates
 STREWN, PROVING = 400, 1200
 """Places about each end, and about the best of all."""
 MOST_PROVED, LOWER = 4, 1.002
-"""How often more, at most, as long as that leads lower by this factor."""
+"""How often more, at most; by what factor lower it must lead to be made again."""
 NEAREST, FARTHEST = -1.5, 1.5
 """Of the decimal logarithm of the distance, in deviations."""
 SURE, UNSURE = 1e-5, 3e-3
@@ -64,15 +64,24 @@ def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
     return z
 
 
+def while_lower(error: SimulationError, z: Vector, move: Callable[[Vector], Vector], most: int) -> Vector:
+    """Return where a move leads from z, made once, then so many times at most, as long as it leads clearly lower."""
+    before, here = z, move(z)
+    for _ in range(most):
+        if error.cost(before) <= LOWER * error.cost(here):
+            break
+        before, here = here, move(here)
+    return here
+
+
 def proved(error: SimulationError, ends: Sequence[Place]) -> tuple[Place, ...]:
     """Return the ends, best first, with the first moved to the lowest place about it.
 
     Where that is lower by more than searches may differ, the others do not agree with it any more.
     """
+
+    def off_stairs(z: Vector) -> Vector:
+        return strewn(error, on_lowest_tread(error, z), PROVING)
+
     best, *others = ends
-    before, here = best.z, strewn(error, on_lowest_tread(error, best.z), PROVING)
-    for _ in range(MOST_PROVED):
-        if error.cost(before) <= LOWER * error.cost(here):
-            break
-        before, here = here, strewn(error, on_lowest_tread(error, here), PROVING)
-    return replace(best, z=here), *others
+    return replace(best, z=while_lower(error, best.z, off_stairs, MOST_PROVED)), *others

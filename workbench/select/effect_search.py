@@ -63,7 +63,7 @@ LEFT_BEHIND = 1.0
 """Of BIC: less is nothing."""
 OUT_OF_RACE = 10.0
 """Factor on the cost of the best search of a step, above which an effect is not searched further;"""
-BESIDE = 2.0
+BEHIND = 2.0
 """above which, where that best one leaves nothing, another's searches are not gone on from where they stay."""
 
 Progress = Callable[[str, float], None]
@@ -446,9 +446,9 @@ class EffectSearch:
         self, number: int, racers: Mapping[str, BegunFit | str], *, racing: bool = True
     ) -> dict[str, EvaluatedModel | str]:
         """Bring searches to where they stay; one of each effect where that is far behind another's."""
-        workers = max(1, self._workers // max(1, len(racers)))
-        # Where one effect is left alone, the searches of its own share the threads.
-        together = 2 if len(racers) == 1 else 1
+        # Where few effects are left, the searches of each share the threads.
+        searched = sum(not isinstance(each, str) for each in racers.values())
+        workers, together = max(1, self._workers // max(1, searched)), 2 if searched == 1 else 1
 
         def first(each: BegunFit | str) -> BegunFit | str:
             if isinstance(each, str):
@@ -462,7 +462,7 @@ class EffectSearch:
             if isinstance(each, str):
                 return each
             lost = racing and each.cost > OUT_OF_RACE * least
-            each = each.near(BESIDE * least) if least <= LEAVES * each.error.count else each
+            each = each.gone_on_up_to(BEHIND * least) if least <= LEAVES * each.error.count else each
             try:
                 return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
             except InputError as error:
