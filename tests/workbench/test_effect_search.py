@@ -52,6 +52,12 @@ class Begun:
     def rms_m(self) -> float:
         return self.first.rms_m
 
+    @property
+    def not_gone_on(self) -> Fit:
+        """What all searches come to that are not gone on from: half of the way from the first to the best."""
+        cost, rms_m = 0.5 * (self.first.cost + self.best.cost), 0.5 * (self.first.rms_m + self.best.rms_m)
+        return replace(self.best, cost=cost, rms_m=rms_m)
+
     def all_begun(self) -> "Begun":
         self.all_of.extend(each.name for each in self.best.valve.effect)
         return self
@@ -60,7 +66,7 @@ class Begun:
         return self
 
     def gone_on_up_to(self, cost: float) -> "Begun":
-        return replace(self, up_to=cost)
+        return replace(self, up_to=min(self.up_to, cost))
 
     def settled(self, _: int) -> "Begun":
         return self
@@ -68,11 +74,14 @@ class Begun:
     def left(self) -> Fit:
         return self.way
 
+    def by_one(self) -> Fit:
+        return self.first
+
     def judged(self, **_: object) -> Fit:
         return self.first
 
     def finished(self, **_: object) -> Fit:
-        return self.best if self.cost <= self.up_to else self.first
+        return self.best if self.cost <= self.up_to else self.not_gone_on
 
 
 def names(step: EffectStep) -> list[str]:
@@ -93,6 +102,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         from_landings: list[tuple[str, bool]] | None = None,
         all_of: list[str] | None = None,
         strengths: Mapping[str, Fitted] | None = None,
+        noise: bool = False,
     ) -> tuple[EffectStep, ...]:
         def made(valve: ValveFile, effects: Sequence[str]) -> Fit:
             there = tuple(each.name for each in valve.effect)
@@ -123,6 +133,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         monkeypatch.setattr(effect_search, "profiled", profiled)
         monkeypatch.setattr(effect_search, "block_errors", block_errors)
         monkeypatch.setattr(EffectSearch, "_local_minimum", lambda *_: local_minimum)
+        monkeypatch.setattr(EffectSearch, "_noise", lambda *_: noise)
         search = search_of({name: LIBRARY[name] for name in library}, workers)
         steps = search.steps(search.base(valve_with()))
         return search.proved(steps)[0] if strengths else steps
@@ -405,15 +416,37 @@ def error_in_floors(step: EffectStep, name: str) -> float:
 def test_what_is_far_behind_is_not_searched_further(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
     floors = {"ip_lag": 1.0, "backlash": 18.0, "stribeck": 9.0}
     (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.5)
-    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 1.5 * 18.0})
+    errors = floors | {"backlash": 1.5 * 18.0, "stribeck": 1.25 * 9.0}
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(errors)
 
 
-def test_what_is_behind_one_that_leaves_nothing_is_not_gone_on_from(
-    searched: Callable[..., tuple[EffectStep, ...]],
+@pytest.mark.parametrize("least", [1.0, 10.0], ids=["leaves nothing", "leaves much"])
+def test_what_is_behind_another_is_not_gone_on_from(
+    searched: Callable[..., tuple[EffectStep, ...]], least: float
 ) -> None:
-    floors = {"ip_lag": 1.0, "backlash": 4.0, "stribeck": 1.9}
-    (step,) = searched(lambda _, added: min((floors[each] for each in added), default=100.0), *floors, first=1.05)
-    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(floors | {"backlash": 1.05 * 4.0})
+    floors = {"ip_lag": least, "backlash": 4.0 * least, "stribeck": 1.9 * least}
+    step, *_ = searched(lambda _, added: min((floors[each] for each in added), default=1e3), *floors, first=1.1)
+    errors = floors | {"backlash": 1.05 * 4.0 * least}
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(errors)
+
+
+@pytest.mark.parametrize(("noise", "base"), [(True, 3.0), (False, 1.0)], ids=["leaves noise", "explains all"])
+def test_beside_what_leaves_nothing_one_search_tells_and_all_are_made_where_there_is_evidence(
+    searched: Callable[..., tuple[EffectStep, ...]], noise: bool, base: float
+) -> None:
+    """Nor are they gone on from where the base explains all: what it lacks lies beside it."""
+    floors = {"ip_lag": 0.9 * base, "backlash": 0.993 * base}
+    begun: list[str] = []
+    step, *_ = searched(
+        lambda _, added: min((floors[each] for each in added), default=base),
+        *floors,
+        first=1.005,
+        noise=noise,
+        all_of=begun,
+    )
+    assert begun[0] == "ip_lag"
+    errors = {"ip_lag": floors["ip_lag"] * (1.0 if noise else 1.0025), "backlash": 1.005 * floors["backlash"]}
+    assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(errors)
 
 
 def test_what_is_far_behind_on_the_way_waits_there(searched: Callable[..., tuple[EffectStep, ...]]) -> None:

@@ -11,9 +11,8 @@ from tests.workbench.valves import SEED
 from workbench.blind.hiding import hide
 from workbench.data.noise_floor import with_noise
 from workbench.data.record import ready
-from workbench.fit.agreement import WITHIN
 from workbench.fit.fitting import fit
-from workbench.fit.objective import SimulationError
+from workbench.fit.objective import WITHIN, SimulationError
 from workbench.model.free_run import FreeRun
 
 

@@ -18,13 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.karnopp import Vector
-from workbench.fit.objective import SimulationError
+from workbench.fit.objective import WITHIN, SimulationError
 from workbench.fit.uncertainty import deviations
 
 SHARED = "slips"
 """Origin of a search by all slips, whose measurements those by halves share."""
 HALVES = frozenset({"even slips", "odd slips"})
-WITHIN = 1.01
 DEVIATIONS, NEAR = 2.0, 0.01
 DETERMINED = 1.0
 """Standard deviation of a coordinate, a factor of e, up to which the record determines it."""

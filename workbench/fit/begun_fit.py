@@ -11,13 +11,13 @@ from typing import TypeVar
 
 from sim.composition import Composition
 from sim.karnopp import Vector
-from workbench.fit.agreement import WITHIN, Place, agreeing
+from workbench.fit.agreement import Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.crossing import crossed, leaves_noise, sticking, unlike
+from workbench.fit.crossing import SURELY, crossed, drawn, leaves_noise, sticking, unlike
 from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
-from workbench.fit.objective import MIDDLE, SimulationError, smoothed
+from workbench.fit.objective import MIDDLE, WITHIN, SimulationError, smoothed
 from workbench.fit.shooting import shooting_starts
 from workbench.fit.strewing import LOWER, on_lowest_tread, proved, strewn, while_lower
 from workbench.fit.threads import on_threads
@@ -50,9 +50,9 @@ class Effort:
     """until searches from so many origins have come to the same."""
     near: float
     """Cost a sample up to which the ends are gone on from: above it, what a valve lacks is no stair beside them."""
-    improves_below: float = inf
-    """Cost above which an effect makes nothing better than the base: such ends are not scanned for stairs, and do not
-    agree, as the place where the effect is off can be reached from everywhere."""
+    base: float = inf
+    """Cost without what is added: an effect that has come to it makes nothing better. Such ends are not scanned for
+    stairs, and do not agree, as the place where the effect is off can be reached from everywhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ class BegunFit:
         return replace(self, ends=self._ordered([*self.ends, *found]))
 
     def _ended(self, start: Place) -> Place:
-        z = settled(self.error, start.z, self.effort.improves_below)
+        z = settled(self.error, start.z, self.effort.base)
         return replace(start, z=strewn(self.error, z) if self._rounds(z) else z)
 
     def _ordered(self, ends: Sequence[Place]) -> tuple[Place, ...]:
@@ -170,11 +170,22 @@ class BegunFit:
             z = descended(self.error, start, COARSE)
             return z if cost(z) > LIKELY * self.cost else descended(self.error, z, NARROW)
 
+        def anew(start: Vector) -> Vector:
+            for stage in (WIDE, MIDDLING):
+                start = descended(self.error.rough, start, stage)
+            z = down(start)
+            return z if cost(z) > LIKELY * self.cost else settled(self.error, z)
+
         pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
         more = sticking(self.error, pool[0])
         while in_vain < IN_VAIN:
             least = cost(pool[0])
-            found = _each(down, [*more, *crossed(self.error, pool)], self.workers, lambda _: None)
+            mistimed = not leaves_noise(self.error, pool[0], SURELY)
+            begins = drawn(self.error, pool[0], self.strengths, in_vain) if mistimed else []
+            found = [
+                *_each(down, [*more, *crossed(self.error, pool)], self.workers, lambda _: None),
+                *_each(anew, begins, self.workers, lambda _: None),
+            ]
             pool, more = unlike(sorted([*pool, *found], key=cost)), []
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:
@@ -190,7 +201,7 @@ class BegunFit:
 
         def off_stairs(z: Vector) -> Vector:
             near = strewn(self.error, on_lowest_tread(self.error, z), STIRRED), by_break_aways(self.error, z)
-            found = [settled(self.error, each, self.effort.improves_below) for each in near if each is not z]
+            found = [settled(self.error, each, self.effort.base) for each in near if each is not z]
             return min([z, *found], key=self.error.cost)
 
         def stirred(end: Place) -> Place:
@@ -211,6 +222,10 @@ class BegunFit:
         begins = shooting_starts(self.error, self.strengths, self.ends[0].z)
         found = _each(self._ended, begins, self.workers, lambda done: self.tell(0.9 + 0.05 * done))
         return replace(self, ends=self._ordered([*self.ends, *found]))
+
+    def by_one(self) -> Fit:
+        """Return the fit by the one search that is the best on its way."""
+        return replace(self, places=self.places[:1]).carried().settled(1).judged(profile=False)
 
     def left(self) -> Fit:
         """Return the fit by the best place on the way: nothing has settled, and nothing is brought there."""
@@ -233,18 +248,21 @@ class BegunFit:
         """Search from the base too where all ends are worse than that."""
         if self.weakest is None or self.cost <= self.error.cost(self.weakest.z):
             return self
-        end = replace(self.weakest, z=settled(self.error, self.weakest.z, self.effort.improves_below))
+        end = replace(self.weakest, z=settled(self.error, self.weakest.z, self.effort.base))
         return replace(self, ends=(end, *self.ends))
 
     def _shows(self, z: Vector) -> bool:
         """Whether what is added makes something better than the base, a quantum by more than the noise hides."""
         theta, noise_m = self.error.theta(z), self.error.run.record.scale_m
         quanta_m = [theta[each.index] for each in self.error.parameters if each.guess == "quantum"]
-        return self.error.cost(z) < self.effort.improves_below and all(each >= FINEST * noise_m for each in quanta_m)
+        return self._improves(z) and all(each >= FINEST * noise_m for each in quanta_m)
+
+    def _improves(self, z: Vector) -> bool:
+        return WITHIN * self.error.cost(z) < self.effort.base
 
     def _rounds(self, z: Vector) -> bool:
         """Whether the sensor rounds at z, and that makes something better than the base."""
-        return smoothed(self.error, z) is not self.error and self.error.cost(z) < self.effort.improves_below
+        return smoothed(self.error, z) is not self.error and self._improves(z)
 
 
 def widely(fit: BegunFit, begins: Sequence[Place]) -> BegunFit:

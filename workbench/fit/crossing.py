@@ -5,18 +5,25 @@
 
 A valley may be so narrow, and its walls such stairs, that no derivative at its floor points along it; searches from
 elsewhere end in it farther up or down. This is the move of differential evolution, but for what follows: each place is
-brought down to the floor again. Ends that have come to the same lead nowhere: of these one counts. Nor is there
-anything to go on for where what is left is noise: it does not go on from one sample to the next, r_1 < 1/sqrt(n), and
-none lies apart, as do those of a slip that comes a sample late.
+brought down to the floor again. Ends that have come to the same lead nowhere: of these one counts.
+
+    z' = z_0 + d         springs and Coulomb friction, which the landings tell, near; all else drawn from afar
+
+Where slips stay mistimed, what moves them, viscous and static friction and what an effect has of its own, is off
+together: of a thousand places drawn so, which a rough simulation screens, the best are brought down, too.
+
+There is nothing to go on for where what is left is noise: it does not go on from one sample to the next,
+r_1 < d/sqrt(n), and none lies apart, as do those of a slip that comes a sample late, with Phi(-d) of its largest. Nor
+is there where a valve scatters, and no more is left than it differs by from itself.
 """
 
 from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
-from sim.composition import STATIC
+from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
 from workbench.fit.objective import SimulationError
 
@@ -26,8 +33,17 @@ BETWEEN, BEYOND, BESIDE = 0.5, (-0.5, -2.0), (1.0, -1.0)
 """f"""
 FAR = np.array([0.01, 0.03, 0.06, 0.12])
 """Of log(F_s/F_c): to treads that none of the ends is on."""
-APART = 0.2
-"""How often one of the samples of noise lies farther off than what counts as apart."""
+EASILY, SURELY = 1.0, 3.0
+"""Deviations by which noise is taken for more one in three times, so that a search goes on in vain; and hardly ever."""
+SCATTERS = 2.0
+"""Noises from which on it counts by how much a valve repeats itself."""
+DRAWN, BROUGHT_DOWN = 500, (2, 4)
+SPREAD = {SPRING: 0.003, COULOMB: 0.01}
+"""Standard deviation of what landings tell, of the logarithm;"""
+FROM_AFAR = {VISCOUS: 1.5, STATIC: 0.2}
+"""what they do not tell is drawn as far off at most;"""
+ABOUT = 0.3
+"""standard deviation of an effect's own in half of the places; in the others it is drawn from its strengths' range."""
 ALIKE = 1e-4
 """By how much two ends differ at most, in each coordinate, that have come to the same."""
 
@@ -40,13 +56,49 @@ def sticking(error: SimulationError, z: Vector) -> list[Vector]:
     return [np.asarray(np.clip(z + far * static, error.lower, error.upper)) for far in (*FAR, *-FAR)]
 
 
-def leaves_noise(error: SimulationError, z: Vector) -> bool:
-    """Return whether nothing but noise is left at z."""
+def leaves_noise(error: SimulationError, z: Vector, deviations: float = EASILY) -> bool:
+    """Return whether nothing but noise is left at z, which is taken for something by so many deviations."""
+    repeats_m = error.run.record.repeatability_m or 0.0
+    if repeats_m > SCATTERS * error.sigma_m and error.rms_m(z) <= repeats_m:
+        return True
     left = error.residuals(z)
-    apart = float(ndtri(1.0 - 0.5 * APART / left.size))
+    apart = float(ndtri(1.0 - ndtr(-deviations) / left.size))
     if float(np.abs(left).max()) > apart * max(1.0, 1.4826 * float(np.median(np.abs(left)))):
         return False
-    return bool(left[1:] @ left[:-1] < (left @ left) / left.size**0.5)
+    return bool(left[1:] @ left[:-1] < deviations * (left @ left) / left.size**0.5)
+
+
+def drawn(error: SimulationError, z: Vector, strengths: Sequence[Sequence[Vector]], turn: int) -> list[Vector]:
+    """Return the best by screening of places drawn about z, what landings do not tell from afar.
+
+    Args:
+        error: by whose screening cost they are compared.
+        z: about which they are drawn; with `turn`, it decides what is drawn.
+        strengths: coordinates of each strength of what is added, which span from where its parameters are drawn.
+        turn: how often it was drawn before.
+    """
+    generator = np.random.default_rng([turn, *z.view(np.uint32)])
+    of_added = [each.index not in SPREAD | FROM_AFAR for each in error.parameters]
+    spread = np.array([SPREAD.get(each.index, 0.0) for each in error.parameters])
+    uniform = np.array([FROM_AFAR.get(each.index, 0.0) for each in error.parameters])
+    lower, upper = _span([each for values in strengths for each in values] or [z], z)
+    places = []
+    for _ in range(DRAWN):
+        far = uniform * generator.uniform(-1.0, 1.0, z.size) * generator.uniform(0.0, 1.0, z.size)
+        there = z + spread * generator.standard_normal(z.size) + far
+        near = there + ABOUT * generator.standard_normal(z.size)
+        places.append([np.where(of_added, own, there) for own in (near, generator.uniform(lower, upper))])
+    return [
+        each
+        for pool, count in zip(zip(*places, strict=True), BROUGHT_DOWN, strict=True)
+        for each in error.screened((np.asarray(np.clip(z, error.lower, error.upper)) for z in pool), count)
+    ]
+
+
+def _span(values: Sequence[Vector], z: Vector) -> tuple[Vector, Vector]:
+    """Return the least and the most of coordinates, and a factor of e beyond."""
+    all_of_them = np.array([z, *values])
+    return all_of_them.min(axis=0) - 1.0, all_of_them.max(axis=0) + 1.0
 
 
 def unlike(ends: Sequence[Vector]) -> list[Vector]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from sim.karnopp import Vector
-from workbench.fit.objective import FINAL, MIDDLE, SimulationError, smoothed
+from workbench.fit.objective import FINAL, MIDDLE, WITHIN, SimulationError, smoothed
 
 
 class Stage(NamedTuple):
@@ -45,6 +45,8 @@ STAIRS = np.geomspace(2e-4, 5e-2, 10)
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative fall of the cost by a scan below which the search has ended."""
+BY_STAIRS = 1.5
+"""Factor on the cost that stairs may make."""
 
 
 def descended_through(error: SimulationError, z: Vector) -> Vector:
@@ -85,29 +87,29 @@ def descended(error: SimulationError, z: Vector, stage: Stage) -> Vector:
     return there if error.cost(there, stage.scale) < error.cost(z, stage.scale) else z
 
 
-def settled(error: SimulationError, z: Vector, scanned_below: float = inf) -> Vector:
+def settled(error: SimulationError, z: Vector, base: float = inf) -> Vector:
     """Return the coordinates of the least in reach of z at the final scale: neither descent nor stairs go lower.
 
     Args:
         error: what is lowered.
         z: where it begins, (parameters,).
-        scanned_below: the cost from which on the stairs are let be: what is no better than a search that is there
-            already need not be the best of its kind.
+        base: the cost of a search that is there already. What has come to that, or lies above it by more than stairs
+            make, is not scanned: it need not be the best of its kind.
     """
     smooth = smoothed(error, z)
     if smooth is not error:
         # At the wider scale first: a slip mistimed by a stair outweighs there what is little outside its quantum.
         there = _scanned_each(smooth, descended(smooth, z, MIDDLING), MIDDLE)
         z = min(z, _at_rest(smooth, there), key=error.cost)
-    return _at_rest(error, z, scanned_below)
+    return _at_rest(error, z, base)
 
 
-def _at_rest(error: SimulationError, z: Vector, scanned_below: float = inf) -> Vector:
+def _at_rest(error: SimulationError, z: Vector, base: float = inf) -> Vector:
     """Return where descents and scans by turns leave z as it is."""
     for _ in range(ROUNDS):
         z = descended(error, descended(error, z, COARSE), NARROW)
         at_rest = error.cost(z)
-        if at_rest > scanned_below:
+        if at_rest > BY_STAIRS * base or base / WITHIN < at_rest < WITHIN * base:
             break
         z = _scanned_each(error, z, FINAL)
         if error.cost(z) > at_rest * (1.0 - SETTLED):

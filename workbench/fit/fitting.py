@@ -26,7 +26,7 @@ from sim.effect import Effect, find_effects
 from workbench.data.motion import slips
 from workbench.data.record import Record, ready, require_few_samples, require_units
 from workbench.data.stretches import informative
-from workbench.fit.agreement import WITHIN, Place
+from workbench.fit.agreement import Place
 from workbench.fit.begun_fit import LEAVES, BegunFit, Effort, Progress, widely
 from workbench.fit.fit_result import Fit, with_profile
 from workbench.fit.objective import SimulationError
@@ -300,7 +300,7 @@ def _begun(
     names = {each.name for each in find_effects(effects, "effects")}
     added = [each for each in error.parameters if each.name.partition(".")[0] in names]
     seeds = [np.concatenate([each, composition.theta[each.size :]]) for each in base.seeds]
-    effort = replace(OF_EFFECT, improves_below=base.cost / WITHIN)
+    effort = replace(OF_EFFECT, base=base.cost)
     starts = effect_starts(error, added, seeds, landed=landed and not record.by_setpoint, points=points)
     tell = progress or (lambda _: None)
     begun = BegunFit(

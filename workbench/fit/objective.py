@@ -25,6 +25,8 @@ from workbench.model.thinning import thinned
 
 FINAL, MIDDLE = 5.0, 30.0
 """Scales, in sigma: of the cost by which fits are compared, and of that by which starts are chosen."""
+WITHIN = 1.01
+"""Factor on the least cost up to which a search has come to it."""
 HOPELESS = 1e3
 """What a residual that is not finite counts, in strokes. However smooth the sensor, less than that is told apart."""
 INSIDE, SHARPER = 0.49, 0.1

@@ -26,7 +26,8 @@ from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
 from sim.effect import Effect
 from workbench.data.held_out import Split
-from workbench.fit.begun_fit import LEAVES, BegunFit
+from workbench.fit.begun_fit import BegunFit
+from workbench.fit.crossing import SURELY, leaves_noise
 from workbench.fit.descent import NARROW, descended
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitting import begun_fit, fit, profiled
@@ -36,7 +37,7 @@ from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 from workbench.model.sampling import Sampling
 from workbench.select.block_errors import block_errors, indistinguishable
-from workbench.select.effect_acceptance import LEAST_BIC, bic, log_likelihood_difference
+from workbench.select.effect_acceptance import LEAST_BIC, bic, gain, log_likelihood_difference
 from workbench.select.effect_candidates import (
     EffectCandidate,
     EffectStep,
@@ -59,12 +60,12 @@ BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
 MOST, NEARLY_ALL = 0.5, 0.8
 """Of the squared error held out, less the floor's: what two steps, and the second of them, leave in vain."""
-LEFT_BEHIND = 1.0
-"""Of BIC: less is nothing."""
+LEFT_BEHIND, SOME_EVIDENCE = 1.0, 3.0
+"""Of BIC: less is nothing; and what one search must find, in independent samples, for the others to be made."""
 OUT_OF_RACE = 10.0
 """Factor on the cost of the best search of a step, above which an effect is not searched further;"""
 BEHIND = 2.0
-"""above which, where that best one leaves nothing, another's searches are not gone on from where they stay."""
+"""above which another's searches are not gone on from where they stay, which lowers costs by some per cent."""
 
 Progress = Callable[[str, float], None]
 Race = Callable[[int, str, float], None]
@@ -306,7 +307,9 @@ class EffectSearch:
         self._known = _Known(self._known.steps, before)
         missing = [name for name in self._library if name not in before.effects]
         names = [name for name in missing if self._library[name].after not in missing]
-        models, waiting = self._raced(number, self._begun(number, before, names))
+        begun = self._begun(number, before, names)
+        little = before.explained or self._noise(before.fit)
+        models, waiting = self._beside(number, before, begun) if little else self._raced(number, begun)
         left = dict(zip(waiting, on_threads(self._left, tuple(waiting.values()), self._workers), strict=True))
         before, models = self._with_base_again(number, before, models, models)
         step = self._judged_in_full(before, {**left, **models}, number)
@@ -394,11 +397,15 @@ class EffectSearch:
 
     def _local_minimum(self, base: Fit, valve: ValveFile) -> float:
         """Return the cost at which a search from this valve's parameters ends."""
+        error = self._error(base, valve)
+        return error.cost(descended(error, error.coordinates(error.composition.theta), NARROW))
+
+    def _error(self, base: Fit, valve: ValveFile) -> SimulationError:
+        """Return the error of a valve over the parameters of a fit of it, simulated as that."""
         composition = Composition.from_file(valve)
         run = FreeRun(composition, self._split.train.record, from_pressure=base.from_pressure, by=base.by)
         parameters = free_parameters(composition, tuple(base.parameters))
-        error = SimulationError(run, composition, parameters, composition.theta)
-        return error.cost(descended(error, error.coordinates(composition.theta), NARROW))
+        return SimulationError(run, composition, parameters, composition.theta)
 
     def _refitted(
         self, number: int, before: EvaluatedModel, names: Sequence[str], *, racing: bool = True, landed: bool = True
@@ -423,9 +430,11 @@ class EffectSearch:
 
         def begun(name: str) -> BegunFit | str:
             try:
-                return begun_fit(train, known, (name,), here, landed=landed)
+                found = begun_fit(train, known, (name,), here, landed=landed)
             except InputError as error:
                 return error.problem
+            # What explains all lacks little, which lies beside it: there is no valley to be crossed.
+            return found.gone_on_up_to(0.0) if before.explained else found
 
         # The dearest, which have the most parameters, first: begun last, they would keep one thread alone at work.
         dearest_first = sorted(names, key=lambda name: -len(self._library[name].parameters))
@@ -441,6 +450,30 @@ class EffectSearch:
             fast, slower = _parted(self._each(number, "searching", further, fast, 0.5, 0.6))
             waiting |= slower
         return self._settled(number, refused | fast), waiting
+
+    def _beside(
+        self, number: int, before: EvaluatedModel, racers: Mapping[str, BegunFit | str]
+    ) -> tuple[dict[str, EvaluatedModel | str], dict[str, BegunFit]]:
+        """Refit effects beside a model that leaves nothing to explain; return their models, and none that waits.
+
+        What it lacks is small, and near: one search tells of any evidence, and only where there is some all are made.
+        """
+        first = self._each(number, "refitting", self._by_one, racers, 0.5, 0.8, self._known.models)
+        evident = {name: racers[name] for name, each in first.items() if _evidence(before, each) > SOME_EVIDENCE}
+        return first | self._settled(number, evident, racing=False), {}
+
+    def _by_one(self, racer: BegunFit | str) -> EvaluatedModel | str:
+        if isinstance(racer, str):
+            return racer
+        try:
+            return self._evaluated(racer.by_one())
+        except InputError as error:
+            return error.problem
+
+    def _noise(self, found: Fit) -> bool:
+        """Whether what a fit leaves cannot be told from noise."""
+        error = self._error(found, found.valve)
+        return leaves_noise(error, error.coordinates(error.composition.theta), SURELY)
 
     def _settled(
         self, number: int, racers: Mapping[str, BegunFit | str], *, racing: bool = True
@@ -462,9 +495,9 @@ class EffectSearch:
             if isinstance(each, str):
                 return each
             lost = racing and each.cost > OUT_OF_RACE * least
-            each = each.gone_on_up_to(BEHIND * least) if least <= LEAVES * each.error.count else each
+            near = each.gone_on_up_to(BEHIND * least)
             try:
-                return self._evaluated(each.judged(profile=False) if lost else each.finished(profile=False))
+                return self._evaluated(near.judged(profile=False) if lost else near.finished(profile=False))
             except InputError as error:
                 return error.problem
 
@@ -546,6 +579,13 @@ def _may_be_none(found: Fit, effect: Effect) -> bool:
         for key, declared in effect.parameters.items()
         if declared.off is not None and (each := found.parameters.get(f"{effect.name}.{key}"))
     )
+
+
+def _evidence(before: EvaluatedModel, model: EvaluatedModel | str) -> float:
+    """Return the BIC of a model before less that of one with an effect, in independent samples."""
+    if isinstance(model, str):
+        return -inf
+    return gain(before.fit, model.fit, before.errors, model.errors).independent_bic
 
 
 def _may_stand(candidate: EffectCandidate) -> bool:
