@@ -18,6 +18,7 @@ from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, set
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, WITHIN, SimulationError, smoothed
+from workbench.fit.quanta import with_best_quantum
 from workbench.fit.shooting import shooting_starts
 from workbench.fit.strewing import LOWER, on_lowest_tread, proved, strewn, while_lower
 from workbench.fit.threads import on_threads
@@ -144,8 +145,10 @@ class BegunFit:
             here = here.settled(min(2 - len(here.ends) % 2, most - len(here.ends)))
         here = here.shot()
         best = here.ends[0].z
-        if here._shows(best):
-            here = replace(here, ends=proved(here.error, here.ends)) if here._rounds(best) else here.gone_on()
+        if here._rounds(best):
+            here = replace(here, ends=proved(here.error, with_best_quantum(here.error, here.ends)))
+        elif here._shows(best):
+            here = here.gone_on()
         return here.judged(profile=profile)
 
     def gone_on_up_to(self, cost: float) -> "BegunFit":

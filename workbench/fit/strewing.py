@@ -9,14 +9,15 @@ In every fourth about half of the coordinates stay.
 Static friction shows in the instants of break-aways alone: its derivative says nothing.
 
 The stairs of a record run across all coordinates at once: a scan of each alone ends on one, as does a descent. Where a
-sensor rounds, searches of several origins may end on the same one: before they are believed, more places are strewn
-about the best.
+sensor rounds, searches of several origins may end on the same one: before they are believed, places about the best are
+crossed with each other by scipy's differential evolution, which needs no derivative.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import Bounds, differential_evolution
 
 from sim.composition import STATIC
 from sim.karnopp import Vector
@@ -25,8 +26,10 @@ from workbench.fit.descent import scanned
 from workbench.fit.objective import SimulationError
 from workbench.fit.uncertainty import along_axes, of_coordinates
 
-STREWN, PROVING = 400, 1200
-"""Places about each end, and about the best of all."""
+STREWN, CROSSED, TURNS = 400, 60, 120
+"""Places about each end; those about the best of all, and how often they are crossed with each other."""
+WIDELY = 20.0
+"""Deviations of these."""
 MOST_PROVED, LOWER = 4, 1.002
 """How often more, at most; by what factor lower it must lead to be made again."""
 NEAREST, FARTHEST = -1.5, 1.5
@@ -64,6 +67,29 @@ def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
     return z
 
 
+def evolved(error: SimulationError, z: Vector) -> Vector:
+    """Return the lowest place that differential evolution comes to from z and others about it, which z decides."""
+    generator = np.random.default_rng(z.view(np.uint32))
+    along, axes = along_axes(error, z)
+    deviation, along = np.clip(of_coordinates(along, axes), SURE, UNSURE), np.clip(along, SURE, UNSURE_ALONG)
+    normal = generator.standard_normal((CROSSED - 1, z.size))
+    normal[::2], normal[1::2] = deviation * normal[::2], along * normal[1::2] @ axes.T
+    reach = 10.0 * WIDELY * deviation
+    lower, upper = np.maximum(error.lower, z - reach), np.minimum(error.upper, z + reach)
+    found = differential_evolution(
+        error.cost,
+        Bounds(lower, upper),
+        init=np.clip(np.vstack([z, z + WIDELY * normal]), lower, upper),
+        maxiter=TURNS,
+        tol=0.0,
+        mutation=(0.3, 1.0),
+        recombination=0.9,
+        polish=False,
+        rng=generator,
+    )
+    return min(z, np.asarray(found.x, np.float64), key=error.cost)
+
+
 def while_lower(error: SimulationError, z: Vector, move: Callable[[Vector], Vector], most: int) -> Vector:
     """Return where a move leads from z, made once, then so many times at most, as long as it leads clearly lower."""
     before, here = z, move(z)
@@ -81,7 +107,7 @@ def proved(error: SimulationError, ends: Sequence[Place]) -> tuple[Place, ...]:
     """
 
     def off_stairs(z: Vector) -> Vector:
-        return strewn(error, on_lowest_tread(error, z), PROVING)
+        return strewn(error, evolved(error, on_lowest_tread(error, z)))
 
     best, *others = ends
     return replace(best, z=while_lower(error, best.z, off_stairs, MOST_PROVED)), *others
