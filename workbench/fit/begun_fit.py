@@ -166,7 +166,10 @@ class BegunFit:
         return lower.stirred() if here.cost > LOWER * lower.cost else lower
 
     def crossed(self) -> "BegunFit":
-        """Search on from between the ends and beyond the best, until a few rounds in a row lead no lower."""
+        """Search on from between the ends and beyond the best, until a few rounds in a row lead no lower.
+
+        Where slips are mistimed also from every strength of what is added, however far off, and from places drawn afar.
+        """
         cost = self.error.cost
 
         def down(start: Vector) -> Vector:
@@ -180,16 +183,16 @@ class BegunFit:
             return z if cost(z) > LIKELY * self.cost else settled(self.error, z)
 
         pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
-        more = sticking(self.error, pool[0])
+        more, weakly_stuck = sticking(self.error, pool[0]), [each[-1] for each in self.strengths]
         while in_vain < IN_VAIN:
             least = cost(pool[0])
             mistimed = not leaves_noise(self.error, pool[0], SURELY)
-            begins = drawn(self.error, pool[0], self.strengths, in_vain) if mistimed else []
+            begins = [*weakly_stuck, *drawn(self.error, pool[0], self.strengths, in_vain)] if mistimed else []
             found = [
                 *_each(down, [*more, *crossed(self.error, pool)], self.workers, lambda _: None),
                 *_each(anew, begins, self.workers, lambda _: None),
             ]
-            pool, more = unlike(sorted([*pool, *found], key=cost)), []
+            pool, more, weakly_stuck = unlike(sorted([*pool, *found], key=cost)), [], []
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:
             return self

@@ -10,7 +10,8 @@ brought down to the floor again. Ends that have come to the same lead nowhere: o
     z' = z_0 + d         springs and Coulomb friction, which the landings tell, near; all else drawn from afar
 
 Where slips stay mistimed, what moves them, viscous and static friction and what an effect has of its own, is off
-together: of a thousand places drawn so, which a rough simulation screens, the best are brought down, too.
+together: of a thousand places drawn so, which a rough simulation screens, the best are brought down, too. So is every
+strength of what is added: by the cost where it begins a strong lag is far behind, but smooths the way down.
 
 There is nothing to go on for where what is left is noise: it does not go on from one sample to the next,
 r_1 < d/sqrt(n), and none lies apart, as do those of a slip that comes a sample late, with Phi(-d) of its largest. Nor

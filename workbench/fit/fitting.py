@@ -38,7 +38,7 @@ from workbench.model.free_run import FreeRun
 from workbench.model.parameters import AT_REST, DEFAULT, LANDED, free_parameters
 from workbench.model.sampling import Motion, Sampling, affords_inertia, sampling, swing_m, with_inertia
 
-OF_BASE, OF_EFFECT, OF_ONE = Effort(8, 6, 3, near=5.0), Effort(5, 4, 2, near=50.0), Effort(1, 1, 1, near=5.0)
+OF_BASE, OF_EFFECT, OF_ONE = Effort(8, 6, 3, near=5.0), Effort(5, 4, 2, near=500.0), Effort(1, 1, 1, near=5.0)
 DRAWS = 8
 LEAST_SLIPS = 3
 SWINGS = 1.5
