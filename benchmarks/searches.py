@@ -16,7 +16,8 @@ A line of JSON is kept a search, so that a campaign can be broken off and taken 
     python -m benchmarks.searches --cases 22 --searches 1 --kind full poor --first-seed SEED     1012 cases: an hour
 
 The figures are the share of searches that found the least; how many did not, and of those how many were trusted; and
-how many come to more than 1 % above the cost of the true parameters, of which at most one in a thousand is allowed.
+how many come to more than 1 % above the cost of the true parameters, of which at most one in a thousand is allowed where the
+effect shows: where the valve without it misses by half the floor more, at 1.25 times that cost.
 """
 
 import argparse
@@ -50,7 +51,7 @@ FEW_SLIPS = 12
 AFTER_LAST_S = 0.5
 """What is kept after the last slip of a poor record."""
 DISTURBED = 1e-12
-WITHIN = 1.01
+WITHIN, SHOWS = 1.01, 1.25
 TARGET = 0.999
 STARTS = ("spring_n_per_m", "viscous_ns_per_m", "coulomb_n", "static_n")
 HEAD = f"  {'':<22}{'cases':>6}{'searches':>9}{'found':>8}{'wrong':>6}{'trusted wrong':>14}{'above truth':>12}{'s':>6}"
@@ -165,8 +166,14 @@ def report(lines: Sequence[Line]) -> Iterator[str]:
                 yield _row(effect, own)
         yield _row("all", chosen)
     if lines:
-        within = sum(each["cost"] <= WITHIN * each["true_cost"] for each in lines)
-        yield f"{within} of {len(lines)} searches within 1 % of the cost of the true parameters; target {TARGET:.1%}"
+        yield f"{_within(lines)} within 1 % of the cost of the true parameters"
+        shown = [each for each in lines if each["base_cost"] >= SHOWS * each["true_cost"]]
+        yield f"{_within(shown)} where the effect shows; target {TARGET:.1%}"
+
+
+def _within(lines: Sequence[Line]) -> str:
+    within = sum(each["cost"] <= WITHIN * each["true_cost"] for each in lines)
+    return f"{within} of {len(lines)} searches"
 
 
 def _row(name: str, lines: Sequence[Line]) -> str:
