@@ -16,8 +16,8 @@ A line of JSON is kept a search, so that a campaign can be broken off and taken 
     python -m benchmarks.searches --cases 22 --searches 1 --kind full poor --first-seed SEED     1012 cases: an hour
 
 The figures are the share of searches that found the least; how many did not, and of those how many were trusted; and
-how many come to more than 1 % above the cost of the true parameters, of which at most one in a thousand is allowed where the
-effect shows: where the valve without it misses by half the floor more, at 1.25 times that cost.
+how many come to more than 1 % above the cost of the true parameters, of which at most one in a thousand is allowed
+where the effect shows: where the valve without it misses by half the floor more, at 1.25 times that cost.
 """
 
 import argparse
