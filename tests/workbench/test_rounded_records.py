@@ -56,9 +56,10 @@ def test_the_digits_of_a_file_are_no_rounding(digits: int, told: bool) -> None:
     assert any("is rounded to" in each for each in notes) == told
 
 
-def test_of_the_quanta_that_few_rests_suggest_the_one_that_leads_lowest_is_taken() -> None:
-    """Of fourteen rests: a third of the quantum came closer at the start, with all else from the base fit."""
-    recording, valve, truth = posed(Case("quantisation", 180522, "poor"))
+@pytest.mark.parametrize("seed", [180522, 180209])
+def test_few_rests_are_rounded_as_the_sensor_does(seed: int) -> None:
+    """A third of the quantum came closer at the start; and the search ended on a stair, 20 deviations from the truth."""
+    recording, valve, truth = posed(Case("quantisation", seed, "poor"))
     base = fit(recording, valve, workers=1, profile=False)
     found = fit(recording, valve, effects=("quantisation",), workers=1, base=base, profile=False)
     assert found.cost < WITHIN * true_cost(recording, truth)
