@@ -17,7 +17,8 @@ import numpy as np
 from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, relative_error_reduction
 
-LEAST_BIC = 10.0
+LEAST_BIC, LEAST_INDEPENDENT = 10.0, 3.0
+"""Of all samples; of independent ones, where the model before leaves something. Else these need as much as all."""
 OVERWHELMING_BIC = 10.0 * LEAST_BIC
 """Of independent samples; suspected whatever was held out, for an effect that acts rarely need not show there."""
 LEAST_REDUCTION = 0.05
@@ -62,10 +63,11 @@ class Gain:
         however_small = complete and self.standard_errors > LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
-        if at_floor and self.independent_bic <= LEAST_BIC:
+        independent = LEAST_BIC if at_floor else LEAST_INDEPENDENT
+        if self.independent_bic <= independent:
             return (
                 f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
-                f"are independent: {self.independent_bic:.2g}, more than {LEAST_BIC:g} needed"
+                f"are independent: {self.independent_bic:.2g}, more than {independent:g} needed"
             )
         if self.held_out <= LEAST_REDUCTION and not however_small:
             way = "falls" if self.held_out >= 0.0 else "rises"

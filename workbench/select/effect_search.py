@@ -37,7 +37,7 @@ from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 from workbench.model.sampling import Sampling
 from workbench.select.block_errors import block_errors, indistinguishable
-from workbench.select.effect_acceptance import LEAST_BIC, bic, gain, log_likelihood_difference
+from workbench.select.effect_acceptance import LEAST_BIC, LEAST_INDEPENDENT, bic, gain, log_likelihood_difference
 from workbench.select.effect_candidates import (
     EffectCandidate,
     EffectStep,
@@ -60,8 +60,8 @@ BETTER = 0.999
 """Factor on the cost at which a base fit counts as better than the one before."""
 MOST, NEARLY_ALL = 0.5, 0.8
 """Of the squared error held out, less the floor's: what two steps, and the second of them, leave in vain."""
-LEFT_BEHIND, SOME_EVIDENCE = 1.0, 3.0
-"""Of BIC: less is nothing; and what one search must find, in independent samples, for the others to be made."""
+LEFT_BEHIND = 1.0
+"""Of BIC: less is nothing."""
 OUT_OF_RACE = 10.0
 """Factor on the cost of the best search of a step, above which an effect is not searched further;"""
 BEHIND = 2.0
@@ -459,7 +459,7 @@ class EffectSearch:
         What it lacks is small, and near: one search tells of any evidence, and only where there is some all are made.
         """
         first = self._each(number, "refitting", self._by_one, racers, 0.5, 0.8, self._known.models)
-        evident = {name: racers[name] for name, each in first.items() if _evidence(before, each) > SOME_EVIDENCE}
+        evident = {name: racers[name] for name, each in first.items() if _evidence(before, each) > LEAST_INDEPENDENT}
         return first | self._settled(number, evident, racing=False), {}
 
     def _by_one(self, racer: BegunFit | str) -> EvaluatedModel | str:
