@@ -3,9 +3,10 @@
 A step fits the valve with each effect added. They race: one that is far behind another at the wide scale, with its
 first searches or with all, or at the middling one waits there, and is searched on only if what the step adds leaves
 something to explain. One whose first search ends far behind another's is not searched further, unless the step would
-name it. An effect that comes after another (`AFTER` in its file) is fitted only where that one has evidence, or is in
-the model already, and what the step would add leaves something to explain. Before they are judged, the valve without is
-fitted once more from the base parameters of the best of those with: an optimiser's failure must not look like physics.
+name it. Beside a model that leaves nothing to explain each is searched once, and on where that shows any evidence. An
+effect that comes after another (`AFTER` in its file) is fitted only where that one has evidence, or is in the model
+already, and what the step would add leaves something to explain. Before they are judged, the valve without is fitted
+once more from the base parameters of the best of those with: an optimiser's failure must not look like physics.
 Steps go on until the added model explains all and leaves no room for another effect, nothing more is accepted, or three
 effects are added. Where two steps leave something to explain, the first is tried with each of its runners-up added,
 too, and taken back if that leads farther; not where they leave most of what was there before them. Where the second
