@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
 from sim.composition import STATIC
@@ -53,8 +54,7 @@ def on_lowest_tread(error: SimulationError, z: Vector) -> Vector:
 def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
     """Return the lowest of so many places about z, which itself decides what is drawn: no two ends draw the same."""
     generator = np.random.default_rng(z.view(np.uint32))
-    along, axes = along_axes(error, z)
-    deviation, along = np.clip(of_coordinates(along, axes), SURE, UNSURE), np.clip(along, SURE, UNSURE_ALONG)
+    deviation, along, axes = _spread(error, z)
     static = np.array([each.index == STATIC for each in error.parameters] or np.zeros(z.size), np.float64)
     for i in range(count):
         far = 10.0 ** generator.uniform(NEAREST, FARTHEST)
@@ -70,8 +70,7 @@ def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
 def evolved(error: SimulationError, z: Vector) -> Vector:
     """Return the lowest place that differential evolution comes to from z and others about it, which z decides."""
     generator = np.random.default_rng(z.view(np.uint32))
-    along, axes = along_axes(error, z)
-    deviation, along = np.clip(of_coordinates(along, axes), SURE, UNSURE), np.clip(along, SURE, UNSURE_ALONG)
+    deviation, along, axes = _spread(error, z)
     normal = generator.standard_normal((CROSSED - 1, z.size))
     normal[::2], normal[1::2] = deviation * normal[::2], along * normal[1::2] @ axes.T
     reach = 10.0 * WIDELY * deviation
@@ -88,6 +87,12 @@ def evolved(error: SimulationError, z: Vector) -> Vector:
         rng=generator,
     )
     return min(z, np.asarray(found.x, np.float64), key=error.cost)
+
+
+def _spread(error: SimulationError, z: Vector) -> tuple[Vector, Vector, NDArray[np.float64]]:
+    """Return s of the coordinates and S along the axes, inside what is believed of either, and the axes V."""
+    along, axes = along_axes(error, z)
+    return np.clip(of_coordinates(along, axes), SURE, UNSURE), np.clip(along, SURE, UNSURE_ALONG), axes
 
 
 def while_lower(error: SimulationError, z: Vector, move: Callable[[Vector], Vector], most: int) -> Vector:

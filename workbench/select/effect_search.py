@@ -310,7 +310,7 @@ class EffectSearch:
         names = [name for name in missing if self._library[name].after not in missing]
         begun = self._begun(number, before, names)
         little = before.explained or self._noise(before.fit)
-        models, waiting = self._beside(number, before, begun) if little else self._raced(number, begun)
+        models, waiting = (self._beside(number, before, begun), {}) if little else self._raced(number, begun)
         left = dict(zip(waiting, on_threads(self._left, tuple(waiting.values()), self._workers), strict=True))
         before, models = self._with_base_again(number, before, models, models)
         step = self._judged_in_full(before, {**left, **models}, number)
@@ -454,20 +454,20 @@ class EffectSearch:
 
     def _beside(
         self, number: int, before: EvaluatedModel, racers: Mapping[str, BegunFit | str]
-    ) -> tuple[dict[str, EvaluatedModel | str], dict[str, BegunFit]]:
-        """Refit effects beside a model that leaves nothing to explain; return their models, and none that waits.
+    ) -> dict[str, EvaluatedModel | str]:
+        """Refit effects beside a model that leaves nothing to explain.
 
         What it lacks is small, and near: one search tells of any evidence, and only where there is some all are made.
         """
-        first = self._each(number, "refitting", self._by_one, racers, 0.5, 0.8, self._known.models)
+        by_one = partial(self._evaluated_by, lambda each: each.by_one())
+        first = self._each(number, "refitting", by_one, racers, 0.5, 0.8, self._known.models)
         evident = {name: racers[name] for name, each in first.items() if _evidence(before, each) > LEAST_INDEPENDENT}
-        return first | self._settled(number, evident, racing=False), {}
+        return first | self._settled(number, evident, racing=False)
 
-    def _by_one(self, racer: BegunFit | str) -> EvaluatedModel | str:
-        if isinstance(racer, str):
-            return racer
+    def _evaluated_by(self, search: Callable[[BegunFit], Fit], racer: BegunFit | str) -> EvaluatedModel | str:
+        """Return what a search comes to; of one that was refused, or is here, why."""
         try:
-            return self._evaluated(racer.by_one())
+            return racer if isinstance(racer, str) else self._evaluated(search(racer))
         except InputError as error:
             return error.problem
 
@@ -492,17 +492,13 @@ class EffectSearch:
         fits = self._each(number, "refitting", first, racers, 0.6, 0.8)
         least = min((each.cost for each in fits.values() if not isinstance(each, str)), default=inf)
 
-        def finished(each: BegunFit | str) -> EvaluatedModel | str:
-            if isinstance(each, str):
-                return each
+        def finished(each: BegunFit) -> Fit:
             lost = racing and each.cost > OUT_OF_RACE * least
             near = each.gone_on_up_to(BEHIND * least)
-            try:
-                return self._evaluated(near.judged(profile=False) if lost else near.finished(profile=False))
-            except InputError as error:
-                return error.problem
+            return near.judged(profile=False) if lost else near.finished(profile=False)
 
-        return self._each(number, "refitting", finished, fits, 0.8, 1.0, self._known.models)
+        evaluated = partial(self._evaluated_by, finished)
+        return self._each(number, "refitting", evaluated, fits, 0.8, 1.0, self._known.models)
 
     def _each(
         self,
