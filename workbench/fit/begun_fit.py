@@ -13,14 +13,14 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.crossing import SURELY, crossed, drawn, leaves_noise, sticking, unlike
+from workbench.fit.crossing import SURELY, crossed, evolved_from_afar, leaves_noise, sticking, unlike
 from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, WITHIN, SimulationError, smoothed
 from workbench.fit.quanta import with_best_quantum
 from workbench.fit.shooting import shooting_starts
-from workbench.fit.strewing import LOWER, on_lowest_tread, proved, strewn, while_lower
+from workbench.fit.strewing import LOWER, MOST_PROVED, evolved, on_lowest_tread, proved, strewn, while_lower
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import Parameter
 
@@ -163,7 +163,14 @@ class BegunFit:
         if leaves_noise(here.error, here.ends[0].z):
             return here
         lower = here.crossed()
-        return lower.stirred() if here.cost > LOWER * lower.cost else lower
+        lower = lower.stirred() if here.cost > LOWER * lower.cost else lower
+        return lower.evolved()
+
+    def evolved(self) -> "BegunFit":
+        """Let places about the best end evolve: where a slip is mistimed still, no end may lie along the valley."""
+        best, *others = self.ends
+        z = while_lower(self.error, best.z, lambda z: settled(self.error, evolved(self.error, z)), MOST_PROVED)
+        return replace(self, ends=self._ordered([replace(best, z=z), *others]))
 
     def crossed(self) -> "BegunFit":
         """Search on from between the ends and beyond the best, until a few rounds in a row lead no lower.
@@ -183,16 +190,17 @@ class BegunFit:
             return z if cost(z) > LIKELY * self.cost else settled(self.error, z)
 
         pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
-        more, weakly_stuck = sticking(self.error, pool[0]), [each[-1] for each in self.strengths]
+        more, begins = sticking(self.error, pool[0]), list[Vector]()
+        if not leaves_noise(self.error, pool[0], SURELY):
+            weakly_stuck = [each[-1] for each in self.strengths]
+            begins = [*weakly_stuck, *evolved_from_afar(self.error, pool[0], self.strengths)]
         while in_vain < IN_VAIN:
             least = cost(pool[0])
-            mistimed = not leaves_noise(self.error, pool[0], SURELY)
-            begins = [*weakly_stuck, *drawn(self.error, pool[0], self.strengths, in_vain)] if mistimed else []
             found = [
                 *_each(down, [*more, *crossed(self.error, pool)], self.workers, lambda _: None),
                 *_each(anew, begins, self.workers, lambda _: None),
             ]
-            pool, more, weakly_stuck = unlike(sorted([*pool, *found], key=cost)), [], []
+            pool, more, begins = unlike(sorted([*pool, *found], key=cost)), [], []
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:
             return self

@@ -22,10 +22,13 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, differential_evolution
 from scipy.special import ndtr, ndtri
 
 from sim.composition import COULOMB, SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
+from workbench.fit.descent import WIDE
 from workbench.fit.objective import SimulationError
 
 PARTNERS, MOST = 3, 8
@@ -38,11 +41,13 @@ EASILY, SURELY = 1.0, 3.0
 """Deviations by which noise is taken for more one in three times, so that a search goes on in vain; and hardly ever."""
 SCATTERS = 2.0
 """Noises from which on it counts by how much a valve repeats itself."""
-DRAWN, BROUGHT_DOWN = 500, (2, 4)
+DRAWN, TURNS, BROUGHT_DOWN = 150, 60, 4
 SPREAD = {SPRING: 0.003, COULOMB: 0.01}
 """Standard deviation of what landings tell, of the logarithm;"""
 FROM_AFAR = {VISCOUS: 1.5, STATIC: 0.2}
 """what they do not tell is drawn as far off at most;"""
+FARTHEST = 3.0
+"""to which they evolve at most, if they are not drawn there;"""
 ABOUT = 0.3
 """standard deviation of an effect's own in half of the places; in the others it is drawn from its strengths' range."""
 ALIKE = 1e-4
@@ -69,31 +74,47 @@ def leaves_noise(error: SimulationError, z: Vector, deviations: float = EASILY) 
     return bool(left[1:] @ left[:-1] < deviations * (left @ left) / left.size**0.5)
 
 
-def drawn(error: SimulationError, z: Vector, strengths: Sequence[Sequence[Vector]], turn: int) -> list[Vector]:
-    """Return the best by screening of places drawn about z, what landings do not tell from afar.
+def evolved_from_afar(error: SimulationError, z: Vector, strengths: Sequence[Sequence[Vector]]) -> list[Vector]:
+    """Return the best that places drawn about z, what landings do not tell from afar, evolve to, compared roughly.
 
     Args:
-        error: by whose screening cost they are compared.
-        z: about which they are drawn; with `turn`, it decides what is drawn.
+        error: over whose rough simulation they evolve, by the cost of the wide scale.
+        z: about which they are drawn; it decides what is drawn.
         strengths: coordinates of each strength of what is added, which span from where its parameters are drawn.
-        turn: how often it was drawn before.
     """
-    generator = np.random.default_rng([turn, *z.view(np.uint32)])
+    generator = np.random.default_rng(z.view(np.uint32))
+    places = _drawn(generator, error, z, strengths)
+    lower, upper = np.maximum(error.lower, z - FARTHEST), np.minimum(error.upper, z + FARTHEST)
+    found = differential_evolution(
+        lambda there: error.rough.cost(there, WIDE.scale),
+        Bounds(np.minimum(lower, places.min(axis=0)), np.maximum(upper, places.max(axis=0))),
+        init=places,
+        strategy="rand1bin",
+        maxiter=TURNS,
+        tol=0.0,
+        mutation=(0.3, 1.0),
+        recombination=0.9,
+        polish=False,
+        rng=generator,
+    )
+    best = np.asarray(found.population)[np.argsort(found.population_energies)]
+    return unlike(list(best))[:BROUGHT_DOWN]
+
+
+def _drawn(
+    generator: np.random.Generator, error: SimulationError, z: Vector, strengths: Sequence[Sequence[Vector]]
+) -> NDArray[np.float64]:
+    """Return places about z, (places, parameters), inside the bounds: what is added near in half of them."""
     of_added = [each.index not in SPREAD | FROM_AFAR for each in error.parameters]
     spread = np.array([SPREAD.get(each.index, 0.0) for each in error.parameters])
     uniform = np.array([FROM_AFAR.get(each.index, 0.0) for each in error.parameters])
     lower, upper = _span([each for values in strengths for each in values] or [z], z)
-    places = []
-    for _ in range(DRAWN):
-        far = uniform * generator.uniform(-1.0, 1.0, z.size) * generator.uniform(0.0, 1.0, z.size)
-        there = z + spread * generator.standard_normal(z.size) + far
-        near = there + ABOUT * generator.standard_normal(z.size)
-        places.append([np.where(of_added, own, there) for own in (near, generator.uniform(lower, upper))])
-    return [
-        each
-        for pool, count in zip(zip(*places, strict=True), BROUGHT_DOWN, strict=True)
-        for each in error.screened((np.asarray(np.clip(z, error.lower, error.upper)) for z in pool), count)
-    ]
+    shape = DRAWN, z.size
+    far = uniform * generator.uniform(-1.0, 1.0, shape) * generator.uniform(0.0, 1.0, shape)
+    places = z + spread * generator.standard_normal(shape) + far
+    own = places + ABOUT * generator.standard_normal(shape)
+    own[::2] = generator.uniform(lower, upper, shape)[::2]
+    return np.clip(np.where(of_added, own, places), error.lower, error.upper)
 
 
 def _span(values: Sequence[Vector], z: Vector) -> tuple[Vector, Vector]:

@@ -27,7 +27,7 @@ from workbench.fit.descent import scanned
 from workbench.fit.objective import SimulationError
 from workbench.fit.uncertainty import along_axes, of_coordinates
 
-STREWN, CROSSED, TURNS = 400, 60, 120
+STREWN, CROSSED, TURNS = 400, 40, 60
 """Places about each end; those about the best of all, and how often they are crossed with each other."""
 WIDELY = 20.0
 """Deviations of these."""
