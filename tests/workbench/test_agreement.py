@@ -10,7 +10,7 @@ from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
 from workbench.fit.descent import NARROW, descended, scanned, settled
 from workbench.fit.objective import FINAL, SimulationError, soft
-from workbench.fit.strewing import proved
+from workbench.fit.quanta import proved
 
 BEST = np.array([0.3, -0.2, 0.1])
 

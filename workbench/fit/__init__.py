@@ -12,7 +12,8 @@ Its files:
     objective          what they lower
     descent            how: trust region, and a scan of the stairs
     strewing           what is left of it: places about the end, treads of static friction
-    quanta             the other quanta that rests suggest
+    quanta             the other quanta that rests suggest, and the stairs of each
+    evolution          places that evolve about an end, and from afar
     crossing           between their ends and beyond, where more than noise is left
     break_aways        what shows in break-aways alone, sought where these contradict it least
     agreement          which of them came to the same

@@ -13,14 +13,15 @@ from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
 from workbench.fit.break_aways import by_break_aways
-from workbench.fit.crossing import SURELY, crossed, evolved_from_afar, leaves_noise, sticking, unlike
+from workbench.fit.crossing import SURELY, crossed, leaves_noise, sticking, unlike
 from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
+from workbench.fit.evolution import evolved, evolved_from_afar
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
 from workbench.fit.objective import MIDDLE, WITHIN, SimulationError, smoothed
-from workbench.fit.quanta import with_best_quantum
+from workbench.fit.quanta import proved, with_best_quantum
 from workbench.fit.shooting import shooting_starts
-from workbench.fit.strewing import LOWER, MOST_PROVED, evolved, on_lowest_tread, proved, strewn, while_lower
+from workbench.fit.strewing import LOWER, on_lowest_tread, strewn, while_lower
 from workbench.fit.threads import on_threads
 from workbench.model.parameters import Parameter
 
@@ -31,6 +32,8 @@ STIRRED, MOST_STIRRED = 100, 6
 """Places about an end from which a search goes on; how often more, at most, as long as that leads clearly lower;"""
 IN_VAIN = 3
 """rounds of crossing that do not, after which it ends;"""
+EVOLVING, TURNS, MOST_EVOLVED = 40, 60, 4
+"""places about the end that is left, how often they are crossed with each other, and how often more at most;"""
 LIKELY = 1.5
 """and times the least cost up to which an end is gone on from beside the best."""
 
@@ -167,15 +170,22 @@ class BegunFit:
         return lower.evolved()
 
     def evolved(self) -> "BegunFit":
-        """Let places about the best end evolve: where a slip is mistimed still, no end may lie along the valley."""
+        """Let places about the best end evolve: no end may lie along its valley."""
+
+        def off_stairs(z: Vector) -> Vector:
+            return settled(self.error, evolved(self.error, z, EVOLVING, TURNS))
+
         best, *others = self.ends
-        z = while_lower(self.error, best.z, lambda z: settled(self.error, evolved(self.error, z)), MOST_PROVED)
-        return replace(self, ends=self._ordered([replace(best, z=z), *others]))
+        return replace(
+            self,
+            ends=self._ordered([replace(best, z=while_lower(self.error, best.z, off_stairs, MOST_EVOLVED)), *others]),
+        )
 
     def crossed(self) -> "BegunFit":
         """Search on from between the ends and beyond the best, until a few rounds in a row lead no lower.
 
-        Where slips are mistimed also from every strength of what is added, however far off, and from places drawn afar.
+        Where slips are mistimed also from what evolves from afar, and from every strength of what is added: by the cost
+        where it begins a strong lag is far behind, but smooths the way down.
         """
         cost = self.error.cost
 

@@ -8,31 +8,24 @@ In every fourth about half of the coordinates stay.
 
 Static friction shows in the instants of break-aways alone: its derivative says nothing.
 
-The stairs of a record run across all coordinates at once: a scan of each alone ends on one, as does a descent. Where a
-sensor rounds, searches of several origins may end on the same one: before they are believed, places about the best are
-crossed with each other by scipy's differential evolution, which needs no derivative.
+The stairs of a record run across all coordinates at once: a scan of each alone ends on one, as does a descent.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, differential_evolution
 
 from sim.composition import STATIC
 from sim.karnopp import Vector
-from workbench.fit.agreement import Place
 from workbench.fit.descent import scanned
 from workbench.fit.objective import SimulationError
 from workbench.fit.uncertainty import along_axes, of_coordinates
 
-STREWN, CROSSED, TURNS = 400, 40, 60
-"""Places about each end; those about the best of all, and how often they are crossed with each other."""
-WIDELY = 20.0
-"""Deviations of these."""
-MOST_PROVED, LOWER = 4, 1.002
-"""How often more, at most; by what factor lower it must lead to be made again."""
+STREWN = 400
+"""Places about an end."""
+LOWER = 1.002
+"""By what factor lower a move must lead to be made again."""
 NEAREST, FARTHEST = -1.5, 1.5
 """Of the decimal logarithm of the distance, in deviations."""
 SURE, UNSURE = 1e-5, 3e-3
@@ -54,7 +47,7 @@ def on_lowest_tread(error: SimulationError, z: Vector) -> Vector:
 def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
     """Return the lowest of so many places about z, which itself decides what is drawn: no two ends draw the same."""
     generator = np.random.default_rng(z.view(np.uint32))
-    deviation, along, axes = _spread(error, z)
+    deviation, along, axes = spread(error, z)
     static = np.array([each.index == STATIC for each in error.parameters] or np.zeros(z.size), np.float64)
     for i in range(count):
         far = 10.0 ** generator.uniform(NEAREST, FARTHEST)
@@ -67,29 +60,7 @@ def strewn(error: SimulationError, z: Vector, count: int = STREWN) -> Vector:
     return z
 
 
-def evolved(error: SimulationError, z: Vector) -> Vector:
-    """Return the lowest place that differential evolution comes to from z and others about it, which z decides."""
-    generator = np.random.default_rng(z.view(np.uint32))
-    deviation, along, axes = _spread(error, z)
-    normal = generator.standard_normal((CROSSED - 1, z.size))
-    normal[::2], normal[1::2] = deviation * normal[::2], along * normal[1::2] @ axes.T
-    reach = 10.0 * WIDELY * deviation
-    lower, upper = np.maximum(error.lower, z - reach), np.minimum(error.upper, z + reach)
-    found = differential_evolution(
-        error.cost,
-        Bounds(lower, upper),
-        init=np.clip(np.vstack([z, z + WIDELY * normal]), lower, upper),
-        maxiter=TURNS,
-        tol=0.0,
-        mutation=(0.3, 1.0),
-        recombination=0.9,
-        polish=False,
-        rng=generator,
-    )
-    return min(z, np.asarray(found.x, np.float64), key=error.cost)
-
-
-def _spread(error: SimulationError, z: Vector) -> tuple[Vector, Vector, NDArray[np.float64]]:
+def spread(error: SimulationError, z: Vector) -> tuple[Vector, Vector, NDArray[np.float64]]:
     """Return s of the coordinates and S along the axes, inside what is believed of either, and the axes V."""
     along, axes = along_axes(error, z)
     return np.clip(of_coordinates(along, axes), SURE, UNSURE), np.clip(along, SURE, UNSURE_ALONG), axes
@@ -103,16 +74,3 @@ def while_lower(error: SimulationError, z: Vector, move: Callable[[Vector], Vect
             break
         before, here = here, move(here)
     return here
-
-
-def proved(error: SimulationError, ends: Sequence[Place]) -> tuple[Place, ...]:
-    """Return the ends, best first, with the first moved to the lowest place about it.
-
-    Where that is lower by more than searches may differ, the others do not agree with it any more.
-    """
-
-    def off_stairs(z: Vector) -> Vector:
-        return strewn(error, evolved(error, on_lowest_tread(error, z)))
-
-    best, *others = ends
-    return replace(best, z=while_lower(error, best.z, off_stairs, MOST_PROVED)), *others
