@@ -102,8 +102,7 @@ def _drawn(generator: Generator, error: SimulationError, z: Vector, strengths: S
     far = np.array([FROM_AFAR.get(each.index, 0.0) for each in error.parameters])
     lower, upper = _span([each for values in strengths for each in values] or [z], z)
     shape = DRAWN, z.size
-    far = far * generator.uniform(-1.0, 1.0, shape) * generator.uniform(0.0, 1.0, shape)
-    places = z + near * generator.standard_normal(shape) + far
+    places = z + near * generator.standard_normal(shape) + far * generator.uniform(-1.0, 1.0, shape)
     own = places + ABOUT * generator.standard_normal(shape)
     own[::2] = generator.uniform(lower, upper, shape)[::2]
     return np.clip(np.where(of_added, own, places), error.lower, error.upper)
