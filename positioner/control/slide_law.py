@@ -61,8 +61,8 @@ UNLIKE = 2.0
 """Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
 MISSED, SURELY, GAVE_WAY = 0.05, 2.0, 0.5
 """Of its way, and of the deviation of landings: by which a slide may miss its aim; of its way: beyond it was none."""
-GONE_ON = 1.25
-"""Of its way: a stem that is sent back from farther has crept there, or been pushed."""
+JUMPED = 1.1
+"""Of its way: a stem that went farther has jumped there, or been pushed: it was told to break loose, not how far."""
 LEAST = 5.1e-3
 """Of the stroke: a slide shorter than this would not be seen for one."""
 TRIED = 2
@@ -225,10 +225,11 @@ def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSetting
     sent_back = replace(memory, anchor=Anchor(position_m, s))
     if not went_m > min(CREEP * settings.stroke_m, GAVE_WAY * way_m):
         return sent_back
-    if not memory.anchor.direction or not (1.0 - MISSED) * way_m < went_m < GONE_ON * way_m:
+    if not memory.anchor.direction or not (1.0 - MISSED) * way_m < went_m:
         return replace(sent_back, held=NONE_HELD)
     turning = s != memory.anchor.direction
-    margin = memory.margins.own(s, turning=turning).after_breaking(went_m)
+    margin = memory.margins.own(s, turning=turning)
+    margin = margin.after_breaking(went_m) if went_m < JUMPED * way_m else margin.after_jumping(way_m, went_m)
     return replace(sent_back, held=NONE_HELD, margins=memory.margins.replaced(s, margin, turning=turning))
 
 
@@ -481,6 +482,8 @@ def _excursion(
     back = {
         each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) + rounded_m for each in (1, -1)
     }
+    # A stem that a slide of the move has left beside its target is beyond the way already.
+    way_m = 0.0 if memory.slides else abs(error_m)
     ways = (
         (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
         (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
@@ -491,7 +494,7 @@ def _excursion(
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     low_m, high_m = balance.stops_m
-    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m)):
+    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m) - (way_m if way[0] == -s else 0.0)):
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)

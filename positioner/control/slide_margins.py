@@ -79,6 +79,15 @@ class Margin:
             return Margin(held_m, way_m)
         return Margin(held_m, min(self.broke_m, way_m), guessed=self.guessed and way_m > self.broke_m)
 
+    def after_jumping(self, way_m: float, went_m: float) -> "Margin":
+        """Return the margin after a slide meant to go a way, m, that jumped farther: none is so short, though it broke.
+
+        So it is not where one as short, or shorter, has landed: that one has missed.
+        """
+        if 0.0 < self.seen_m <= way_m:
+            return self
+        return Margin(max(self._believed_m, way_m), min(self.broke_m or went_m, went_m))
+
     def after_holding(self, way_m: float) -> "Margin":
         """Return the margin after a slide meant to go a way, m, that did not break loose."""
         if way_m <= 0.0:
