@@ -204,6 +204,8 @@ def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: 
     """
     if not memory.excursion or not _seen_for_a_while(memory, observation):
         return False
+    if not _has_slid(memory, observation.position_m, settings):
+        return False  # one that is sent on from its reference is beyond it already
     s, went_m = memory.direction, abs(observation.position_m - memory.last_m)
     goes_on = (observation.now_s - memory.slide_s) / (observation.now_s - memory.last_s)
     beyond_m = min(s * (each - reference_m) for each in (observation.position_m, memory.last_m))
@@ -211,6 +213,13 @@ def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: 
         beyond_m > _way_m(memory, memory.margins.of(-s, turning=True), settings)
         and (went_m - observation.quantum_m) * goes_on < SLOW * settings.stroke_m
     )
+
+
+def _has_slid(memory: SlideMemory, position_m: float, settings: SlideSettings) -> bool:
+    """Whether the stem has gone farther in its slide than a packing gives way."""
+    s, from_m = memory.direction, memory.anchor.position_m
+    way_m, went_m = s * (memory.aim_m - from_m), s * (position_m - from_m)
+    return went_m > min(CREEP * settings.stroke_m, GAVE_WAY * way_m)
 
 
 def _seen_for_a_while(memory: SlideMemory, observation: StemObservation) -> bool:
@@ -223,8 +232,6 @@ def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSetting
     s, from_m = memory.direction, memory.anchor.position_m
     way_m, went_m = s * (memory.aim_m - from_m), s * (position_m - from_m)
     sent_back = replace(memory, anchor=Anchor(position_m, s))
-    if not went_m > min(CREEP * settings.stroke_m, GAVE_WAY * way_m):
-        return sent_back
     if not memory.anchor.direction or not (1.0 - MISSED) * way_m < went_m:
         return replace(sent_back, held=NONE_HELD)
     turning = s != memory.anchor.direction
