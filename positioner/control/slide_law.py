@@ -61,8 +61,9 @@ UNLIKE = 2.0
 """Factor by which static friction may differ up and down, where slides in one direction were long ones only."""
 MISSED, SURELY, GAVE_WAY = 0.05, 2.0, 0.5
 """Of its way, and of the deviation of landings: by which a slide may miss its aim; of its way: beyond it was none."""
-JUMPED = 1.1
-"""Of its way: a stem that went farther has jumped there, or been pushed: it was told to break loose, not how far."""
+JUMPED, GONE_ON = 1.1, 2.0
+"""Of its way: a stem that went farther jumped there, for none goes less far; from farther still it has crept there, or
+been pushed."""
 LEAST = 5.1e-3
 """Of the stroke: a slide shorter than this would not be seen for one."""
 TRIED = 2
@@ -73,6 +74,8 @@ FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
 ROUNDED = 0.5
 """Quanta by which a position may be rounded."""
+SPARED = 0.5
+"""Of an error: by so much farther from its reference an excursion may go that leaves what lies between by less."""
 SLOW, WHILE_S = 2e-3, 0.02
 """Of the stroke: an excursion that will go no farther has done its work; in which time its speed is seen."""
 FAR = 2.0
@@ -204,11 +207,11 @@ def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: 
     """
     if not memory.excursion or not _seen_for_a_while(memory, observation):
         return False
-    if not _has_slid(memory, observation.position_m, settings):
-        return False  # one that is sent on from its reference is beyond it already
     s, went_m = memory.direction, abs(observation.position_m - memory.last_m)
     goes_on = (observation.now_s - memory.slide_s) / (observation.now_s - memory.last_s)
     beyond_m = min(s * (each - reference_m) for each in (observation.position_m, memory.last_m))
+    if s * (memory.anchor.position_m - reference_m) > 0.0 and not _has_slid(memory, observation.position_m, settings):
+        return False  # it was beyond before
     return (
         beyond_m > _way_m(memory, memory.margins.of(-s, turning=True), settings)
         and (went_m - observation.quantum_m) * goes_on < SLOW * settings.stroke_m
@@ -232,7 +235,9 @@ def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSetting
     s, from_m = memory.direction, memory.anchor.position_m
     way_m, went_m = s * (memory.aim_m - from_m), s * (position_m - from_m)
     sent_back = replace(memory, anchor=Anchor(position_m, s))
-    if not memory.anchor.direction or not (1.0 - MISSED) * way_m < went_m:
+    if not _has_slid(memory, position_m, settings):
+        return sent_back
+    if not memory.anchor.direction or not (1.0 - MISSED) * way_m < went_m < GONE_ON * way_m:
         return replace(sent_back, held=NONE_HELD)
     turning = s != memory.anchor.direction
     margin = memory.margins.own(s, turning=turning)
@@ -489,19 +494,20 @@ def _excursion(
     back = {
         each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) + rounded_m for each in (1, -1)
     }
-    # A stem that a slide of the move has left beside its target is beyond the way already.
-    way_m = 0.0 if memory.slides else abs(error_m)
     ways = (
         (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
         (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
     )
+    # By the other side it is as much farther off at most as it is now, and travels less by twice what it leaves the way
+    # less by: half of either counts. What a slide of the move has left beside its reference is off the way already.
+    farther_m = {s: 0.0, -s: 0.0 if memory.slides else SPARED * abs(error_m)}
     # A stem that the first of two slides has left away, for the second was too short, does not wait there.
     left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]
     if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     low_m, high_m = balance.stops_m
-    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m) - (way_m if way[0] == -s else 0.0)):
+    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m) - farther_m[way[0]]):
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)

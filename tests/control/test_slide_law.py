@@ -869,6 +869,29 @@ def test_a_slide_that_is_sent_back_has_shown_that_its_way_breaks_loose() -> None
     assert short.margins == known, "it came to half its way: that may be a packing, or a pressure that is late"
 
 
+@pytest.mark.parametrize(("went_m", "margin"), [(0.0089, (0.007, 0.0089)), (0.0072, (0.004, 0.0072)), (0.0145, None)])
+def test_a_stem_that_jumps_farther_than_it_was_asked_shows_that_no_slide_is_so_short(
+    went_m: float, margin: tuple[float, float] | None
+) -> None:
+    """Behind a slow I/P one was asked for 0.7 %, the margin of its kin, again and again, and jumped by 0.85 %."""
+    known = replace(KNOWN, onward_up=Margin(0.004, 0.011), turning_up=Margin(0.004, 0.011))
+    memory = SlideMemory(target_m=0.06, direction=1, excursion=True, aim_m=0.067, anchor=Anchor(0.06, 1))
+    memory = replace(memory, margins=known, course=STOOD, slide_s=0.5, last_s=0.5, last_m=0.06 + went_m)
+    back = within(0.06 + went_m, 1.0, False, memory)
+    assert not back.excursion
+    expected = known.onward_up if margin is None else Margin(*margin)
+    assert back.margins.onward_up.held_m == pytest.approx(expected.held_m, rel=2e-3)
+    assert back.margins.onward_up.broke_m == pytest.approx(expected.broke_m)
+
+
+def test_a_stem_that_is_to_turn_beyond_its_reference_first_is_not_sent_back_before_it_has() -> None:
+    """It stands there already: 20 ms later it was sent back from where it stood, and that did not break it loose."""
+    memory = SlideMemory(target_m=0.06, direction=-1, excursion=True, aim_m=0.045, anchor=Anchor(0.051, 1))
+    memory = replace(memory, margins=KNOWN, course=STOOD, slide_s=0.9, last_s=0.9, last_m=0.051)
+    assert within(0.0509, 1.0, False, memory).excursion
+    assert not within(0.0452, 1.0, False, replace(memory, last_m=0.0452)).excursion
+
+
 def test_an_excursion_goes_by_the_shorter_way_round() -> None:
     """By its side it would have to go on by 1 % of the stroke; round the other it turns, by half of that."""
     margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
@@ -877,6 +900,15 @@ def test_an_excursion_goes_by_the_shorter_way_round() -> None:
     assert after.level_pa == pytest.approx(BALANCE.pressure_pa(0.06 - 0.0055, -1))
     even = replace(margins, onward_up=Margin(0.0049, 0.005))
     assert rested(0.0595, SlideMemory(anchor=Anchor(0.0595, 1), margins=even)).direction == 1
+
+
+@pytest.mark.parametrize(("slides", "direction"), [(0, -1), (2, 1)])
+def test_the_shorter_way_round_leaves_what_lies_between_stem_and_reference_least(slides: int, direction: int) -> None:
+    """2.5 % from it it would go 7.5 % beyond by its side, 5 % the other way; a stem that was left there by a slide of the
+    move is off the way already."""
+    margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
+    after = rested(0.0575, SlideMemory(anchor=Anchor(0.0575, 1), margins=margins, slides=slides))
+    assert (after.excursion, after.direction) == (True, direction)
 
 
 def test_a_slide_that_stuck_short_behind_a_slow_pressure_is_none_that_held() -> None:

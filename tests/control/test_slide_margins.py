@@ -43,3 +43,11 @@ def test_what_is_guessed_or_has_held_since_has_not_been_seen_to_break_loose() ->
     assert guess.after_breaking(2e-3).seen_m == 2e-3
     assert guess.after_breaking(3e-3).seen_m == 0.0, "it may be shorter yet"
     assert (KNOWN.seen_m, KNOWN.after_holding(2.5e-3).seen_m) == (2.4e-3, 0.0)
+
+
+def test_a_jump_bounds_the_margin_from_both_sides_but_not_where_shorter_ways_have_landed() -> None:
+    jumped = Margin(0.0, 2.0).after_jumping(0.7, 0.85)
+    assert (jumped.held_m, jumped.broke_m) == (0.7, 0.85)
+    assert 0.7 < jumped.way_m < 0.85
+    landed = Margin(0.4, 0.6)
+    assert landed.after_jumping(0.7, 0.85) == landed, "that one missed"
