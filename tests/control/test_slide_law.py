@@ -904,10 +904,10 @@ def test_an_excursion_goes_by_the_shorter_way_round() -> None:
 
 @pytest.mark.parametrize(("slides", "direction"), [(0, -1), (2, 1)])
 def test_the_shorter_way_round_leaves_what_lies_between_stem_and_reference_least(slides: int, direction: int) -> None:
-    """2.5 % from it it would go 7.5 % beyond by its side, 5 % the other way; a stem that was left there by a slide of the
-    move is off the way already."""
+    """At 3 % from it, it would go 7 % beyond by its side, 5 % the other way round; a stem that a slide of the move has
+    left there is off the way already."""
     margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
-    after = rested(0.0575, SlideMemory(anchor=Anchor(0.0575, 1), margins=margins, slides=slides))
+    after = rested(0.057, SlideMemory(anchor=Anchor(0.057, 1), margins=margins, slides=slides))
     assert (after.excursion, after.direction) == (True, direction)
 
 
