@@ -12,12 +12,12 @@ With the stem at rest at x, e = r - x and s = sign(e):
     else                             two slides:  u = B(r + s M, s), wait until it rests, u = B(r, -s)
                                                   M = max(1.02 m_-s, m_s - abs(e))
 
-The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem is
-farther than m_-s beyond r and will go no farther, it need not rest. An excursion goes the other way round, by r - s M
-with M = max(1.02 m_s, m_-s + abs(e)), where that is shorter, for the margins of turning and of going on differ, or
-where one of the two would leave the travel or the pressure limits. To 1.02 m comes what sensor and device round: a
-first slide that fell so much short would leave no way back. Only resting times depend on the period of the loop, not
-where the stem lands.
+The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem has
+slid, is farther than m_-s beyond r, and will go no farther; it need not rest. An excursion goes the other way round, by
+r - s M' with M' = max(1.02 m_s, m_-s + abs(e)), where M' - abs(e)/2 < M, for the margins of turning and of going on
+differ: it leaves the way between by M' - abs(e) and r by M', so half of the error is spared. Or where one of the two
+would leave the travel or the pressure limits. To 1.02 m comes what sensor and device round: a first slide that fell so
+much short would leave no way back. Only resting times depend on the period of the loop, not where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. A
 stem that does not come to rest, off its reference, is not moved, and that is said.
@@ -75,7 +75,7 @@ FIRST_MARGIN = 0.1
 ROUNDED = 0.5
 """Quanta by which a position may be rounded."""
 SPARED = 0.5
-"""Of an error: by so much farther from its reference an excursion may go that leaves what lies between by less."""
+"""Of an error: by so much farther from its reference an excursion may go by the other side, where it travels less."""
 SLOW, WHILE_S = 2e-3, 0.02
 """Of the stroke: an excursion that will go no farther has done its work; in which time its speed is seen."""
 FAR = 2.0
@@ -498,8 +498,7 @@ def _excursion(
         (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
         (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
     )
-    # By the other side it is as much farther off at most as it is now, and travels less by twice what it leaves the way
-    # less by: half of either counts. What a slide of the move has left beside its reference is off the way already.
+    # What a slide of the move has left beside its reference is off the way between already: nothing is spared.
     farther_m = {s: 0.0, -s: 0.0 if memory.slides else SPARED * abs(error_m)}
     # A stem that the first of two slides has left away, for the second was too short, does not wait there.
     left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]

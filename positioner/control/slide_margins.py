@@ -9,6 +9,9 @@ known; what is, are the longest way that held the stem and the shortest that bro
     held < m <= broke                 tried next: sqrt(held broke), at most 2 held, until broke is within 10 % of held;
                                       then broke
 
+Behind a slow I/P a slide may break loose though it is sent less far than m, for there stems stick short of where they
+are sent: it jumps by m. Then the way asked is no way to go, as if it had held, and m is at most where it jumped to.
+
 A way that holds though it has broken loose before is believed for the move: the next is longer by `RAISE`. When that
 has broken loose, `held` is what it was, so that a margin that luck has made too long comes back within a few moves.
 A margin of which little is known is taken for its next of kin, or what held that one, less a fifth, says what holds it.
