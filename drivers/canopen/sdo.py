@@ -25,7 +25,7 @@ from config.errors import InputError
 from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
 from drivers.canopen.events import NodeEvent
 from drivers.canopen.node_bus import SDO_ANSWER, SDO_REQUEST, NodeBus
-from drivers.canopen.watcher import NMT_STATES, OPERATIONAL, PRE_OPERATIONAL, NodeWatcher
+from drivers.canopen.watcher import BOOT_UP, NMT_STATES, OPERATIONAL, PRE_OPERATIONAL, NodeWatcher
 from fieldbus.canopen.eds import read_eds
 
 ILLEGAL_VALUE = 3
@@ -199,12 +199,14 @@ class SdoTransfers:
     def hears_operational(self) -> bool:
         """Return whether the node's heartbeat says OPERATIONAL; False of one that has none.
 
+        That it boots is no answer: what it does then it says next.
+
         Raises:
             DriverError: as `upload`.
         """
         heartbeats = self.has(HEARTBEAT_MS) and self.upload(HEARTBEAT_MS) > 0
         end_s = time.monotonic() + (LONGEST_LISTENING_S if heartbeats else 0.0)
-        while self._watcher.state is None and (rest_s := end_s - time.monotonic()) > 0:
+        while self._watcher.state in (None, BOOT_UP) and (rest_s := end_s - time.monotonic()) > 0:
             self._receive(rest_s)
         return self._watcher.state == OPERATIONAL
 

@@ -91,12 +91,11 @@ class OtherNode:
         self.frames: list[tuple[int, bytes]] = []
         self.constant: set[int] = set()
         self.node.add_write_callback(self._refuse)
+        self.node.nmt.state = "OPERATIONAL"  # before 0x1017, whose heartbeat would say first that it boots
         for name, value in (("2005", HELD_PA), ("2006", 7.0)):
             self.node.sdo[int(name, 16)].raw = value
         for index, value in ((0x2007, 2), (STATUS_WORD, 0b1111), (0x1017, HEARTBEAT_MS), (0x6040, 7)):
             self.node.sdo[index].raw = value
-        self.node.nmt.state = "OPERATIONAL"
-        self.node.nmt.start_heartbeat(HEARTBEAT_MS)
         self.network.subscribe(0, self._note)
         self.network.subscribe(0x600 + NODE, self._note)
 
@@ -297,6 +296,21 @@ def test_fixed_pdos_that_lack_what_is_wanted_are_refused_and_left(other: OtherNo
     with pytest.raises(Refused, match="SDO abort"):
         driver_of(other).open()
     assert other.configuration[4:] == before[4:]
+    assert other.settles("OPERATIONAL")
+
+
+def test_a_node_that_says_that_it_boots_is_asked_again_what_it_does(other: OtherNode) -> None:
+    """A boot-up frame that came late left a node stopped that ran when it was found."""
+    fix_pdos(other)
+    asks_heartbeat = b"\x40" + struct.pack("<H", 0x1017)
+
+    def boot(_identity: int, data: bytearray, _stamp: float) -> None:
+        if data.startswith(asks_heartbeat):
+            other.network.send_message(0x700 + NODE, b"\0")
+
+    other.network.subscribe(0x600 + NODE, boot)
+    with pytest.raises(Refused, match="SDO abort"):
+        driver_of(other).open()
     assert other.settles("OPERATIONAL")
 
 
