@@ -26,6 +26,10 @@ Ends = Callable[[Effects, Effects], float]
 """From the effects a fit begins with, and those it is to add, to the error that it comes to, in floors."""
 
 
+COMES_TO_NOTHING = "presliding"
+"""Its searches are made to end at the base."""
+
+
 @dataclass(frozen=True)
 class Begun:
     """A fit made by hand as it is begun: where it is on the way, what its first search comes to, and what all do."""
@@ -51,6 +55,11 @@ class Begun:
     @property
     def rms_m(self) -> float:
         return self.first.rms_m
+
+    @property
+    def shows(self) -> bool:
+        """Whether its first search makes something better than the base; that of `COMES_TO_NOTHING` does not."""
+        return all(each.name != COMES_TO_NOTHING for each in self.best.valve.effect)
 
     @property
     def not_gone_on(self) -> Fit:
@@ -428,6 +437,13 @@ def test_what_is_behind_another_is_not_gone_on_from(
     step, *_ = searched(lambda _, added: min((floors[each] for each in added), default=1e3), *floors, first=1.1)
     errors = floors | {"backlash": 1.05 * 4.0 * least}
     assert {name: error_in_floors(step, name) for name in floors} == pytest.approx(errors)
+
+
+def test_what_has_come_to_nothing_is_not_gone_on_from(searched: Callable[..., tuple[EffectStep, ...]]) -> None:
+    floors = {"ip_lag": 2.0, COMES_TO_NOTHING: 2.1}
+    step, *_ = searched(lambda _, added: min((floors[each] for each in added), default=1e3), *floors, first=1.1)
+    assert error_in_floors(step, "ip_lag") == pytest.approx(2.0)
+    assert error_in_floors(step, COMES_TO_NOTHING) == pytest.approx(1.05 * 2.1)
 
 
 @pytest.mark.parametrize(("noise", "base"), [(True, 3.0), (False, 1.0)], ids=["leaves noise", "explains all"])

@@ -150,7 +150,7 @@ class BegunFit:
         best = here.ends[0].z
         if here._rounds(best):
             here = replace(here, ends=proved(here.error, with_best_quantum(here.error, here.ends)))
-        elif here._shows(best):
+        elif here._visible(best):
             here = here.gone_on()
         return here.judged(profile=profile)
 
@@ -275,11 +275,18 @@ class BegunFit:
         end = replace(self.weakest, z=settled(self.error, self.weakest.z, self.effort.base))
         return replace(self, ends=(end, *self.ends))
 
+    @property
+    def shows(self) -> bool:
+        """Whether what is added makes something better than the base, where its best search has ended."""
+        return self._shows(self.ends[0].z)
+
     def _shows(self, z: Vector) -> bool:
-        """Whether what is added makes something better than the base, a quantum by more than the noise hides."""
+        return self._improves(z) and self._visible(z)
+
+    def _visible(self, z: Vector) -> bool:
+        """Whether the noise does not hide that the sensor rounds at z, if it does."""
         theta, noise_m = self.error.theta(z), self.error.run.record.scale_m
-        quanta_m = [theta[each.index] for each in self.error.parameters if each.guess == "quantum"]
-        return self._improves(z) and all(each >= FINEST * noise_m for each in quanta_m)
+        return all(theta[each.index] >= FINEST * noise_m for each in self.error.parameters if each.guess == "quantum")
 
     def _improves(self, z: Vector) -> bool:
         return WITHIN * self.error.cost(z) < self.effort.base

@@ -494,7 +494,8 @@ class EffectSearch:
 
         def finished(each: BegunFit) -> Fit:
             lost = racing and each.cost > OUT_OF_RACE * least
-            near = each.gone_on_up_to(BEHIND * least)
+            # Of many effects few act in this valve: what has come to nothing is not gone on from here, as a fit would.
+            near = each.gone_on_up_to(BEHIND * least if each.shows else 0.0)
             return near.judged(profile=False) if lost else near.finished(profile=False)
 
         evaluated = partial(self._evaluated_by, finished)
