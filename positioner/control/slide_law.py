@@ -220,9 +220,14 @@ def _far_enough(memory: SlideMemory, observation: StemObservation, reference_m: 
 
 def _has_slid(memory: SlideMemory, position_m: float, settings: SlideSettings) -> bool:
     """Whether the stem has gone farther in its slide than a packing gives way."""
-    s, from_m = memory.direction, memory.anchor.position_m
-    way_m, went_m = s * (memory.aim_m - from_m), s * (position_m - from_m)
+    way_m, went_m = _way_and_went_m(memory, position_m)
     return went_m > min(CREEP * settings.stroke_m, GAVE_WAY * way_m)
+
+
+def _way_and_went_m(memory: SlideMemory, position_m: float) -> tuple[float, float]:
+    """Return how far the slide under way is to go from where the stem stood, m, and how far it has gone."""
+    s, from_m = memory.direction, memory.anchor.position_m
+    return s * (memory.aim_m - from_m), s * (position_m - from_m)
 
 
 def _seen_for_a_while(memory: SlideMemory, observation: StemObservation) -> bool:
@@ -232,8 +237,8 @@ def _seen_for_a_while(memory: SlideMemory, observation: StemObservation) -> bool
 
 def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSettings) -> SlideMemory:
     """Return the memory of the first of two slides where it is sent back: no rest will say so, but it has slid."""
-    s, from_m = memory.direction, memory.anchor.position_m
-    way_m, went_m = s * (memory.aim_m - from_m), s * (position_m - from_m)
+    s = memory.direction
+    way_m, went_m = _way_and_went_m(memory, position_m)
     sent_back = replace(memory, anchor=Anchor(position_m, s))
     if not _has_slid(memory, position_m, settings):
         return sent_back
@@ -499,14 +504,14 @@ def _excursion(
         (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
     )
     # What a slide of the move has left beside its reference is off the way between already: nothing is spared.
-    farther_m = {s: 0.0, -s: 0.0 if memory.slides else SPARED * abs(error_m)}
+    spared_m = {s: 0.0, -s: 0.0 if memory.slides else SPARED * abs(error_m)}
     # A stem that the first of two slides has left away, for the second was too short, does not wait there.
     left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]
     if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     low_m, high_m = balance.stops_m
-    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m) - farther_m[way[0]]):
+    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m) - spared_m[way[0]]):
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)

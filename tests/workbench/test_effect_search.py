@@ -26,8 +26,8 @@ Ends = Callable[[Effects, Effects], float]
 """From the effects a fit begins with, and those it is to add, to the error that it comes to, in floors."""
 
 
-COMES_TO_NOTHING = "presliding"
-"""Its searches are made to end at the base."""
+COMES_TO_NOTHING = "friction_drift"
+"""Its searches are made to end at the base: no other test has it."""
 
 
 @dataclass(frozen=True)

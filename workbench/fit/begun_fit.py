@@ -175,11 +175,11 @@ class BegunFit:
         def off_stairs(z: Vector) -> Vector:
             return settled(self.error, evolved(self.error, z, EVOLVING, TURNS))
 
-        best, *others = self.ends
-        return replace(
-            self,
-            ends=self._ordered([replace(best, z=while_lower(self.error, best.z, off_stairs, MOST_EVOLVED)), *others]),
-        )
+        return self._with_best(while_lower(self.error, self.ends[0].z, off_stairs, MOST_EVOLVED))
+
+    def _with_best(self, z: Vector) -> "BegunFit":
+        """Return it with its best end moved to z."""
+        return replace(self, ends=self._ordered([replace(self.ends[0], z=z), *self.ends[1:]]))
 
     def crossed(self) -> "BegunFit":
         """Search on from between the ends and beyond the best, until a few rounds in a row lead no lower.
@@ -214,8 +214,7 @@ class BegunFit:
             in_vain = 0 if least > LOWER * cost(pool[0]) else in_vain + 1
         if pool[0] is self.ends[0].z:
             return self
-        best = replace(self.ends[0], z=settled(self.error, pool[0]))
-        return replace(self, ends=self._ordered([best, *self.ends[1:]]))
+        return self._with_best(settled(self.error, pool[0]))
 
     def stirred(self) -> "BegunFit":
         """Go on from the lowest of the places strewn about the best end; where that leads lower, about others too.
