@@ -65,6 +65,7 @@ def test_an_effect_that_is_not_there_never_makes_it_worse() -> None:
                 (120443, "poor", "asymmetric_friction"),
                 (120490, "full", "dwell_stiction"),
                 (90309, "full", "ip_lag"),
+                (180245, "full", "stribeck"),
             )
         ),
     ],

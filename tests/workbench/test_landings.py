@@ -8,7 +8,7 @@ from config.valve_file import ValveFile
 from sim.composition import BASE, COULOMB, SPRING, STATIC, VISCOUS, Composition
 from tests.workbench.valves import NOISE_M, SEED, drawn_valve, record_of, with_effect
 from workbench.data.record import ready
-from workbench.fit.break_aways import by_break_aways
+from workbench.fit.break_aways import by_break_aways, making_up
 from workbench.fit.landings import Landings, rests
 from workbench.fit.objective import SimulationError
 from workbench.model.free_run import FreeRun
@@ -88,6 +88,34 @@ def test_without_such_an_effect_break_aways_move_nothing() -> None:
     error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
     begin = error.coordinates(composition.theta)
     assert by_break_aways(error, begin) is begin
+
+
+def stirred_by(name: str, **values: float) -> tuple[SimulationError, Column]:
+    """Return the error of the true valve with one effect, and its coordinates."""
+    truth = with_effect(VALVE, name, **values)
+    composition = Composition.from_file(truth)
+    parameters = free_parameters(composition, [*DEFAULT, f"{name}.{next(iter(values))}"])
+    record = ready(record_of(truth, 1, 3000))
+    error = SimulationError(FreeRun(composition, record), composition, parameters, composition.theta)
+    return error, error.coordinates(composition.theta)
+
+
+def test_a_stribeck_excess_is_stronger_or_weaker_where_static_friction_makes_up_for_it() -> None:
+    error, z = stirred_by("stribeck", excess_n=100.0, velocity_m_per_s=0.02, exponent=2.0)
+    places = [error.theta(each) for each in making_up(error, z)]
+    broken_at_n = error.theta(z)[STATIC] + 100.0
+    assert {np.sign(each[len(BASE)] - 100.0) for each in places} == {-1.0, 1.0}
+    assert [each[STATIC] + each[len(BASE)] for each in places] == pytest.approx([broken_at_n] * len(places), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"), [("preload", {"force_n": 100.0}), ("asymmetric_friction", {"asymmetry": 0.2})]
+)
+def test_what_break_aways_tell_from_static_friction_does_not_make_up_for_it(
+    name: str, values: dict[str, float]
+) -> None:
+    error, z = stirred_by(name, **values)
+    assert not list(making_up(error, z))
 
 
 def test_a_rest_knows_where_its_slide_came_from_and_where_the_next_one_goes() -> None:

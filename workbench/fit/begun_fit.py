@@ -12,7 +12,7 @@ from typing import TypeVar
 from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
-from workbench.fit.break_aways import by_break_aways
+from workbench.fit.break_aways import by_break_aways, making_up
 from workbench.fit.crossing import SURELY, crossed, leaves_noise, sticking, unlike
 from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
 from workbench.fit.evolution import evolved, evolved_from_afar
@@ -223,7 +223,11 @@ class BegunFit:
         """
 
         def off_stairs(z: Vector) -> Vector:
-            near = strewn(self.error, on_lowest_tread(self.error, z), STIRRED), by_break_aways(self.error, z)
+            near = (
+                strewn(self.error, on_lowest_tread(self.error, z), STIRRED),
+                by_break_aways(self.error, z),
+                self._made_up(z),
+            )
             found = [settled(self.error, each, self.effort.base) for each in near if each is not z]
             return min([z, *found], key=self.error.cost)
 
@@ -237,6 +241,11 @@ class BegunFit:
         likely = min(sum(self.error.cost(end.z) <= LIKELY * here.cost for end in others), self.effort.agreeing)
         found = _each(stirred, others[:likely], self.workers, lambda _: None)
         return replace(self, ends=self._ordered([best, *found, *others[likely:]]))
+
+    def _made_up(self, z: Vector) -> Vector:
+        """Return the lowest from z with what makes up for static friction stronger or weaker; z where nothing does."""
+        down = [descended(self.error, descended(self.error, each, COARSE), NARROW) for each in making_up(self.error, z)]
+        return min(down, key=self.error.cost) if down else z
 
     def shot(self) -> "BegunFit":
         """Search from starts by multiple shooting too, where the best end leaves something to explain."""

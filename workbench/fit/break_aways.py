@@ -6,11 +6,16 @@
 
 Each break-away is a stair in all of these parameters, which a descent does not see; but C needs no simulation: a random
 search may try many places, and takes the one that the break-aways contradict least.
+
+    F_s' = F_s - (F_b(z') - F_b(z))         F_b what an effect adds to static friction, the same at each break-away
+
+What of an effect makes up for static friction, as a Stribeck excess does, runs along a valley of these stairs, whose
+floor no derivative and no straight line follows: z with it stronger or weaker, and static friction for it, does.
 """
 
 import numpy as np
 
-from sim.composition import STATIC
+from sim.composition import BASE, COULOMB, STATIC
 from sim.karnopp import Vector
 from workbench.fit.landings import NOT_IN_LANDINGS, Landings, Loaded, rests
 from workbench.fit.objective import SimulationError
@@ -24,7 +29,9 @@ NEAREST, FARTHEST = -3.0, 0.0
 OF_STATIC = 0.15
 """of that of static friction, which is known better."""
 SHOWN_BY = 0.1
-"""By how much a parameter is moved to see what it shows in."""
+"""By how much a parameter is moved to see what it shows in;"""
+MADE_UP_BY = (0.25, 0.5, 1.0, 1.5)
+"""and one that makes up for static friction, either way."""
 
 
 def by_break_aways(error: SimulationError, z: Vector) -> Vector:
@@ -60,6 +67,34 @@ def broken_loose(error: SimulationError, landings: Landings, theta: Vector) -> V
     return error.theta(z)
 
 
+def making_up(error: SimulationError, z: Vector) -> list[Vector]:
+    """Return z with what makes up for static friction stronger and weaker; none where break-aways tell it from that."""
+    if error.run.by.slow or not any(each.index == STATIC for each in error.parameters):
+        return []
+    landings = Landings(error, rests(error.run.record))
+    broken = landings.breaking(error.run.run(error.theta(z)).pressure_pa)
+    if not broken.rows.size:
+        return []
+
+    def made_up(there: Vector) -> Vector | None:
+        theta = error.theta(there)
+        more_n = landings.static_at_n(theta, broken) - landings.static_at_n(error.theta(z), broken)
+        by_n = float(np.median(more_n))
+        theta[STATIC] += by_n
+        alike = float(np.ptp(more_n)) <= CONTRADICTED_N < abs(by_n)
+        return error.coordinates(theta) if alike and theta[STATIC] >= theta[COULOMB] else None
+
+    own = [i for i, each in enumerate(error.parameters) if each.index >= len(BASE)]
+    found = [made_up(_moved(error, z, i, far * way)) for i in own for far in MADE_UP_BY for way in (1.0, -1.0)]
+    return [each for each in found if each is not None]
+
+
+def _moved(error: SimulationError, z: Vector, i: int, far: float) -> Vector:
+    there = z.copy()
+    there[i] = np.clip(z[i] + far, error.lower[i], error.upper[i])
+    return there
+
+
 class _BreakAways:
     """The rests of a record, under the loads that they bore and did not bear."""
 
@@ -75,8 +110,7 @@ class _BreakAways:
 
     def show_alone(self, z: Vector, i: int) -> bool:
         """Return whether a parameter changes where rests break loose, and not where slides land."""
-        there = z.copy()
-        there[i] += SHOWN_BY if z[i] + SHOWN_BY <= self._error.upper[i] else -SHOWN_BY
+        there = _moved(self._error, z, i, SHOWN_BY if z[i] + SHOWN_BY <= self._error.upper[i] else -SHOWN_BY)
         here_n, there_n = (self._landings.balance_n(self._error.theta(each), self._landed) for each in (z, there))
         changes = not np.array_equal(self._beyond_n(z, self._breaking), self._beyond_n(there, self._breaking))
         return changes and bool(np.array_equal(here_n, there_n))
