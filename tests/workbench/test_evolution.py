@@ -7,7 +7,7 @@ import pytest
 
 from sim.composition import SPRING, STATIC, VISCOUS
 from sim.karnopp import Vector
-from workbench.fit.evolution import evolved, evolved_from_afar
+from workbench.fit.evolution import evolved, evolved_from_afar, evolved_inside
 from workbench.fit.objective import FINAL, SimulationError
 from workbench.model.parameters import Parameter
 
@@ -53,7 +53,31 @@ class Stairs:
         return float(np.sum(self.residuals(z) ** 2))
 
 
-def as_error(made_up: TwoValleys | Stairs) -> SimulationError:
+class Rounded:
+    """A sensor that rounds what is linear: each position in a wrong quantum counts, or how far it is outside."""
+
+    parameters = (*PARAMETERS[:2], Parameter("rounding.quantum_m", STATIC + 7, 0.0, 1.0, guess="quantum"))
+    lower, upper = np.full(3, -2.0), np.full(3, 2.0)
+    slopes = np.random.default_rng(4).standard_normal((600, 2))
+    measured = np.round(slopes @ np.array([0.7, -0.4]) * 20.0)
+    asked: list[Vector]
+
+    def __init__(self, *, outside: bool) -> None:
+        self._outside, self.asked = outside, []
+
+    def residuals(self, z: Vector, scale: float = FINAL) -> Vector:
+        self.asked.append(z)
+        off = np.abs(20.0 * self.slopes @ z[:2] - self.measured)
+        return np.asarray(np.maximum(off - 0.5, 0.0) if self._outside else np.round(off) + 0.01 * off)
+
+    def jacobian(self, z: Vector, here: Vector, step: float) -> Vector:
+        return np.column_stack([20.0 * self.slopes, np.ones(len(self.slopes))])
+
+    def cost(self, z: Vector, scale: float = FINAL) -> float:
+        return float(np.sum(self.residuals(z) ** 2))
+
+
+def as_error(made_up: TwoValleys | Stairs | Rounded) -> SimulationError:
     return cast(SimulationError, cast(Any, made_up))
 
 
@@ -80,3 +104,13 @@ def test_the_end_itself_decides_what_is_drawn() -> None:
         evolved_from_afar(as_error(error), z, [])
     assert np.array_equal(first.asked, again.asked)
     assert not np.allclose(first.asked[1], other.asked[1])
+
+
+def test_where_a_sensor_rounds_places_evolve_by_what_lies_outside_its_quanta_which_stay() -> None:
+    rounded, outside, stuck = Rounded(outside=False), Rounded(outside=True), np.array([0.72, -0.41, 0.3])
+    found = evolved_inside(as_error(rounded), as_error(outside), stuck, 60, 60)
+    assert rounded.cost(stuck) > 10.0
+    assert rounded.cost(found) < 1.0, "every position in its quantum"
+    assert {float(each[2]) for each in outside.asked} == {stuck[2]}
+    nowhere = evolved_inside(as_error(rounded), as_error(TwoValleys()), found, 10, 2)
+    assert np.array_equal(nowhere, found), "what leads higher is not followed"

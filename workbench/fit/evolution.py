@@ -5,7 +5,9 @@
     z' = z + d                         from afar: springs and Coulomb friction, which the landings tell, near; all else
                                        from where it may be; compared by a rough simulation at the wide scale
 
-About an end they come off stairs that run across all coordinates at once. From afar they cross what lies between two
+About an end they come off stairs that run across all coordinates at once. Where a sensor rounds, a single position in a
+wrong quantum outweighs all else, and the error does not tell how far it lies outside: there that is what they are
+compared by. From afar they cross what lies between two
 valleys where slips stay mistimed: what moves these, viscous and static friction and what an effect has of its own, is
 off together. There the lowest must not lead the others, as it is the valley that is to be left.
 """
@@ -44,13 +46,20 @@ Places = NDArray[np.float64]
 
 def evolved(error: SimulationError, z: Vector, places: int, turns: int) -> Vector:
     """Return the lowest place that so many evolve to from z and about it, in so many turns; z decides what is drawn."""
-    generator = np.random.default_rng(z.view(np.uint32))
-    deviation, along, axes = spread(error, z)
-    normal = generator.standard_normal((places - 1, z.size))
-    normal[::2], normal[1::2] = deviation * normal[::2], along * normal[1::2] @ axes.T
-    lower, upper = np.maximum(error.lower, z - REACH * deviation), np.minimum(error.upper, z + REACH * deviation)
-    begins = np.clip(np.vstack([z, z + WIDELY * normal]), lower, upper)
+    begins, lower, upper, generator = _about(error, z, places)
     return min(z, _evolved(error.cost, begins, lower, upper, "best1bin", turns, generator)[0], key=error.cost)
+
+
+def evolved_inside(error: SimulationError, unrounded: SimulationError, z: Vector, places: int, turns: int) -> Vector:
+    """Return the lowest place that evolves from z and about it where a sensor rounds, by what lies outside its quanta.
+
+    The quantum itself stays: a wider one would hold all positions.
+    """
+    begins, lower, upper, generator = _about(error, z, places)
+    for i in (i for i, each in enumerate(error.parameters) if each.guess == "quantum"):
+        begins[:, i] = lower[i] = upper[i] = z[i]
+    found = _evolved(unrounded.cost, begins, lower, upper, "best1bin", turns, generator)
+    return min([z, *found], key=error.cost)
 
 
 def evolved_from_afar(error: SimulationError, z: Vector, strengths: Sequence[Sequence[Vector]]) -> list[Vector]:
@@ -68,6 +77,16 @@ def evolved_from_afar(error: SimulationError, z: Vector, strengths: Sequence[Seq
     rough = error.rough
     found = _evolved(lambda there: rough.cost(there, WIDE.scale), begins, lower, upper, "rand1bin", TURNS, generator)
     return list(found[:LEADING])
+
+
+def _about(error: SimulationError, z: Vector, places: int) -> tuple[Places, Vector, Vector, Generator]:
+    """Return z and places about it, (places, parameters), their bounds, and what draws on."""
+    generator = np.random.default_rng(z.view(np.uint32))
+    deviation, along, axes = spread(error, z)
+    normal = generator.standard_normal((places - 1, z.size))
+    normal[::2], normal[1::2] = deviation * normal[::2], along * normal[1::2] @ axes.T
+    lower, upper = np.maximum(error.lower, z - REACH * deviation), np.minimum(error.upper, z + REACH * deviation)
+    return np.clip(np.vstack([z, z + WIDELY * normal]), lower, upper), lower, upper, generator
 
 
 def _evolved(

@@ -183,13 +183,13 @@ class Unrounded(SimulationError):
     the sharper sigma and the margin.
     """
 
-    def __init__(self, error: SimulationError, quantum: Parameter, z: Vector) -> None:
+    def __init__(self, error: SimulationError, quantum: Parameter, z: Vector, inside: float = INSIDE) -> None:
         theta = error.theta(z)
         super().__init__(error.run, error.composition, error.parameters, theta)
         self._index = quantum.index
         quantum_m = float(theta[quantum.index])
         self._measured_m = quantum_m * np.round(self._measured_m / quantum_m)
-        self._unit_m, self._inside_m = SHARPER * self.sigma_m, INSIDE * quantum_m
+        self._unit_m, self._inside_m = SHARPER * self.sigma_m, inside * quantum_m
 
     def simulated(self, z: Vector) -> Vector:
         """Return the parameter vector at z without rounding."""
@@ -198,12 +198,18 @@ class Unrounded(SimulationError):
         return theta
 
 
-def smoothed(error: SimulationError, z: Vector) -> SimulationError:
-    """Return the error itself, or where a sensor rounds at z, that of the position before it is rounded."""
+def smoothed(error: SimulationError, z: Vector, inside: float = INSIDE) -> SimulationError:
+    """Return the error itself, or where a sensor rounds at z, that of the position before it is rounded.
+
+    Args:
+        error: of what is indicated.
+        z: where the quantum is taken from.
+        inside: share of the quantum by which a position may lie off.
+    """
     theta = error.theta(z)
     for each in error.parameters:
         if each.guess == "quantum" and theta[each.index] > 0.0:
-            return Unrounded(error, each, z)
+            return Unrounded(error, each, z, inside)
     return error
 
 

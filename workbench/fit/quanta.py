@@ -13,13 +13,15 @@ from dataclasses import replace
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place
 from workbench.fit.descent import settled
-from workbench.fit.evolution import evolved
+from workbench.fit.evolution import evolved, evolved_inside
 from workbench.fit.guesses import likely_quanta_m
-from workbench.fit.objective import WITHIN, SimulationError
+from workbench.fit.objective import WITHIN, SimulationError, smoothed
 from workbench.fit.strewing import on_lowest_tread, strewn, while_lower
 
 EVOLVING, TURNS, MOST = 60, 120, 4
 """Places about the best end, how often they are crossed with each other, and how often all of it is made more."""
+HALF = 0.5
+"""Of a quantum: a position that is rounded lies off by that at most."""
 
 
 def with_best_quantum(error: SimulationError, ends: Sequence[Place]) -> Sequence[Place]:
@@ -46,6 +48,7 @@ def proved(error: SimulationError, ends: Sequence[Place]) -> tuple[Place, ...]:
     """
 
     def off_stairs(z: Vector) -> Vector:
+        z = evolved_inside(error, smoothed(error, z, HALF), z, EVOLVING, TURNS)
         return strewn(error, evolved(error, on_lowest_tread(error, z), EVOLVING, TURNS))
 
     best, *others = ends
