@@ -6,10 +6,10 @@
                                        from where it may be; compared by a rough simulation at the wide scale
 
 About an end they come off stairs that run across all coordinates at once. Where a sensor rounds, a single position in a
-wrong quantum outweighs all else, and the error does not tell how far it lies outside: there that is what they are
-compared by. From afar they cross what lies between two
-valleys where slips stay mistimed: what moves these, viscous and static friction and what an effect has of its own, is
-off together. There the lowest must not lead the others, as it is the valley that is to be left.
+wrong quantum outweighs all else, and the error does not tell how far outside of it: that is what they are compared by
+there. From afar they cross what lies between two valleys where slips stay mistimed: what moves these, viscous and
+static friction and what an effect has of its own, is off together. There the lowest must not lead the others, as it is
+the valley that is to be left.
 """
 
 from collections.abc import Callable, Sequence
