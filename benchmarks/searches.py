@@ -32,6 +32,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from benchmarks.kept_lines import Line, kept, run
+from config.errors import InputError
 from config.recording import Column, Recording
 from config.valve_file import ValveFile, ValveParameters
 from sim.composition import Composition
@@ -121,11 +122,14 @@ def disturbed(recording: Recording, valve: ValveFile, number: int) -> tuple[Reco
 
 
 def searched(task: Task) -> Line:
-    """Search once; return what is kept of it."""
+    """Search once; return what is kept of it: of a record that no valve is fitted to, why."""
     recording, valve, truth = posed(task.case)
     stirred, start = disturbed(recording, valve, task.number)
     began_s = time.process_time()
-    base = fit(stirred, start, seed=task.number, workers=1, profile=False)
+    try:
+        base = fit(stirred, start, seed=task.number, workers=1, profile=False)
+    except InputError as error:
+        return {**task.case._asdict(), "number": task.number, "refused": error.problem}
     base_s = time.process_time() - began_s
     found = fit(stirred, start, effects=(task.case.effect,), seed=task.number, workers=1, base=base, profile=False)
     return {
@@ -154,6 +158,9 @@ def true_cost(recording: Recording, truth: ValveFile) -> float:
 
 def report(lines: Sequence[Line]) -> Iterator[str]:
     """Yield the figures by kind and effect."""
+    refused = [each for each in lines if "refused" in each]
+    lines = [each for each in lines if "refused" not in each]
+    yield from (f"{each['effect']} {each['seed']} {each['kind']} is refused: {each['refused']}" for each in refused)
     for kind in get_args(Kind):
         chosen = [each for each in lines if each["kind"] == kind]
         if not chosen:
