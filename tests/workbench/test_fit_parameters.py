@@ -66,6 +66,7 @@ def test_an_effect_that_is_not_there_never_makes_it_worse() -> None:
                 (120490, "full", "dwell_stiction"),
                 (90309, "full", "ip_lag"),
                 (180245, "full", "stribeck"),
+                (230606, "full", "stribeck"),
                 (220094, "full", "quantisation"),
             )
         ),

@@ -106,6 +106,11 @@ def test_a_stribeck_excess_is_stronger_or_weaker_where_static_friction_makes_up_
     broken_at_n = error.theta(z)[STATIC] + 100.0
     assert {np.sign(each[len(BASE)] - 100.0) for each in places} == {-1.0, 1.0}
     assert [each[STATIC] + each[len(BASE)] for each in places] == pytest.approx([broken_at_n] * len(places), rel=1e-6)
+    elsewhere = z.copy()
+    elsewhere[-1] *= 0.6
+    *_, last = making_up(error, z, [elsewhere])
+    assert last[-1] == elsewhere[-1], "what is elsewhere stays there, and static friction makes up for it"
+    assert error.theta(last)[STATIC] + error.theta(last)[len(BASE)] == pytest.approx(broken_at_n, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import TypeVar
 
+import numpy as np
+
 from sim.composition import Composition
 from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
@@ -243,8 +245,11 @@ class BegunFit:
         return replace(self, ends=self._ordered([best, *found, *others[likely:]]))
 
     def _made_up(self, z: Vector) -> Vector:
-        """Return the lowest from z with what makes up for static friction stronger or weaker; z where nothing does."""
-        down = [descended(self.error, descended(self.error, each, COARSE), NARROW) for each in making_up(self.error, z)]
+        """Return the lowest from z with what makes up for static friction of other strengths; z where nothing does."""
+        own = np.array([each in self.added for each in self.error.parameters])
+        anew = [np.where(own, strength[0], z) for strength in self.strengths]
+        begins = making_up(self.error, z, anew)
+        down = [descended(self.error, descended(self.error, each, COARSE), NARROW) for each in begins]
         return min(down, key=self.error.cost) if down else z
 
     def shot(self) -> "BegunFit":

@@ -13,6 +13,8 @@ What of an effect makes up for static friction, as a Stribeck excess does, runs 
 floor no derivative and no straight line follows: z with it stronger or weaker, and static friction for it, does.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sim.composition import BASE, COULOMB, STATIC
@@ -67,8 +69,14 @@ def broken_loose(error: SimulationError, landings: Landings, theta: Vector) -> V
     return error.theta(z)
 
 
-def making_up(error: SimulationError, z: Vector) -> list[Vector]:
-    """Return z with what makes up for static friction stronger and weaker; none where break-aways tell it from that."""
+def making_up(error: SimulationError, z: Vector, anew: Sequence[Vector] = ()) -> list[Vector]:
+    """Return z with what makes up for static friction stronger and weaker; none where break-aways tell it from that.
+
+    Args:
+        error: of what the break-aways are.
+        z: about which; static friction makes up for what is moved.
+        anew: places that differ from z in an effect's own parameters, moved so, too.
+    """
     if error.run.by.slow or not any(each.index == STATIC for each in error.parameters):
         return []
     landings = Landings(error, rests(error.run.record))
@@ -85,8 +93,8 @@ def making_up(error: SimulationError, z: Vector) -> list[Vector]:
         return error.coordinates(theta) if alike and theta[STATIC] >= theta[COULOMB] else None
 
     own = [i for i, each in enumerate(error.parameters) if each.index >= len(BASE)]
-    found = [made_up(_moved(error, z, i, far * way)) for i in own for far in MADE_UP_BY for way in (1.0, -1.0)]
-    return [each for each in found if each is not None]
+    moved = [_moved(error, z, i, far * way) for i in own for far in MADE_UP_BY for way in (1.0, -1.0)]
+    return [each for there in (*moved, *anew) if (each := made_up(there)) is not None]
 
 
 def _moved(error: SimulationError, z: Vector, i: int, far: float) -> Vector:
