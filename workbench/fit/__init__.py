@@ -21,4 +21,5 @@ Its files:
     breaking_off       how all of them end early
     fitted_parameter   a parameter with its interval, and how it is shown
     uncertainty        what the record determines
+    static_scatter     static friction where break-aways scatter
 """

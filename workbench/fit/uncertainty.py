@@ -20,7 +20,8 @@ costs more, on the average, is no more than its own scatter from slip to slip:
 
 For a smooth cost D = H w^2 / 2 and o_j = w g_j, g_j the scores, so that w ends at t sqrt V_g / H: the sandwich
 estimator (Huber, White) by clusters, with Satterthwaite's degrees of freedom. It takes in where multiple shooting goes
-from the minimum, too: that weighs the slips otherwise, and how far apart the two end says how wrong either may be.
+from the minimum, too: that weighs the slips otherwise, and how far apart the two end says how wrong either may be. And
+that of static friction takes in the mean of the break-aways (`static_scatter.py`), below which the run's best lies.
 
 The condition number is that of J scaled to unit columns; a combination is not determined if its standard
 deviation exceeds 1, a factor of e.
@@ -40,6 +41,7 @@ from workbench.data.motion import slips
 from workbench.fit.descent import COARSE, descended
 from workbench.fit.guesses import with_other_end_kept
 from workbench.fit.objective import FINAL, SimulationError, root_weights, softs
+from workbench.fit.static_scatter import static_within
 
 DIFFERENCE = 1e-3
 SCATTER_DIFFERENCE = 1e-2
@@ -127,7 +129,7 @@ def uncertainty(
         lower, upper = np.array([curve.interval(i, float(std[i])) for i in range(z.size)]).T
     as_good = np.array([z, *(each for each in others if error.cost(each) < limit)])
     if profile and scatters and not error.run.by.slow:
-        as_good = np.vstack([as_good, descended(error.by_slips(), z, COARSE)])
+        as_good = np.vstack([as_good, descended(error.by_slips(), z, COARSE), *static_within(error, z)])
     lower, upper = np.minimum(lower, as_good.min(axis=0)), np.maximum(upper, as_good.max(axis=0))
     condition = float(np.linalg.cond(scaled)) if sensitive.all() else np.inf
     along = np.sqrt(_variances(values, kappa))
