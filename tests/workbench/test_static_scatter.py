@@ -42,12 +42,11 @@ def test_the_mean_of_break_aways_is_told() -> None:
 
 
 def test_an_interval_takes_it_in_where_the_run_breaks_loose_too_early() -> None:
-    error, z = posed(SEEDS[0])
+    error, z = posed(262008)
     early = error.theta(z)
-    early[STATIC] = 1.02 * early[COULOMB]
+    early[STATIC] = 1.1 * early[COULOMB]
     found = uncertainty(error, error.coordinates(early))
-    lower_n, upper_n = (float(early[COULOMB] * np.exp(each[-1])) for each in (found.lower, found.upper))
-    assert lower_n <= error.theta(z)[STATIC] <= upper_n
+    assert found.lower[-1] <= z[-1] <= found.upper[-1], "by the run alone it ends below"
 
 
 @pytest.mark.parametrize(("free", "samples"), [(LANDED, None), (AT_REST, 300)])
