@@ -1,6 +1,5 @@
 """Static friction of a valve whose break-aways scatter: their mean is told, however early a run breaks loose."""
 
-import numpy as np
 import pytest
 
 from config.recording import Recording
