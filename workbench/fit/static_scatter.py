@@ -57,7 +57,7 @@ def static_within(error: SimulationError, z: Vector) -> list[Vector]:
     borne = _borne(error, theta)
     if borne.lower_n.size < FEWEST:
         return []
-    mean_n, std_n = _mean(borne)
+    mean_n, std_n = _mean(borne, GUESSED * float(theta[STATIC]))
     if not np.isfinite(std_n):
         return []
     ends = []
@@ -80,10 +80,14 @@ def _borne(error: SimulationError, theta: Vector) -> _Borne:
     return _Borne(np.minimum(own_n, broke_n), np.maximum(own_n, broke_n), besides_n[besides_n > theta[COULOMB]])
 
 
-def _mean(borne: _Borne) -> tuple[float, float]:
-    """Return mu and its standard deviation, N; that is infinite where the break-aways do not tell."""
-    middle_n = float(np.median(0.5 * (borne.lower_n + borne.upper_n)))
-    guessed = float(np.log(GUESSED * middle_n))
+def _mean(borne: _Borne, guessed_n: float) -> tuple[float, float]:
+    """Return mu and its standard deviation, N; that is infinite where the break-aways do not tell.
+
+    Args:
+        borne: what they bore.
+        guessed_n: their scatter, about.
+    """
+    middle_n, guessed = float(np.median(0.5 * (borne.lower_n + borne.upper_n))), float(np.log(guessed_n))
 
     def loss(at: Vector) -> float:
         mean_n, scatter_n = at[0], np.exp(at[1])
