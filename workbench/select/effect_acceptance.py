@@ -23,8 +23,9 @@ OVERWHELMING_BIC = 10.0 * LEAST_BIC
 """Of independent samples; suspected whatever was held out, for an effect that acts rarely need not show there."""
 LEAST_REDUCTION = 0.05
 LEAST_STANDARD_ERRORS, AT_THE_FLOOR, COMPLETE = 2.0, 3.0, 1.0
-"""More where the error is at the floor: of twenty candidates one falls by two deviations by pure chance. Less where
-overwhelming evidence leaves nothing."""
+"""More where the error is at the floor: of twenty candidates one falls by two deviations by pure chance. So much, too,
+says of a drive that drifts, whose error is one arc, what its independent samples do not. Less where overwhelming
+evidence leaves nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,8 @@ class Gain:
         if self.bic <= LEAST_BIC:
             return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
         independent = LEAST_BIC if at_floor else LEAST_INDEPENDENT
-        if self.independent_bic <= independent:
+        surely_held_out = not at_floor and self.standard_errors > AT_THE_FLOOR
+        if self.independent_bic <= independent and not surely_held_out:
             return (
                 f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
                 f"are independent: {self.independent_bic:.2g}, more than {independent:g} needed"
