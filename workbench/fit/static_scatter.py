@@ -69,13 +69,13 @@ def static_within(error: SimulationError, z: Vector) -> list[Vector]:
 
 
 def _borne(error: SimulationError, theta: Vector) -> _Borne:
-    landings = Landings(error, chosen := rests(error.run.record))
-    pressure_pa = error.run.run(theta).pressure_pa
-    broke_n = landings.static_at_n(theta, landings.breaking(pressure_pa))
-    bore_n = landings.static_at_n(theta, landings.holding(pressure_pa)).reshape(-1, 2)
-    left = np.array([each.leaves_to for each in chosen], np.int64)
-    own_n = bore_n[left != 0, (left[left != 0] > 0).astype(np.int64)]
-    besides_n = np.concatenate([bore_n[left == 0].ravel(), bore_n[left != 0, (left[left != 0] < 0).astype(np.int64)]])
+    landings, pressure_pa = Landings(error, rests(error.run.record)), error.run.run(theta).pressure_pa
+    bore = landings.holding(pressure_pa)
+    leaves = bore.directions == bore.leaves_to
+    broke_n, own_n, besides_n = (
+        landings.static_at_n(theta, each)
+        for each in (landings.breaking(pressure_pa), bore.those(leaves), bore.those(~leaves))
+    )
     # A slow stem is at rest, by its samples, for longer than it is; what broke it loose it seems to have borne.
     return _Borne(np.minimum(own_n, broke_n), np.maximum(own_n, broke_n), besides_n[besides_n > theta[COULOMB]])
 
