@@ -12,6 +12,7 @@ from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.fit.fit_result import Fit
 from workbench.select.block_errors import NOISE_KNOWN_TO, BlockErrors, knife_edges_sentence
+from workbench.select.effect_acceptance import LEAST_INDEPENDENT
 from workbench.select.effect_candidates import EffectCandidate, EffectStep, EvaluatedModel
 from workbench.select.equivalence import classes, distinguishing_record
 from workbench.select.pressure_errors import PressureErrors
@@ -68,10 +69,16 @@ def _said(
     part = f"{lowers} it" if verdict in ("unjudged", "unfinished") else f"{explains} a part"
     begun = f" {names} {part}: {fell}." if names else f" The held-out error is {length.said(best.errors.test_rmse_m)}."
     if verdict == "unexplained":
-        lacked = "no effect here is proved to explain" if suspicion else "the library does not have"
+        told = suspicion or any(each.physical and _tells(each) for each in steps[-1].candidates)
+        lacked = "no effect here is proved to explain" if told else "the library does not have"
         said = f"Something is missing that {lacked}.{begun}"
         return f"{said}{_elsewhere(best, names, length)}{suspicion}{repeat}{_scatter(parts, length)}"
     return _unproved(verdict, best, steps, library, parts) + begun + (suspicion if verdict == "untrusted" else "")
+
+
+def _tells(candidate: EffectCandidate) -> bool:
+    """Whether the fitted part has evidence for a candidate, in independent samples: it may be what is missing."""
+    return candidate.gain is not None and candidate.gain.independent_bic > LEAST_INDEPENDENT
 
 
 def floor_by_pressure(parts: Split, kind: Kind) -> list[str]:
