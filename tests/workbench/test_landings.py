@@ -90,7 +90,7 @@ def test_without_such_an_effect_break_aways_move_nothing() -> None:
     assert by_break_aways(error, begin) is begin
 
 
-def stirred_by(name: str, **values: float) -> tuple[SimulationError, Column]:
+def true_error(name: str, **values: float) -> tuple[SimulationError, Column]:
     """Return the error of the true valve with one effect, and its coordinates."""
     truth = with_effect(VALVE, name, **values)
     composition = Composition.from_file(truth)
@@ -101,7 +101,7 @@ def stirred_by(name: str, **values: float) -> tuple[SimulationError, Column]:
 
 
 def test_a_stribeck_excess_is_stronger_or_weaker_where_static_friction_makes_up_for_it() -> None:
-    error, z = stirred_by("stribeck", excess_n=100.0, velocity_m_per_s=0.02, exponent=2.0)
+    error, z = true_error("stribeck", excess_n=100.0, velocity_m_per_s=0.02, exponent=2.0)
     places = [error.theta(each) for each in making_up(error, z)]
     broken_at_n = error.theta(z)[STATIC] + 100.0
     assert {np.sign(each[len(BASE)] - 100.0) for each in places} == {-1.0, 1.0}
@@ -119,8 +119,8 @@ def test_a_stribeck_excess_is_stronger_or_weaker_where_static_friction_makes_up_
 def test_what_break_aways_tell_from_static_friction_does_not_make_up_for_it(
     name: str, values: dict[str, float]
 ) -> None:
-    error, z = stirred_by(name, **values)
-    assert not list(making_up(error, z))
+    error, z = true_error(name, **values)
+    assert not making_up(error, z)
 
 
 def test_a_rest_knows_where_its_slide_came_from_and_where_the_next_one_goes() -> None:

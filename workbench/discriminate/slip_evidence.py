@@ -42,6 +42,7 @@ from workbench.data.record import Record
 from workbench.fit.fit_result import Fit
 from workbench.fit.landings import DIFFERENCE, FEWEST, FORCE_N, Landings, Loaded, Rest, rests
 from workbench.fit.objective import SimulationError
+from workbench.fit.static_scatter import PADDING, TINY, log_between
 from workbench.model.free_run import FreeRun
 from workbench.model.parameters import free_parameters
 
@@ -57,14 +58,11 @@ GUESSED_N = 30.0
 """Scatter of static friction to begin with."""
 HELD = 0.5
 """Of a coordinate, from the fit: a standard deviation."""
-PADDING = 0.05
-"""Of the scatter, by which the interval of a break-away is wider either way: noise may have broken it."""
 SHIFT = 2e-3
 """Of the stroke, wider than a sensor's steps: over which a landing's slope is taken, and how far off a load is."""
 TOLD, MOSTLY = 0.5, 0.75
 """So near, in scatters, must so many of its own landings lie where a rival's balance says."""
 NORMAL = lgamma(0.5 * (FREEDOM + 1.0)) - lgamma(0.5 * FREEDOM) - 0.5 * log(FREEDOM * pi)
-TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,12 +312,15 @@ def _log_density(off: Vector) -> Vector:
 
 
 def _log_between(lower: Vector, upper: Vector) -> Vector:
-    """Return log (T(upper) - T(lower)), taken in the lower tail, where it is exact."""
-    flipped = lower > 0.0
-    low, high = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
-    return np.asarray(np.log(np.maximum(stdtr(FREEDOM, high) - stdtr(FREEDOM, low), TINY)))
+    """Return log (T(upper) - T(lower))."""
+    return log_between(lower, upper, _below)
 
 
 def _log_beyond(lower: Vector) -> Vector:
     """Return log (1 - T(lower))."""
-    return np.asarray(np.log(np.maximum(stdtr(FREEDOM, -lower), TINY)))
+    return np.asarray(np.log(np.maximum(_below(-lower), TINY)))
+
+
+def _below(off: Vector) -> Vector:
+    """Return T of distances in scatters."""
+    return np.asarray(stdtr(FREEDOM, off))

@@ -16,7 +16,7 @@ from sim.karnopp import Vector
 from workbench.fit.agreement import Place, agreeing
 from workbench.fit.break_aways import by_break_aways, making_up
 from workbench.fit.crossing import SURELY, crossed, leaves_noise, sticking, unlike
-from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, settled
+from workbench.fit.descent import COARSE, MIDDLING, NARROW, WIDE, descended, descended_through, settled
 from workbench.fit.evolution import evolved, evolved_from_afar
 from workbench.fit.fit_result import Fit, fit_at
 from workbench.fit.guesses import FINEST, with_open_ends
@@ -196,9 +196,7 @@ class BegunFit:
             return z if cost(z) > LIKELY * self.cost else descended(self.error, z, NARROW)
 
         def anew(start: Vector) -> Vector:
-            for stage in (WIDE, MIDDLING):
-                start = descended(self.error.rough, start, stage)
-            z = down(start)
+            z = down(descended_through(self.error.rough, start, (WIDE, MIDDLING)))
             return z if cost(z) > LIKELY * self.cost else settled(self.error, z)
 
         pool, in_vain = unlike([each.z for each in (*self.ends, *self.places)]), 0
@@ -249,7 +247,7 @@ class BegunFit:
         own = np.array([each in self.added for each in self.error.parameters])
         anew = [np.where(own, strength[0], z) for strength in self.strengths]
         begins = making_up(self.error, z, anew)
-        down = [descended(self.error, descended(self.error, each, COARSE), NARROW) for each in begins]
+        down = [descended_through(self.error, each, (COARSE, NARROW)) for each in begins]
         return min(down, key=self.error.cost) if down else z
 
     def shot(self) -> "BegunFit":

@@ -84,9 +84,11 @@ def making_up(error: SimulationError, z: Vector, anew: Sequence[Vector] = ()) ->
     if not broken.rows.size:
         return []
 
+    here_n = landings.static_at_n(error.theta(z), broken)
+
     def made_up(there: Vector) -> Vector | None:
         theta = error.theta(there)
-        more_n = landings.static_at_n(theta, broken) - landings.static_at_n(error.theta(z), broken)
+        more_n = landings.static_at_n(theta, broken) - here_n
         by_n = float(np.median(more_n))
         theta[STATIC] += by_n
         alike = float(np.ptp(more_n)) <= CONTRADICTED_N < abs(by_n)

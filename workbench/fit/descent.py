@@ -10,6 +10,7 @@ either side over five hundredths, the lowest step taken and the descent begun ag
 Where a sensor rounds, all of this is done by the position before rounding first: rounded ones show no way down.
 """
 
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -49,9 +50,9 @@ BY_STAIRS = 1.5
 """Factor on the cost that stairs may make."""
 
 
-def descended_through(error: SimulationError, z: Vector) -> Vector:
-    """Return the coordinates of the least that the stages from wide to narrow reach from z, without a scan."""
-    for stage in (WIDE, MIDDLING, NARROW):
+def descended_through(error: SimulationError, z: Vector, stages: Sequence[Stage] = (WIDE, MIDDLING, NARROW)) -> Vector:
+    """Return the coordinates of the least that stages, one after the other, reach from z, without a scan."""
+    for stage in stages:
         z = descended(error, z, stage)
     return z
 
@@ -107,7 +108,7 @@ def settled(error: SimulationError, z: Vector, base: float = inf) -> Vector:
 def _at_rest(error: SimulationError, z: Vector, base: float = inf) -> Vector:
     """Return where descents and scans by turns leave z as it is."""
     for _ in range(ROUNDS):
-        z = descended(error, descended(error, z, COARSE), NARROW)
+        z = descended_through(error, z, (COARSE, NARROW))
         at_rest = error.cost(z)
         if at_rest > BY_STAIRS * base or base / WITHIN < at_rest < WITHIN * base:
             break

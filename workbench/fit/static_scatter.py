@@ -5,6 +5,7 @@
     held_i  <= F_s,i                     what it bore the other way, or never left under
 
     l = sum_k log (Phi((upper_k - mu)/S) - Phi((lower_k - mu)/S)) + sum_i log (1 - Phi((held_i - mu)/S))
+      - (log(S / (F_s/20)))^2 / 8        F_s of the fit: S is held to it loosely
 
 is greatest at the mean; its standard deviation follows from the curvature there. All are taken back to the bare valve's
 static friction through the effects, at the rest's place, pressure and time. A free run cannot say it: one break-away
@@ -51,7 +52,7 @@ def static_within(error: SimulationError, z: Vector) -> list[Vector]:
         error: of the record.
         z: coordinates of the fit, by whose pressure and effects loads are told.
     """
-    if error.run.by.slow or not any(each.index == STATIC for each in error.parameters):
+    if not any(each.index == STATIC for each in error.parameters):
         return []
     theta = error.theta(z)
     borne = _borne(error, theta)
@@ -92,16 +93,20 @@ def _mean(borne: _Borne, guessed_n: float) -> tuple[float, float]:
     def loss(at: Vector) -> float:
         mean_n, scatter_n = at[0], np.exp(at[1])
         lower, upper = (borne.lower_n - mean_n) / scatter_n - PADDING, (borne.upper_n - mean_n) / scatter_n + PADDING
-        flipped = lower > 0.0
-        low, high = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
-        between = np.log(np.maximum(ndtr(high) - ndtr(low), TINY))
-        held = log_ndtr((mean_n - borne.held_n) / scatter_n)
+        between, held = log_between(lower, upper, ndtr), log_ndtr((mean_n - borne.held_n) / scatter_n)
         return float(0.5 * ((at[1] - guessed) / LOOSELY) ** 2 - between.sum() - held.sum())
 
     best = minimize(loss, [middle_n, guessed], method="Nelder-Mead").x
     curvature = _curvature(loss, best, np.array([DIFFERENCE * np.exp(best[1]), DIFFERENCE]))
     told = bool(np.linalg.eigvalsh(curvature)[0] > 0.0)
     return float(best[0]), float(np.sqrt(np.linalg.inv(curvature)[0, 0])) if told else np.inf
+
+
+def log_between(lower: Vector, upper: Vector, below: Callable[[Vector], Vector]) -> Vector:
+    """Return log (P(upper) - P(lower)), P the share `below`, taken in the lower tail, where it is exact."""
+    flipped = lower > 0.0
+    low, high = np.where(flipped, -upper, lower), np.where(flipped, -lower, upper)
+    return np.asarray(np.log(np.maximum(below(high) - below(low), TINY)))
 
 
 def _curvature(loss: Callable[[Vector], float], at: Vector, step: Vector) -> NDArray[np.float64]:
