@@ -14,7 +14,8 @@ real time.
     slide_law, slide_memory                     the law of slides: nothing, one or two
     move_law, move_memory                       the law that chooses the move: nothing, a pulse, a slide or two
     reference_course                            does the reference rest, or take back what would be corrected
-    slide_margins                               how far a slide must be sent to break the stem loose, as learnt
+    slide_balance                               where a slide lands, and how margins go over the travel
+    slide_margins, margins_over_travel          how far a slide must be sent to break the stem loose, as learnt
     slide_inverse                               what the law of slides takes from an extended valve
     pressure_path                               lead against a slow pressure of an extended valve, and its arrival
     cutoffs                                     beside a stop: the stem is pressed onto it

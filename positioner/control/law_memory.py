@@ -12,9 +12,11 @@ from positioner.control import move_law as moves
 from positioner.control import slide_law as slides
 from positioner.control.breakaway_memory import BreakawayMemory, BreakawaySettings, Observation, initial_memory
 from positioner.control.conventional_law import ConventionalMemory, ConventionalSettings
+from positioner.control.margins_over_travel import with_margins_at
 from positioner.control.move_memory import MoveMemory, MoveSettings
 from positioner.control.sample import Sample
-from positioner.control.slide_inverse import stem_observed, with_margins_at
+from positioner.control.slide_balance import Balance
+from positioner.control.slide_inverse import stem_observed
 from positioner.control.slide_memory import SlideMemory, SlideSettings, StemObservation
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimates
@@ -93,8 +95,8 @@ def _after_moves(memory: MoveMemory, settings: MoveSettings, seen: LawInput) -> 
     observation = _observed(seen)
     if seen.valve is not None:
         sampled = replace(sampled, position_m=observation.position_m)
-        memory = replace(memory, slides=with_margins_at(memory.slides, seen.reference_m, seen.valve))
     balance = _balance(seen, seen.ratios)
+    memory = replace(memory, slides=with_margins_at(memory.slides, seen.reference_m, balance))
     reference_m, allowed = seen.reference_m, not seen.provisional
     return moves.step(
         memory, sampled, observation, reference_m, balance, seen.estimates, settings, pulses_allowed=allowed
@@ -111,9 +113,9 @@ def _after_pulses(memory: BreakawayMemory, settings: BreakawaySettings, seen: La
 def _after_slides(memory: SlideMemory, settings: SlideSettings, seen: LawInput) -> SlideMemory:
     if seen.ratios is None:
         return slides.while_not_commanding(memory, seen.command_pa)
-    if seen.valve is not None:
-        memory = with_margins_at(memory, seen.reference_m, seen.valve)
-    return slides.step(memory, _observed(seen), seen.reference_m, _balance(seen, seen.ratios), settings)
+    balance = _balance(seen, seen.ratios)
+    memory = with_margins_at(memory, seen.reference_m, balance)
+    return slides.step(memory, _observed(seen), seen.reference_m, balance, settings)
 
 
 def _sampled(seen: LawInput) -> Observation:
@@ -135,9 +137,9 @@ def _observed(seen: LawInput) -> StemObservation:
     return observation if seen.valve is None else stem_observed(observation, seen.valve, seen.statics.way)
 
 
-def _balance(seen: LawInput, ratios: Ratios) -> slides.Balance:
+def _balance(seen: LawInput, ratios: Ratios) -> Balance:
     statics = seen.statics
-    return slides.Balance(
+    return Balance(
         ratios,
         statics.balances,
         statics.held,

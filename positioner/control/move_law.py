@@ -31,7 +31,7 @@ from positioner.control.breakaway_law import PlannedPulse, Worth
 from positioner.control.breakaway_memory import BreakawayMemory, LearntPush, Move, Observation
 from positioner.control.move_memory import MoveMemory, MoveSettings
 from positioner.control.pulse_trial import take_identification
-from positioner.control.slide_law import Balance
+from positioner.control.slide_balance import Balance
 from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
 from positioner.control.slide_memory import NOWHERE, Anchor, SlideMemory, StemObservation
 from positioner.estimation.acceptance import Ratios

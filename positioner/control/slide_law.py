@@ -1,9 +1,8 @@
 """The law of slides: a stem that slides into rest lands where spring and friction balance, however slow the loop.
 
-    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
-                                        of an extended valve, [law] valve:        extended_balance.py)
-    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_margins.py; of an
-                                                                extended valve:   slide_inverse.py)
+    B(x, s)    pressure under which a slide in direction s lands at x            (slide_balance.py)
+    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s  (learnt: slide_margins.py; at another
+                                                                place: margins_over_travel.py)
 
 With the stem at rest at x, e = r - x and s = sign(e):
 
@@ -14,10 +13,10 @@ With the stem at rest at x, e = r - x and s = sign(e):
 
 The first of two slides leaves the way between x and r by M: an excursion. The second is given as soon as the stem has
 slid, is farther than m_-s beyond r, and will go no farther; it need not rest. An excursion goes the other way round, by
-r - s M' with M' = max(1.02 m_s, m_-s + abs(e)), where M' - abs(e)/2 < M, for the margins of turning and of going on
-differ: it leaves the way between by M' - abs(e) and r by M', so half of the error is spared. Or where one of the two
-would leave the travel or the pressure limits. To 1.02 m comes what sensor and device round: a first slide that fell so
-much short would leave no way back. Only resting times depend on the period of the loop, not where the stem lands.
+r - s M' with M' = max(1.02 m_s, m_-s + abs(e)), where it leaves the way between by less, M' - abs(e) < M, for the
+margins of turning and of going on differ. Or where one of the two would leave the travel or the pressure limits. To
+1.02 m comes what sensor and device round: a first slide that fell so much short would leave no way back. Only resting
+times depend on the period of the loop, not where the stem lands.
 
 While the stem moves, a reference that lies two margins from it is followed at once; a nearer one waits for the rest. A
 stem that does not come to rest, off its reference, is not moved, and that is said.
@@ -32,12 +31,11 @@ excursion, the pressure, the number of slides. Then it is stuck, whichever bound
 before the row (`_barred`).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isnan, nan
 
 from config.codes import InhibitReason
-from config.extended_valve import ExtendedValve
+from positioner.control.slide_balance import Balance
 from positioner.control.slide_margins import BESIDE, GROWS, NO_MARGINS, Margin
 from positioner.control.slide_memory import (
     CREEP,
@@ -50,10 +48,7 @@ from positioner.control.slide_memory import (
     SlideSettings,
     StemObservation,
 )
-from positioner.estimation.acceptance import Ratios
-from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import STOP, SlideOutcome
-from positioner.estimation.landings.local_balance import landing_pa, scatter_m
 
 RETURN = 1.02
 """Margins that the second slide is given, for a stem must not stay where the first took it."""
@@ -68,14 +63,12 @@ LEAST = 5.1e-3
 """Of the stroke: a slide shorter than this would not be seen for one."""
 TRIED = 2
 """Slides of a move that may be as short as may break loose."""
-KNOWN = 1e-3
-"""Of the stroke: how well an extended valve is known."""
 FIRST_MARGIN = 0.1
 """Of F_c/k_s: the first margin, where nothing is known of static friction."""
 ROUNDED = 0.5
 """Quanta by which a position may be rounded."""
-SPARED = 0.5
-"""Of an error: by so much farther from its reference an excursion may go by the other side, where it travels less."""
+OTHER_SIDE = 1.05
+"""Factor on how far an excursion by the other side leaves the way between, for it takes longer."""
 SLOW, WHILE_S = 2e-3, 0.02
 """Of the stroke: an excursion that will go no farther has done its work; in which time its speed is seen."""
 FAR = 2.0
@@ -90,54 +83,6 @@ REFILL_S = 60.0
 """At rest, after this time each, two slides come back to the number that is left."""
 STUCK_AFTER = 3
 """Slides in a row that break nothing loose, each as long as has: one may be luck, and friction grows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Balance:
-    """What the law knows of the valve: the straight law, the landings, and what held the stem; the latest first."""
-
-    ratios: Ratios
-    landings: Sequence[SlideOutcome]
-    held: Sequence[SlideOutcome]
-    stroke_m: float
-    valve: ExtendedValve | None = None
-    """In place of the straight law, where its effects are known."""
-    now_s: float = 0.0
-    swing: float = 0.0
-    """ρ, share of its way by which the stem swings past its balance (estimation/landings/swing.py)."""
-
-    def slide_pa(self, from_m: float, to_m: float, direction: int) -> float:
-        """Return the pressure under which a slide from rest ends at a place, Pa: at its balance, or swung past it."""
-        return self.pressure_pa(to_m - self.swing * (to_m - from_m) if self.swing else to_m, direction)
-
-    def pressure_pa(self, position_m: float, direction: int) -> float:
-        """Return B(x, s), Pa."""
-        if self.valve is not None:
-            return extended_landing_pa(position_m, direction, self.valve, self.landings, self.now_s)
-        return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
-
-    def way_m(self, each: SlideOutcome) -> float:
-        """Return how far a slide would have gone, m, by the balance at the place it starts from."""
-        s, from_pa = each.direction, self.pressure_pa(each.from_m, each.direction)
-        if self.valve is not None:
-            followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
-            return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
-        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
-
-    @property
-    def stops_m(self) -> tuple[float, float]:
-        """The ends of the travel, m, as far as is known."""
-        return (0.0, self.stroke_m) if self.valve is None else self.valve.stops_m
-
-    @property
-    def scatter_m(self) -> float:
-        """How far slides land off the balance, a standard deviation, m."""
-        return scatter_m(self.ratios, self.landings, self.stroke_m) if self.valve is None else KNOWN * self.stroke_m
-
-    @property
-    def friction_m(self) -> float:
-        """F_c/k_s, m."""
-        return self.ratios.k_over_c / self.ratios.b_over_c
 
 
 def while_not_commanding(memory: SlideMemory, command_pa: float) -> SlideMemory:
@@ -170,7 +115,7 @@ def step(
     memory = memory.asked(observation.now_s, reference_m)
     reference_m = _asked_m(memory, observation, settings)
     if observation.rest is None and _far_enough(memory, observation, reference_m, settings):
-        memory = _broken_loose(memory, observation.position_m, settings)
+        memory = _broken_loose(memory, observation, settings)
         return _slide(memory, observation.now_s, reference_m, -memory.direction, balance, settings, excursion=False)
     if memory.excursion and observation.rest is None:
         memory = replace(memory, return_pa=_return_pa(memory, observation.position_m, balance, settings))
@@ -235,9 +180,9 @@ def _seen_for_a_while(memory: SlideMemory, observation: StemObservation) -> bool
     return observation.now_s - memory.last_s > (1.0 - 1e-6) * WHILE_S
 
 
-def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSettings) -> SlideMemory:
-    """Return the memory of the first of two slides where it is sent back: no rest will say so, but it has slid."""
-    s = memory.direction
+def _broken_loose(memory: SlideMemory, observation: StemObservation, settings: SlideSettings) -> SlideMemory:
+    """Return the memory of a slide that is sent elsewhere before it rests: no rest will say so, but it has slid."""
+    s, position_m = memory.direction, observation.position_m
     way_m, went_m = _way_and_went_m(memory, position_m)
     sent_back = replace(memory, anchor=Anchor(position_m, s))
     if not _has_slid(memory, position_m, settings):
@@ -246,7 +191,8 @@ def _broken_loose(memory: SlideMemory, position_m: float, settings: SlideSetting
         return replace(sent_back, held=NONE_HELD)
     turning = s != memory.anchor.direction
     margin = memory.margins.own(s, turning=turning)
-    margin = margin.after_breaking(went_m) if went_m < JUMPED * way_m else margin.after_jumping(way_m, went_m)
+    jumped = went_m > max(JUMPED * way_m, way_m + observation.quantum_m)
+    margin = margin.after_jumping(way_m, went_m) if jumped else margin.after_breaking(went_m)
     return replace(sent_back, held=NONE_HELD, margins=memory.margins.replaced(s, margin, turning=turning))
 
 
@@ -255,9 +201,15 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
     guess_m = FIRST_MARGIN * balance.friction_m
     if settings.breakaway_pa is not None:
         guess_m = max(guess_m, (settings.breakaway_pa + balance.ratios.k_over_c) / -balance.ratios.b_over_c)
+    at_m = memory.margins_at_m
     slid_m = {
         s: min(
-            (abs(each.position_m - each.from_m) for each in balance.landings if each.direction == s), default=guess_m
+            (
+                abs(each.position_m - each.from_m) * balance.grows(each.from_m, at_m, s)
+                for each in balance.landings
+                if each.direction == s
+            ),
+            default=guess_m,
         )
         / (1.0 - balance.swing)
         for s in (1, -1)
@@ -265,7 +217,9 @@ def _first_margins(memory: SlideMemory, balance: Balance, settings: SlideSetting
     margins = memory.margins
     for s in (1, -1):
         shortest_m = min(slid_m[s], UNLIKE * slid_m[-s])
-        ways_m = (balance.way_m(each) for each in balance.held if each.direction == s)
+        ways_m = (
+            balance.way_m(each) * balance.grows(each.from_m, at_m, s) for each in balance.held if each.direction == s
+        )
         held_m = max((way_m for way_m in ways_m if way_m < shortest_m), default=0.0)
         guessed = settings.breakaway_pa is None and not any(each.direction == s for each in balance.landings)
         margins = margins.replaced(s, Margin(max(0.0, held_m), shortest_m, guessed=guessed), turning=False)
@@ -306,7 +260,7 @@ def _learnt(
     if not slid:
         return _after_holding(replace(memory, anchor=anchor), s, way_m)
     beside = not short and missed_m > max(MISSED * way_m, settings.dead_band_m, quantum_m)
-    if turning and beside and BESIDE * way_m < margin.seen_m:
+    if turning and beside and BESIDE * way_m < margin.seen_m and balance.tried(way_m, s) > 1:
         margin = margin.after_holding(way_m)
     elif hit and anchor.direction:
         margin = margin.after_breaking(went_m)
@@ -336,7 +290,7 @@ def _redirected(
         return memory
     level_pa = min(max(balance.pressure_pa(reference_m, s), settings.minimum_pa), settings.maximum_pa)
     return replace(
-        memory,
+        _broken_loose(memory, observation, settings),
         level_pa=level_pa,
         target_m=reference_m,
         direction=s,
@@ -388,7 +342,8 @@ def _next_slide(
     memory = replace(memory, anchor=anchor)
     way_m = _way_m(memory, memory.margin(s), settings)
     if memory.excursion and s == -memory.direction:  # planned by what may do: it is tried before more is asked for
-        way_m = min(way_m, max(memory.margin(s).way_m, LEAST * settings.stroke_m))
+        rounded_m = ROUNDED * observation.quantum_m + beside_m
+        way_m = min(way_m, max(memory.margin(s).way_m, LEAST * settings.stroke_m - rounded_m))
     to_m = target_m + _lead_m(memory, observation.now_s, s, way_m, balance, settings)
     asked_m = s * (to_m - anchor.position_m)
     if asked_m >= way_m:
@@ -481,8 +436,13 @@ def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> floa
     What surely does may be longer than an excursion may, where none but long ones have been seen: what lies between is
     tried.
     """
+    return max(_breaks_loose_m(memory, margin, settings), LEAST * settings.stroke_m)
+
+
+def _breaks_loose_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:
+    """Return how far a slide must be sent to break loose, m, be it seen for a slide or not."""
     surely = memory.slides >= TRIED and margin.seen_m <= settings.excursion_limit_m
-    return max(min(margin.sure_m, GROWS * margin.way_m) if surely else margin.way_m, LEAST * settings.stroke_m)
+    return min(margin.sure_m, GROWS * margin.way_m) if surely else margin.way_m
 
 
 def _excursion(
@@ -496,22 +456,23 @@ def _excursion(
     s = 1 if error_m > 0 else -1
     now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m + _beside_m(balance, settings)
     there = {each: _way_m(memory, memory.margin(each), settings) for each in (1, -1)}
-    back = {
-        each: RETURN * _way_m(memory, memory.margins.of(each, turning=True), settings) + rounded_m for each in (1, -1)
-    }
+    turning_m = {each: _breaks_loose_m(memory, memory.margins.of(each, turning=True), settings) for each in (1, -1)}
+    back = {each: max(RETURN * turning_m[each] + rounded_m, LEAST * settings.stroke_m) for each in (1, -1)}
     ways = (
         (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
         (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
     )
-    # What a slide of the move has left beside its reference is off the way between already: nothing is spared.
-    spared_m = {s: 0.0, -s: 0.0 if memory.slides else SPARED * abs(error_m)}
+    # What a slide of the move has left beside its reference is off the way between already; while references keep
+    # coming, there is none.
+    between_m = 0.0 if memory.slides or memory.course.changes_m else abs(error_m)
+    leaves_m = {s: abs(ways[0][1] - target_m), -s: OTHER_SIDE * (abs(ways[1][1] - target_m) - between_m)}
     # A stem that the first of two slides has left away, for the second was too short, does not wait there.
     left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]
     if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     low_m, high_m = balance.stops_m
-    for direction, by_m in sorted(ways, key=lambda way: abs(way[1] - target_m) - spared_m[way[0]]):
+    for direction, by_m in sorted(ways, key=lambda way: leaves_m[way[0]]):
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)

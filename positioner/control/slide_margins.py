@@ -85,10 +85,10 @@ class Margin:
     def after_jumping(self, way_m: float, went_m: float) -> "Margin":
         """Return the margin after a slide meant to go a way, m, that jumped farther: none is so short, though it broke.
 
-        So it is not where one as short, or shorter, has landed: that one has missed.
+        Where one as short, or shorter, has landed, that is believed for the move, as of a way that holds.
         """
         if 0.0 < self.seen_m <= way_m:
-            return self
+            return Margin(max(self.held_m, way_m), went_m, self._believed_m, self.guessed)
         return Margin(max(self._believed_m, way_m), min(self.broke_m or went_m, went_m))
 
     def after_holding(self, way_m: float) -> "Margin":
@@ -101,7 +101,8 @@ class Margin:
 
     def times(self, factor: float) -> "Margin":
         """Return it so much longer."""
-        return Margin(factor * self.held_m, factor * self.broke_m, guessed=self.guessed)
+        before_m = None if self.held_before_m is None else factor * self.held_before_m
+        return Margin(factor * self.held_m, factor * self.broke_m, before_m, self.guessed)
 
 
 UNTRIED = Margin()

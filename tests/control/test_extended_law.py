@@ -8,8 +8,10 @@ from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
-from positioner.control.slide_inverse import with_margins_at
+from positioner.control.margins_over_travel import with_margins_at
+from positioner.control.slide_balance import Balance
 from positioner.control.slide_memory import Held, SlideMemory
+from positioner.estimation.landings.extended_balance import straight_law
 from sim.composition import Composition
 from sim.static_inverse import extended_valve
 from tests.cases import few_always
@@ -61,17 +63,18 @@ def test_a_reference_beyond_a_known_stop_ends_there_and_teaches_nothing() -> Non
 
 def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:
     _, extended = switched_on("position_friction")
-    first = with_margins_at(SlideMemory(), 0.2 * STROKE_M, extended)
+    balance = Balance(straight_law(extended), (), (), STROKE_M, extended)
+    first = with_margins_at(SlideMemory(), 0.2 * STROKE_M, balance)
     up = first.margins.turning_up
     assert up.way_m == pytest.approx(1.02 * extended.margin_m(0.2 * STROKE_M, 1))
     learnt = replace(first, margins=first.margins.replaced(1, up.times(1.06), turning=True))
-    there = with_margins_at(learnt, 0.8 * STROKE_M, extended)
+    there = with_margins_at(learnt, 0.8 * STROKE_M, balance)
     up, down = there.margins.turning_up, there.margins.turning_down
-    assert up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1))
+    assert up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1), rel=0.01)
     assert down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
-    assert with_margins_at(there, 0.8 * STROKE_M, extended) is there
+    assert with_margins_at(there, 0.8 * STROKE_M, balance) is there
     grown = replace(first, margins=first.margins.replaced(1, up.times(3.0), turning=True))
-    held = with_margins_at(replace(grown, held=Held(2, learnt.margins)), 0.8 * STROKE_M, extended)
+    held = with_margins_at(replace(grown, held=Held(2, learnt.margins)), 0.8 * STROKE_M, balance)
     assert held.learnt == there.margins, "so does what was known before slides that held"
 
 

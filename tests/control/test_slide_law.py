@@ -14,7 +14,8 @@ from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller_memory import Decision
 from positioner.control.reference_course import ReferenceCourse
 from positioner.control.requests import Requests
-from positioner.control.slide_law import MOST_SLIDES, Balance, step, while_not_commanding
+from positioner.control.slide_balance import Balance
+from positioner.control.slide_law import MOST_SLIDES, step, while_not_commanding
 from positioner.control.slide_margins import Margin, Margins
 from positioner.control.slide_memory import DAY_S, Anchor, Held, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
@@ -247,7 +248,8 @@ def test_a_ramp_is_followed_by_slides_that_land_ahead_of_it_and_its_end_is_reach
 def test_two_slides_follow_a_slow_ramp_only_when_they_save_more_than_they_cost() -> None:
     """0.13 % a second: two slides every 2 s had the stem away most of the time, 50 strokes for one."""
     loop = Loop(0.1)
-    loop.step_to(0.5)
+    for at in (0.5, *(4 * (0.503, 0.5, 0.497, 0.5))):  # margins are learnt
+        loop.step_to(at)
     references = np.repeat(0.5 + 0.04 / 60 * np.arange(60), 5)
     path = np.concatenate([loop.step_to(float(each), cycles=5) for each in references[::5]])
     assert np.abs(np.diff(path)).sum() < 0.04 + 4 * 2 * 1.3 * LEAST
@@ -342,7 +344,8 @@ def test_a_stem_that_comes_free_goes_to_its_reference_and_is_as_movable_as_befor
     stuck_at(loop, 0.6)
     law = loop.cycle._controller._memory.law
     assert isinstance(law, SlideMemory)
-    assert law.margins == margins
+    for now, before in zip(law.margins.all, margins.all, strict=True):
+        assert (now.held_m, now.broke_m) == pytest.approx((before.held_m, before.broke_m), rel=1e-3)
     free(loop)
     path = loop.step_to(0.6, cycles=200)
     assert path.max() < 0.601, "not where the last push would have brought it"
@@ -898,7 +901,7 @@ def test_an_excursion_goes_by_the_shorter_way_round() -> None:
     after = rested(0.0595, SlideMemory(anchor=Anchor(0.0595, 1), margins=margins))
     assert (after.excursion, after.direction) == (True, -1)
     assert after.level_pa == pytest.approx(BALANCE.pressure_pa(0.06 - 0.0055, -1))
-    even = replace(margins, onward_up=Margin(0.0049, 0.005))
+    even = replace(margins, onward_up=Margin(0.0044, 0.0045))
     assert rested(0.0595, SlideMemory(anchor=Anchor(0.0595, 1), margins=even)).direction == 1
 
 
@@ -934,12 +937,12 @@ def test_a_stem_that_rests_where_it_was_to_has_slid_though_it_seemed_to_creep_th
     assert after.anchor == Anchor(0.06002, -1)
 
 
-def test_a_way_shorter_than_has_broken_loose_that_lands_beside_its_aim_is_no_margin() -> None:
+def test_a_way_shorter_than_has_broken_loose_that_lands_beside_its_aim_again_is_no_margin() -> None:
     """Behind an I/P of 0.46 s it broke loose, and landed a tenth too far, each time: scatter excused it for ever."""
     known = Margins(*(4 * [Margin(0.0050, 0.0070)]))
-    scattered = replace(BALANCE, valve=None, landings=SCATTERED)
-    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.066, 1), margins=known)
     came = SlideOutcome(1.0, -1, 0.066, 27e3, 0.0594, 1e-6, moved=True, landing=True)
+    scattered = replace(BALANCE, valve=None, landings=(came, came, *SCATTERED))
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.066, 1), margins=known)
     assert scattered.scatter_m > 0.0003, "by twice that, it is where it was to go"
     after = step(memory, StemObservation(1.0, 0.0594, True, None, 0.0, came), 0.06, scattered, SETTINGS)
     assert after.margins.turning_down.held_m == pytest.approx(0.006)
@@ -951,7 +954,10 @@ def test_a_packing_that_gives_way_farther_than_a_short_way_makes_that_no_margin(
     known = Margins(*(4 * [Margin(broke_m=0.0095)]))
     memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.068, 1), margins=known)
     came = SlideOutcome(1.0, -1, 0.068, 27e3, 0.0573, 1e-6, moved=True, landing=True)
-    after = step(memory, StemObservation(1.0, 0.0573, True, None, 0.0, came), 0.06, BALANCE, SETTINGS)
+    once = step(memory, StemObservation(1.0, 0.0573, True, None, 0.0, came), 0.06, BALANCE, SETTINGS)
+    assert once.margins == known, "the next is sent less far, for that is how far a short slide goes"
+    again = replace(BALANCE, landings=(came, came))
+    after = step(memory, StemObservation(1.0, 0.0573, True, None, 0.0, came), 0.06, again, SETTINGS)
     assert after.margins.turning_down.held_m == pytest.approx(0.008)
     assert after.margins.turning_down.broke_m == 0.0095
     onward = step(

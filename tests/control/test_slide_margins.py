@@ -1,5 +1,7 @@
 """The shortest slide that breaks loose, as slides teach it."""
 
+import pytest
+
 from positioner.control.slide_margins import CLOSE, RAISE, Margin
 
 KNOWN = Margin(held_m=2.1e-3, broke_m=2.4e-3)
@@ -49,5 +51,6 @@ def test_a_jump_bounds_the_margin_from_both_sides_but_not_where_shorter_ways_hav
     jumped = Margin(0.0, 2.0).after_jumping(0.7, 0.85)
     assert (jumped.held_m, jumped.broke_m) == (0.7, 0.85)
     assert 0.7 < jumped.way_m < 0.85
-    landed = Margin(0.4, 0.6)
-    assert landed.after_jumping(0.7, 0.85) == landed, "that one missed"
+    landed = Margin(0.4, 0.6).after_jumping(0.7, 0.85)
+    assert landed == Margin(0.7, 0.85, held_before_m=0.4), "believed for the move"
+    assert landed.after_breaking(0.85).held_m == pytest.approx(0.4, rel=2e-3)

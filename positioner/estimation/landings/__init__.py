@@ -9,6 +9,8 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     pressure_arrival                  has the measured pressure followed the command, and what a stem takes from then on
     pressure_delivered                is the pressure measured at a rest the one commanded
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
+    short_slides                      how much farther a short slide goes than it was sent
+    mean_nearby                       the mean of what was seen nearby and of late
     extended_balance                  the same of a valve whose effects are known
     swing                             how far past its balance a stem swings and sticks there
     parting                           the instant that parts landings best

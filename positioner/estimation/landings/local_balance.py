@@ -7,6 +7,9 @@
     n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q and l_s leave of e_j,  s_j = s
     w_j     = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
 
+    B(x_0, x, s) = B(x, s) - s κ g_s(x - x_0)            of a slide from x_0: g_s of e' (short_slides.py), n_s of what
+                                                         that leaves
+
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
 that lies apart for less, and σ is what the others lie off by. A slide to x that missed all the same says what is
@@ -14,9 +17,9 @@ missing there: the next one lands. w_0 holds that correction back where there is
 makes the last slides miss alike everywhere: l_s.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
-from math import copysign, exp, sqrt
+from math import copysign, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +27,9 @@ import numpy as np
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.mean_nearby import mean_nearby
 from positioner.estimation.landings.parting import FINEST
+from positioner.estimation.landings.short_slides import Sent, beyond_m, jumped_m, sent
 
 WIDTH = 0.04
 """h, of the stroke."""
@@ -77,6 +82,27 @@ def landing_pa(
     return bent_pa(position_m, direction) + missed
 
 
+def sliding_pa(
+    from_m: float,
+    to_m: float,
+    direction: int,
+    ratios: Ratios,
+    landings: Sequence[SlideOutcome],
+    stroke_m: float,
+) -> float:
+    """Return the pressure, Pa, under which a slide from rest at a position lands at another, m.
+
+    Args:
+        from_m, to_m: where it begins and lands.
+        direction, ratios, landings, stroke_m: as of `landing_pa`.
+    """
+    bend = _bend(ratios, tuple(landings), stroke_m)
+    way, up = bend.ways[direction > 0], direction > 0
+    bent_pa = ratios.balance_pa(to_m, direction) + bend.lately_pa[up] + _bent_by_pa(bend.q, to_m / stroke_m, direction)
+    near_pa = mean_nearby(((each_m - to_m) / (WIDTH * stroke_m) for each_m in way.at_m), way.left_pa, FADING, HELD_BACK)
+    return bent_pa + near_pa + direction * ratios.b_over_c * beyond_m(abs(to_m - from_m), way.sent)
+
+
 def bent_by_pa(
     position_m: float, direction: int, ratios: Ratios, landings: Sequence[SlideOutcome], stroke_m: float
 ) -> float:
@@ -96,6 +122,15 @@ def _bent_by_pa(bend: tuple[float, ...], share: float, direction: int) -> float:
     return level + friction * s + t * (slope + t * (square + t * cube) + parting * s)
 
 
+class _Way(NamedTuple):
+    """The landings in one direction, the latest first."""
+
+    sent: tuple[Sent, ...]
+    at_m: tuple[float, ...]
+    left_pa: tuple[float, ...]
+    """Of e', by g_s."""
+
+
 class _Bend(NamedTuple):
     """What landings say of a straight law, Pa."""
 
@@ -104,13 +139,18 @@ class _Bend(NamedTuple):
     """Of the landings from one to the next, a standard deviation: friction that drifts is gone by, and no scatter."""
     lately_pa: tuple[float, float]
     """l_s, down and up."""
+    ways: tuple[_Way, ...]
+    """Down and up."""
+
+
+_STRAIGHT = (0.0,) * len(BENDS)
 
 
 @lru_cache(maxsize=4)
 def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> _Bend:
     """Return what landings say; q is zeros where there are too few."""
     if len(landings) < FEWEST:
-        return _Bend((0.0,) * len(BENDS), FINEST * -ratios.b_over_c * stroke_m, (0.0, 0.0))
+        return _Bend(_STRAIGHT, FINEST * -ratios.b_over_c * stroke_m, (0.0, 0.0), tuple(_few(landings, ratios)))
     s = np.array([float(each.direction) for each in landings])
     t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
     e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
@@ -130,7 +170,29 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
     left_pa = e - Q @ q
     ways_pa = tuple(left_pa[s == way] for way in (-1.0, 1.0))
     down_pa, up_pa = (_alike(each[:LATEST].tolist()) for each in ways_pa)
-    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, _scatter_pa(ways_pa)), (down_pa, up_pa))
+    off_pa = (left_pa - np.where(s > 0.0, up_pa, down_pa)).tolist()
+    landed = list(zip(landings, off_pa, strict=True))
+    ways = (_way([each for each in landed if each[0].direction == way], -ratios.b_over_c) for way in (-1, 1))
+    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, _scatter_pa(ways_pa)), (down_pa, up_pa), tuple(ways))
+
+
+def _few(landings: Sequence[SlideOutcome], ratios: Ratios) -> Iterator[_Way]:
+    """Yield what a few landings say of each direction, down and up: they tell no way from a place."""
+    for way in (-1, 1):
+        landed = [each for each in landings if each.direction == way]
+        left_pa = (each.command_pa - ratios.balance_pa(each.position_m, way) for each in landed)
+        yield _Way((), tuple(each.position_m for each in landed), tuple(left_pa))
+
+
+def _way(landed: Sequence[tuple[SlideOutcome, float]], slope_pa_per_m: float) -> _Way:
+    """Return what landings in one direction say of its ways, each given with e', Pa."""
+    slid = [(each, off_pa) for each, off_pa in landed if each.position_m != each.from_m]
+    slides = sent(slid, slope_pa_per_m)
+    left_pa = (
+        off_pa + each.direction * slope_pa_per_m * jumped_m(slide.sent_m, slides)
+        for (each, off_pa), slide in zip(slid, slides, strict=True)
+    )
+    return _Way(slides, tuple(each.position_m for each, _ in slid), tuple(left_pa))
 
 
 def _scatter_pa(ways_pa: Iterable[Array]) -> float:
@@ -162,11 +224,10 @@ def missed_pa(
         width_m: h.
         least_pa: by which each e_j is brought nearer to 0: less says nothing.
     """
-    weighted_pa, weights, age = 0.0, HELD_BACK, 1.0
-    for each in landed:
-        weight = age * exp(-(((each.position_m - position_m) / width_m) ** 2) / 2)
-        missed = each.command_pa - law(each.position_m, each.direction)
-        weighted_pa += weight * copysign(max(0.0, abs(missed) - least_pa), missed)
-        weights += weight
-        age *= FADING
-    return weighted_pa / weights
+
+    def missed(each: SlideOutcome) -> float:
+        off_pa = each.command_pa - law(each.position_m, each.direction)
+        return copysign(max(0.0, abs(off_pa) - least_pa), off_pa)
+
+    near = [((each.position_m - position_m) / width_m, missed(each)) for each in landed]
+    return mean_nearby((apart for apart, _ in near), (off_pa for _, off_pa in near), FADING, HELD_BACK)
