@@ -260,7 +260,10 @@ def _learnt(
     if not slid:
         return _after_holding(replace(memory, anchor=anchor), s, way_m)
     beside = not short and missed_m > max(MISSED * way_m, settings.dead_band_m, quantum_m)
-    if turning and beside and BESIDE * way_m < margin.seen_m and balance.tried(way_m, s) > 1:
+    again = beside and balance.tried(way_m, s) > 1
+    if again and ours and s * (to_m - memory.aim_m) > 0.0:
+        margin = margin.after_jumping(way_m, went_m)
+    elif again and turning and BESIDE * way_m < margin.seen_m:
         margin = margin.after_holding(way_m)
     elif hit and anchor.direction:
         margin = margin.after_breaking(went_m)
@@ -288,9 +291,11 @@ def _redirected(
     way_m = abs(reference_m - observation.position_m)
     if way_m < FAR * memory.margins.of(s, turning=True).sure_m:
         return memory
+    if not isnan(memory.aim_m) and _has_slid(memory, observation.position_m, settings):
+        memory = _broken_loose(memory, observation, settings)
     level_pa = min(max(balance.pressure_pa(reference_m, s), settings.minimum_pa), settings.maximum_pa)
     return replace(
-        _broken_loose(memory, observation, settings),
+        memory,
         level_pa=level_pa,
         target_m=reference_m,
         direction=s,

@@ -946,7 +946,7 @@ def test_a_way_shorter_than_has_broken_loose_that_lands_beside_its_aim_again_is_
     assert scattered.scatter_m > 0.0003, "by twice that, it is where it was to go"
     after = step(memory, StemObservation(1.0, 0.0594, True, None, 0.0, came), 0.06, scattered, SETTINGS)
     assert after.margins.turning_down.held_m == pytest.approx(0.006)
-    assert after.margins.turning_down.broke_m == 0.0070
+    assert after.margins.turning_down.broke_m == pytest.approx(0.0066), "it jumped there"
 
 
 def test_a_packing_that_gives_way_farther_than_a_short_way_makes_that_no_margin() -> None:

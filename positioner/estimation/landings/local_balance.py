@@ -3,12 +3,12 @@
     B(x, s) = κ x + s φ + offset + q_1 + q_2 s + q_3 t + q_4 t^2 + q_5 t^3 + q_6 s t + l_s + n_s(x)
     t       = 2 x/stroke - 1
     q       = (Q' W Q/σ^2 + P^-1)^-1 Q' W e/σ^2             e_j = p_j - (κ x_j + s_j φ + offset)
-    l_s     = what q leaves of all of the last e_j, s_j = s: the least of them if they have one sign, else 0
+    l_s     = what q and g_s leave of all of the last e_j, s_j = s: the least of them if they have one sign, else 0
     n_s(x)  = Σ w_j e'_j / (w_0 + Σ w_j)                    e'_j what q and l_s leave of e_j,  s_j = s
     w_j     = exp(-((x_j - x) / h)^2 / 2) ρ^(landings of direction s since j)
 
-    B(x_0, x, s) = B(x, s) - s κ g_s(x - x_0)            of a slide from x_0: g_s of e' (short_slides.py), n_s of what
-                                                         that leaves
+    B(x_0, x, s) = B(x, s) - s κ g_s(abs(x - x_0))       of a slide from x_0: g_s of what q leaves (short_slides.py),
+                                                         n_s of what g_s and l_s leave
 
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
@@ -74,7 +74,7 @@ def landing_pa(
     bend = _bend(ratios, tuple(landings), stroke_m)
 
     def bent_pa(position_m: float, direction: int) -> float:
-        straight_pa = ratios.balance_pa(position_m, direction) + bend.lately_pa[direction > 0]
+        straight_pa = ratios.balance_pa(position_m, direction) + bend.ways[direction > 0].lately_pa
         return straight_pa + _bent_by_pa(bend.q, position_m / stroke_m, direction)
 
     landed = (each for each in landings if each.direction == direction)
@@ -97,8 +97,8 @@ def sliding_pa(
         direction, ratios, landings, stroke_m: as of `landing_pa`.
     """
     bend = _bend(ratios, tuple(landings), stroke_m)
-    way, up = bend.ways[direction > 0], direction > 0
-    bent_pa = ratios.balance_pa(to_m, direction) + bend.lately_pa[up] + _bent_by_pa(bend.q, to_m / stroke_m, direction)
+    way = bend.ways[direction > 0]
+    bent_pa = ratios.balance_pa(to_m, direction) + way.lately_pa + _bent_by_pa(bend.q, to_m / stroke_m, direction)
     near_pa = mean_nearby(((each_m - to_m) / (WIDTH * stroke_m) for each_m in way.at_m), way.left_pa, FADING, HELD_BACK)
     return bent_pa + near_pa + direction * ratios.b_over_c * beyond_m(abs(to_m - from_m), way.sent)
 
@@ -125,10 +125,12 @@ def _bent_by_pa(bend: tuple[float, ...], share: float, direction: int) -> float:
 class _Way(NamedTuple):
     """The landings in one direction, the latest first."""
 
+    lately_pa: float
+    """l_s"""
     sent: tuple[Sent, ...]
     at_m: tuple[float, ...]
     left_pa: tuple[float, ...]
-    """Of e', by g_s."""
+    """Of e_j, by q, g_s and l_s."""
 
 
 class _Bend(NamedTuple):
@@ -137,8 +139,6 @@ class _Bend(NamedTuple):
     q: tuple[float, ...]
     scatter_pa: float
     """Of the landings from one to the next, a standard deviation: friction that drifts is gone by, and no scatter."""
-    lately_pa: tuple[float, float]
-    """l_s, down and up."""
     ways: tuple[_Way, ...]
     """Down and up."""
 
@@ -150,7 +150,7 @@ _STRAIGHT = (0.0,) * len(BENDS)
 def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -> _Bend:
     """Return what landings say; q is zeros where there are too few."""
     if len(landings) < FEWEST:
-        return _Bend(_STRAIGHT, FINEST * -ratios.b_over_c * stroke_m, (0.0, 0.0), tuple(_few(landings, ratios)))
+        return _Bend(_STRAIGHT, FINEST * -ratios.b_over_c * stroke_m, tuple(_few(landings, ratios)))
     s = np.array([float(each.direction) for each in landings])
     t = np.array([2.0 * each.position_m / stroke_m - 1.0 for each in landings])
     e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
@@ -168,12 +168,10 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
         sigma_pa = max(FINEST * stroke_pa, 1.4826 * float(np.median(off)))
         weights = known * np.minimum(1.0, HUBER * sigma_pa / np.maximum(off, 1e-9))
     left_pa = e - Q @ q
-    ways_pa = tuple(left_pa[s == way] for way in (-1.0, 1.0))
-    down_pa, up_pa = (_alike(each[:LATEST].tolist()) for each in ways_pa)
-    off_pa = (left_pa - np.where(s > 0.0, up_pa, down_pa)).tolist()
-    landed = list(zip(landings, off_pa, strict=True))
+    landed = list(zip(landings, left_pa.tolist(), strict=True))
     ways = (_way([each for each in landed if each[0].direction == way], -ratios.b_over_c) for way in (-1, 1))
-    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, _scatter_pa(ways_pa)), (down_pa, up_pa), tuple(ways))
+    scatter_pa = _scatter_pa(left_pa[s == way] for way in (-1.0, 1.0))
+    return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, scatter_pa), tuple(ways))
 
 
 def _few(landings: Sequence[SlideOutcome], ratios: Ratios) -> Iterator[_Way]:
@@ -181,18 +179,21 @@ def _few(landings: Sequence[SlideOutcome], ratios: Ratios) -> Iterator[_Way]:
     for way in (-1, 1):
         landed = [each for each in landings if each.direction == way]
         left_pa = (each.command_pa - ratios.balance_pa(each.position_m, way) for each in landed)
-        yield _Way((), tuple(each.position_m for each in landed), tuple(left_pa))
+        yield _Way(0.0, (), tuple(each.position_m for each in landed), tuple(left_pa))
 
 
 def _way(landed: Sequence[tuple[SlideOutcome, float]], slope_pa_per_m: float) -> _Way:
-    """Return what landings in one direction say of its ways, each given with e', Pa."""
+    """Return what landings in one direction say, each given with what q leaves of it, Pa."""
     slid = [(each, off_pa) for each, off_pa in landed if each.position_m != each.from_m]
     slides = sent(slid, slope_pa_per_m)
-    left_pa = (
+    left_pa = [
         off_pa + each.direction * slope_pa_per_m * jumped_m(slide.sent_m, slides)
         for (each, off_pa), slide in zip(slid, slides, strict=True)
+    ]
+    lately_pa = _alike(left_pa[:LATEST])
+    return _Way(
+        lately_pa, slides, tuple(each.position_m for each, _ in slid), tuple(each - lately_pa for each in left_pa)
     )
-    return _Way(slides, tuple(each.position_m for each, _ in slid), tuple(left_pa))
 
 
 def _scatter_pa(ways_pa: Iterable[Array]) -> float:
