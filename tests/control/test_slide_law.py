@@ -23,6 +23,7 @@ from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.valve_health import HealthSettings
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.static_law import static_law
 from positioner.estimation.landings.stem_at_rest import Rest
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
 from sim.effect import FINE_STEP_S
@@ -912,6 +913,72 @@ def test_the_shorter_way_round_leaves_what_lies_between_stem_and_reference_least
     margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
     after = rested(0.057, SlideMemory(anchor=Anchor(0.057, 1), margins=margins, slides=slides))
     assert (after.excursion, after.direction) == (True, direction)
+
+
+def test_while_references_keep_coming_an_excursion_stays_near_them() -> None:
+    """By its side it goes 7 % beyond the reference, the other way round 8 %: there is no way between that stays."""
+    margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
+    memory = SlideMemory(anchor=Anchor(0.057, 1), margins=margins, target_m=0.06)
+    memory = replace(memory, course=ReferenceCourse(0.06, 9.9, (5e-4, -5e-4, 5e-4), (0.5, 0.5, 0.5)))
+    observation = StemObservation(10.0, 0.057, True, Rest(0.057, 1e-6, 1e-6, 100, 0.1), 0.0, None)
+    excursion = step(memory, observation, 0.06, BALANCE, SETTINGS)
+    assert (excursion.excursion, excursion.direction) == (True, 1)
+    assert rested(0.057, replace(memory, course=STOOD)).direction == -1
+
+
+def by_quanta(position_m: float, memory: SlideMemory) -> SlideMemory:
+    """Return one step on a stem at rest, seen by a tenth of a per cent of the stroke."""
+    at = Rest(position_m, 1e-6, 1e-6, 100, 0.1)
+    known = replace(memory, target_m=0.06, course=STOOD, slide_s=9.5)
+    return step(known, StemObservation(10.0, position_m, True, at, 1e-4, None), 0.06, BALANCE, SETTINGS)
+
+
+def test_an_excursion_that_only_has_to_be_seen_is_not_made_longer_by_what_is_rounded() -> None:
+    """0.1 % breaks it loose, 0.51 % is seen: half a quantum, 0.05 %, made it 0.57 %, where 0.5 % is the least."""
+    short = Margins(*(4 * [Margin(0.9e-4, 1e-4)]))
+    first = by_quanta(0.0597, SlideMemory(anchor=Anchor(0.0597, 1), margins=short))
+    assert first.excursion
+    assert abs(first.aim_m - 0.06) == pytest.approx(5.1e-3 * STROKE_M)
+    back = by_quanta(0.06047, replace(first, anchor=Anchor(0.06047, 1)))
+    assert (back.excursion, back.direction) == (False, -1)
+    assert back.aim_m == 0.06, "though it fell short by what is rounded"
+    longer = by_quanta(0.0597, SlideMemory(anchor=Anchor(0.0597, 1), margins=KNOWN))
+    assert abs(longer.aim_m - 0.06) == pytest.approx(1.02 * 0.0056 + 0.5e-4), "one that would not come back is"
+
+
+@pytest.mark.parametrize(("went_m", "broke_m"), [(0.0063, 0.0063), (0.002, 0.008)])
+def test_a_slide_that_a_far_reference_cuts_off_has_broken_loose_if_it_has_gone_its_way(
+    went_m: float, broke_m: float
+) -> None:
+    """No rest says so: behind a slow I/P, where a scan is shorter than an answer, nothing was ever learnt."""
+    margins = replace(KNOWN, turning_up=Margin(0.004, 0.008))
+    memory = SlideMemory(target_m=0.05, aim_m=0.056, direction=1, anchor=Anchor(0.05, -1), margins=margins)
+    memory = replace(memory, course=ReferenceCourse(0.05, 0.0), slide_s=0.5)
+    cut_off = step(memory, StemObservation(1.0, 0.05 + went_m, True, None, 0.0, None), 0.08, BALANCE, SETTINGS)
+    assert cut_off.target_m == 0.08
+    assert cut_off.margins.turning_up.broke_m == pytest.approx(broke_m)
+
+
+def test_the_shortest_slide_of_the_staircase_says_less_where_the_spring_is_softer() -> None:
+    """A spring that hardens: at 85 % of the travel a slide is shorter than at 30 %, as friction over its slope is."""
+    landings = [
+        SlideOutcome(0.0, s, x * STROKE_M - 0.01 * s, hardened_pa(x, s), x * STROKE_M, 1e-6, moved=True, landing=True)
+        for x in np.linspace(0.25, 0.85, 13)
+        for s in (1, -1)
+    ]
+    landings[-2] = landings[-2]._replace(from_m=landings[-2].position_m - 0.004)
+    law = static_law(landings, STROKE_M)
+    known = Balance(law.ratios, landings, (), STROKE_M)
+    memory = SlideMemory(margins_at_m=0.3 * STROKE_M)
+    observation = StemObservation(1.0, 0.03, True, Rest(0.03, 1e-6, 1e-6, 100, 0.1), 0.0, None)
+    found = step(memory, observation, 0.03, known, SETTINGS).margins.onward_up
+    slopes = [1.0 + 0.9 * x**2 for x in (0.3, 0.84)]
+    assert found.broke_m == pytest.approx(0.004 * slopes[1] / slopes[0], rel=0.03)
+
+
+def hardened_pa(share: float, s: int) -> float:
+    """The pressure of a spring that hardens by 30 %, Pa."""
+    return SLOPE_PA_PER_M * STROKE_M * (share + 0.3 * share**3) + s * FRICTION_PA
 
 
 def test_a_slide_that_stuck_short_behind_a_slow_pressure_is_none_that_held() -> None:

@@ -41,6 +41,10 @@ LATEST = 3
 """Landings in a direction, of which l_s is taken."""
 BENDS = (0.05, 0.05, 0.05, 0.1, 0.04, 0.03)
 """Of the pressure over the stroke: standard deviations of q, the root of P."""
+SHORT, SHORTEST = 3.0, 0.5
+"""Of the shortest slide: one that went as far counts half; of F_c/k_s: the shortest is taken for no longer."""
+SAME = 1e-9
+"""m: positions nearer than this are one."""
 FEWEST = 5
 """Landings: fewer do not say how they are bent."""
 FADES = 0.97
@@ -156,7 +160,9 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
     e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
     Q = np.column_stack((np.ones(s.size), s, t, t**2, t**3, s * t))
     stroke_pa = -ratios.b_over_c * stroke_m
-    known: Array = np.power(FADES, np.arange(s.size, dtype=float))
+    known: Array = np.power(FADES, np.arange(s.size, dtype=float)) * _length_counts(
+        landings, s, ratios.k_over_c / ratios.b_over_c
+    )
     held = np.diag((np.array(BENDS) * stroke_pa) ** -2.0)
     weights: Array = known
     sigma_pa = max(FINEST * stroke_pa, float(np.sqrt(np.mean(e**2))))
@@ -172,6 +178,17 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
     ways = (_way([each for each in landed if each[0].direction == way], -ratios.b_over_c) for way in (-1, 1))
     scatter_pa = _scatter_pa(left_pa[s == way] for way in (-1.0, 1.0))
     return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, scatter_pa), tuple(ways))
+
+
+def _length_counts(landings: Sequence[SlideOutcome], s: Array, friction_m: float) -> Array:
+    """Return the weight of each landing by how far its slide went: where a short one lands is not the balance alone.
+
+    Short is what is not far beyond the shortest in its direction; that may itself be long, but not beyond friction.
+    """
+    went_m: Array = np.array([max(SAME, abs(each.position_m - each.from_m)) for each in landings])
+    shortest_m: Array = np.array([min(went_m[s == way].min(), SHORTEST * friction_m) for way in s])
+    weights: Array = 1.0 / (1.0 + (SHORT * shortest_m / went_m) ** 2)
+    return weights
 
 
 def _few(landings: Sequence[SlideOutcome], ratios: Ratios) -> Iterator[_Way]:
