@@ -33,6 +33,7 @@ before the row (`_barred`).
 
 from dataclasses import replace
 from math import isnan, nan
+from typing import NamedTuple
 
 from config.codes import InhibitReason
 from positioner.control.slide_balance import Balance
@@ -454,37 +455,25 @@ def _excursion(
     memory: SlideMemory, observation: StemObservation, balance: Balance, settings: SlideSettings
 ) -> SlideMemory:
     """Give the first of two slides, by whichever side it may."""
-    target_m = memory.target_m
+    target_m, now_s = memory.target_m, observation.now_s
     assert target_m is not None
     assert observation.rest is not None
-    error_m = target_m - memory.anchor.position_m
-    s = 1 if error_m > 0 else -1
-    now_s, rounded_m = observation.now_s, ROUNDED * observation.quantum_m + _beside_m(balance, settings)
-    there = {each: _way_m(memory, memory.margin(each), settings) for each in (1, -1)}
-    turning_m = {each: _breaks_loose_m(memory, memory.margins.of(each, turning=True), settings) for each in (1, -1)}
-    back = {each: max(RETURN * turning_m[each] + rounded_m, LEAST * settings.stroke_m) for each in (1, -1)}
-    ways = (
-        (s, target_m + s * max(back[-s], there[s] - abs(error_m))),
-        (-s, target_m - s * max(back[s], there[-s] + abs(error_m))),
-    )
-    # What a slide of the move has left beside its reference is off the way between already; while references keep
-    # coming, there is none.
-    between_m = 0.0 if memory.slides or memory.course.changes_m else abs(error_m)
-    leaves_m = {s: abs(ways[0][1] - target_m), -s: OTHER_SIDE * (abs(ways[1][1] - target_m) - between_m)}
     # A stem that the first of two slides has left away, for the second was too short, does not wait there.
-    left_away = memory.slides > 0 and abs(error_m) > 0.5 * back[s]
+    error_m = target_m - memory.anchor.position_m
+    back_m = _back_m(memory, 1 if error_m > 0 else -1, observation, balance, settings)
+    left_away = memory.slides > 0 and abs(error_m) > 0.5 * back_m
     if now_s - memory.excursion_s < settings.excursion_interval_s and not left_away:
         return _because(memory, InhibitReason.EXCURSION_WAITS)
     why = InhibitReason.EXCURSION_BEYOND_LIMIT
     low_m, high_m = balance.stops_m
-    for direction, by_m in sorted(ways, key=lambda way: leaves_m[way[0]]):
+    for direction, by_m, beyond_m in _ways_round(memory, target_m, observation, balance, settings):
         if abs(by_m - target_m) > settings.excursion_limit_m or not low_m <= by_m <= high_m:
             continue
         both_pa = balance.pressure_pa(by_m, direction), balance.pressure_pa(target_m, -direction)
         if not all(settings.minimum_pa <= each <= settings.maximum_pa for each in both_pa):
             why = InhibitReason.LAW_BEYOND_LIMITS
             continue
-        spent_m = memory.spent_at_m(now_s, settings) + 2 * abs(by_m - target_m)
+        spent_m = memory.spent_at_m(now_s, settings) + 2 * beyond_m
         if 0.0 < settings.budget_m_per_s * DAY_S < spent_m and not left_away:
             why = InhibitReason.EXCURSION_BUDGET_SPENT
             continue
@@ -494,6 +483,42 @@ def _excursion(
     if why is InhibitReason.EXCURSION_BUDGET_SPENT:
         return _because(memory, why)
     return _barred(memory, why, observation.rest.position_m, balance, settings)
+
+
+class _WayRound(NamedTuple):
+    """An excursion: the direction of its first slide, by which place it goes, and how far beyond the way between, m."""
+
+    direction: int
+    by_m: float
+    beyond_m: float
+
+
+def _ways_round(
+    memory: SlideMemory, target_m: float, observation: StemObservation, balance: Balance, settings: SlideSettings
+) -> list[_WayRound]:
+    """Return the excursions by either side, first the one that leaves the way between stem and target by less.
+
+    What a slide of the move has left beside its target is off that way already, and while references keep coming there
+    is none: then it is the one that leaves the target by less.
+    """
+    error_m = target_m - memory.anchor.position_m
+    s, way_m = (1 if error_m > 0 else -1), abs(error_m)
+    there = {each: _way_m(memory, memory.margin(each), settings) for each in (1, -1)}
+    back = {each: _back_m(memory, each, observation, balance, settings) for each in (1, -1)}
+    on_m, round_m = max(back[-s], there[s] - way_m), max(back[s], there[-s] + way_m)
+    by_its_side = _WayRound(s, target_m + s * on_m, on_m)
+    by_the_other = _WayRound(-s, target_m - s * round_m, round_m - way_m)
+    leaves_m = round_m if memory.slides or memory.course.changes_m else OTHER_SIDE * by_the_other.beyond_m
+    return [by_its_side, by_the_other] if on_m <= leaves_m else [by_the_other, by_its_side]
+
+
+def _back_m(
+    memory: SlideMemory, direction: int, observation: StemObservation, balance: Balance, settings: SlideSettings
+) -> float:
+    """Return how far beyond its target a stem is sent, m, that is to come back by a slide in a direction."""
+    turning_m = _breaks_loose_m(memory, memory.margins.of(direction, turning=True), settings)
+    rounded_m = ROUNDED * observation.quantum_m + _beside_m(balance, settings)
+    return max(RETURN * turning_m + rounded_m, LEAST * settings.stroke_m)
 
 
 def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, settings: SlideSettings) -> float:
