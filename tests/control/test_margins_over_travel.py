@@ -65,21 +65,25 @@ def test_what_a_packing_gives_way_goes_with_friction_alone() -> None:
     assert there.margins.turning_up.broke_m == pytest.approx(3.0e-3 - 1.1e-3 * (1.0 - going_on), rel=0.02)
 
 
-def test_play_is_the_same_everywhere() -> None:
+@pytest.mark.parametrize(("hardens", "grows"), [(HARDENS, 0.0), (0.0, 2 * GROWS)])
+def test_play_is_the_same_everywhere(hardens: float, grows: float) -> None:
     """Going on takes 2 mm, turning 1.2, for 0.8 mm of play are taken up."""
     played = Margins(Margin(1.98e-3, 2e-3), Margin(1.98e-3, 2e-3), Margin(1.19e-3, 1.2e-3), Margin(1.19e-3, 1.2e-3))
     memory = SlideMemory(margins=played, margins_at_m=0.3 * STROKE_M)
-    there = with_margins_at(memory, 0.6 * STROKE_M, balance(HARDENS, 0.0)).margins
-    assert there.turning_up.broke_m == pytest.approx(2e-3 * true_ratio(HARDENS, 0.0, 0.3, 0.6) - 0.8e-3, rel=0.05)
+    there = with_margins_at(memory, 0.6 * STROKE_M, balance(hardens, grows)).margins
+    assert there.turning_up.broke_m == pytest.approx(2e-3 * true_ratio(hardens, grows, 0.3, 0.6) - 0.8e-3, rel=0.05)
 
 
 def test_margins_come_back_with_the_reference_and_so_do_those_before_slides_that_held() -> None:
-    known = SlideMemory(margins=KNOWN, margins_at_m=0.3 * STROKE_M, held=Held(1, KNOWN))
+    doubted = replace(KNOWN, onward_up=Margin(1.0e-3, 1.1e-3, held_before_m=0.8e-3))
+    known = SlideMemory(margins=doubted, margins_at_m=0.3 * STROKE_M, held=Held(1, doubted))
     bent = balance(HARDENS, GROWS)
     there = with_margins_at(known, 0.8 * STROKE_M, bent)
+    believed_m = there.margins.onward_up.held_before_m
+    assert believed_m == pytest.approx(0.8 * there.margins.onward_up.held_m)
     assert there.held.margins == there.margins
     back = with_margins_at(there, 0.3 * STROKE_M, bent)
-    for now, before in zip(back.margins.all, KNOWN.all, strict=True):
+    for now, before in zip(back.margins.all, doubted.all, strict=True):
         assert (now.held_m, now.broke_m) == pytest.approx((before.held_m, before.broke_m))
 
 

@@ -888,6 +888,17 @@ def test_a_stem_that_jumps_farther_than_it_was_asked_shows_that_no_slide_is_so_s
     assert back.margins.onward_up.broke_m == pytest.approx(expected.broke_m)
 
 
+def test_a_stem_seen_a_quantum_farther_than_it_was_sent_has_not_jumped() -> None:
+    """By 10 bits 0.5 % of stroke is five quanta: one more made that way one that holds, and the next longer."""
+    memory = SlideMemory(target_m=0.06, direction=1, excursion=True, aim_m=0.0606, anchor=Anchor(0.06, -1))
+    memory = replace(memory, margins=Margins(*(4 * [Margin(0.0, 0.0006)])), course=STOOD)
+    memory = replace(memory, slide_s=0.5, last_s=0.5, last_m=0.0607)
+    seen = StemObservation(1.0, 0.0607, True, None, 1e-4, None)
+    finer = replace(seen, quantum_m=1e-5)
+    sent_back = [step(memory, each, 0.06, BALANCE, SETTINGS).margins.turning_up for each in (seen, finer)]
+    assert [each.held_m > 0.0 for each in sent_back] == [False, True]
+
+
 def test_a_stem_that_is_to_turn_beyond_its_reference_first_is_not_sent_back_before_it_has() -> None:
     """It stands there already: 20 ms later it was sent back from where it stood, and that did not break it loose."""
     memory = SlideMemory(target_m=0.06, direction=-1, excursion=True, aim_m=0.045, anchor=Anchor(0.051, 1))
@@ -913,6 +924,13 @@ def test_the_shorter_way_round_leaves_what_lies_between_stem_and_reference_least
     margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
     after = rested(0.057, SlideMemory(anchor=Anchor(0.057, 1), margins=margins, slides=slides))
     assert (after.excursion, after.direction) == (True, direction)
+
+
+def test_an_excursion_spends_what_the_stem_travels_more() -> None:
+    """The other way round by 5 %, of which it would have gone 3 anyway: that is 4 mm there and back, not 10."""
+    margins = Margins(Margin(0.0099, 0.01), Margin(0.0099, 0.01), Margin(0.0049, 0.005), Margin(0.0049, 0.005))
+    after = rested(0.057, SlideMemory(anchor=Anchor(0.057, 1), margins=margins))
+    assert after.spent_m == pytest.approx(2 * (0.057 - after.aim_m))
 
 
 def test_while_references_keep_coming_an_excursion_stays_near_them() -> None:
