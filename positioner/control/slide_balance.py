@@ -1,9 +1,11 @@
 """What the law of slides knows of the valve: where a slide lands, and how margins go over the travel.
 
-B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
-                                    of an extended valve, [law] valve:        extended_balance.py)
-φ, κ       friction and slope of B, as bent over the travel
-m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s: as φ/κ, for both frictions grow alike
+    B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
+                                        of an extended valve, [law] valve:        extended_balance.py)
+    φ, κ       friction and slope of B, as bent over the travel
+    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s
+
+Where friction grows over the travel its static part grows alike, so m_s goes as φ/κ.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,8 @@
 """The mean of what was seen nearby and of late, held back where that is little.
 
-m = Σ w_j y_j / (w_0 + Σ w_j)         w_j = exp(-z_j^2/2) ρ^j,  z_j how many widths y_j lies apart, the latest first
+    m = Σ w_j y_j / (w_0 + Σ w_j)         w_j = exp(-z_j^2/2) ρ^j,  z_j how many widths y_j lies apart
+
+The latest comes first.
 """
 
 from collections.abc import Iterable
