@@ -15,6 +15,7 @@ import argparse
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import nan
 
 import numpy as np
 
@@ -92,10 +93,17 @@ class Loop:
         self.cycle = Cycle(link, self.controller, pace, Requests(mode=Mode.AUTOMATIC, mode_writes=1), recorder=None)
         if extended is None:
             self._ask(eta=(0, 0, 0))
-            while self.cycle.snapshot.decision.estimates.progress < 1:
+            for _ in range(round(file.excitation.staircase_limit_s / period_s)):
                 self.cycle.once()
+                if self.cycle.snapshot.decision.estimates.progress >= 1:
+                    break
             self._ask(eta=QUIET)
         self.stand(period_s)
+
+    @property
+    def identified(self) -> bool:
+        """Whether the staircase came to an end: one whose supply does not give what it asks for waits for it."""
+        return self.cycle.snapshot.decision.applied.ratios is not None
 
     def _ask(self, **values: object) -> None:
         self.cycle.requests = replace(self.cycle.requests, **values)  # type: ignore[arg-type]
@@ -132,6 +140,11 @@ class Outcome:
         """Their root mean square."""
         return float(np.sqrt(np.mean(self.error**2)))
 
+    @property
+    def identified(self) -> bool:
+        """Whether there are any: what is not identified does not move."""
+        return not np.isnan(self.error).any()
+
 
 @dataclass(frozen=True, slots=True)
 class Course:
@@ -143,8 +156,10 @@ class Course:
     seed: int
 
     def outcome(self, composition: Composition, extended: ExtendedValve | None) -> Outcome:
-        """Make them on a valve."""
+        """Make them on a valve; of one that could not be identified errors are NaN."""
         loop = Loop(composition, extended, self.period_s, self.seed)
+        if extended is None and not loop.identified:
+            return Outcome(np.full(self.steps, nan))
         loop.step_to(FIRST * STROKE_M)
         loop.stand(max(2.0, self.step_s))
         errors = []
@@ -171,11 +186,14 @@ def report(course: Course, names: Sequence[str]) -> Iterator[str]:
         slower = replace(course, step_s=SLOW.get(effect.name, 1.0) * course.step_s)
         without = slower.outcome(valve, None)
         with_it = slower.outcome(valve, extended_valve(ValveFile(valve=SEED, effect=(table,)), effect.name))
-        worst = (100 * np.abs(each.error).max() for each in (without, with_it))
-        yield (
-            f"{effect.name:22}{100 * without.rms:13.4f}{next(worst):8.3f}{100 * with_it.rms:11.4f}{next(worst):8.3f}"
-            f"{with_it.rms / bare:9.1f}{without.rms / with_it.rms:9.1f}"
-        )
+        told = f"{without.rms / with_it.rms:9.1f}" if without.identified else ""
+        yield f"{effect.name:22}{_said(without):>21}{_said(with_it):>19}{with_it.rms / bare:9.1f}{told}"
+
+
+def _said(outcome: Outcome) -> str:
+    """Return errors as they are printed, % of stroke: rms and the worst."""
+    worst = 100 * float(np.abs(outcome.error).max())
+    return f"{100 * outcome.rms:11.4f}{worst:8.3f}" if outcome.identified else "not identified"
 
 
 def main() -> None:
