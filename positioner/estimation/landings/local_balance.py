@@ -12,9 +12,9 @@
 
 A spring that hardens bends both lines alike (t^2, t^3), friction that grows over the travel makes them part (s t): two
 or three numbers, which the landings of S3 give. P holds them to what such valves have; W, Huber's, counts a landing
-that lies apart for less, and σ is what the others lie off by. A slide to x that missed all the same says what is
-missing there: the next one lands. w_0 holds that correction back where there is little to go by. Friction that drifts
-makes the last slides miss alike everywhere: l_s.
+that lies apart for less, and that of a short slide, and σ is what the others lie off by. A slide to x that missed all
+the same says what is missing there: the next one lands. w_0 holds that correction back where there is little to go by.
+Friction that drifts makes the last slides miss alike everywhere: l_s.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -160,9 +160,8 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
     e = np.array([each.command_pa - ratios.balance_pa(each.position_m, each.direction) for each in landings])
     Q = np.column_stack((np.ones(s.size), s, t, t**2, t**3, s * t))
     stroke_pa = -ratios.b_over_c * stroke_m
-    known: Array = np.power(FADES, np.arange(s.size, dtype=float)) * _length_counts(
-        landings, s, ratios.k_over_c / ratios.b_over_c
-    )
+    friction_m = ratios.k_over_c / ratios.b_over_c
+    known: Array = np.power(FADES, np.arange(s.size, dtype=float)) * _weights_by_length(landings, s, friction_m)
     held = np.diag((np.array(BENDS) * stroke_pa) ** -2.0)
     weights: Array = known
     sigma_pa = max(FINEST * stroke_pa, float(np.sqrt(np.mean(e**2))))
@@ -180,7 +179,7 @@ def _bend(ratios: Ratios, landings: tuple[SlideOutcome, ...], stroke_m: float) -
     return _Bend(tuple(q.tolist()), max(FINEST * stroke_pa, scatter_pa), tuple(ways))
 
 
-def _length_counts(landings: Sequence[SlideOutcome], s: Array, friction_m: float) -> Array:
+def _weights_by_length(landings: Sequence[SlideOutcome], s: Array, friction_m: float) -> Array:
     """Return the weight of each landing by how far its slide went: where a short one lands is not the balance alone.
 
     Short is what is not far beyond the shortest in its direction; that may itself be long, but not beyond friction.
