@@ -235,7 +235,7 @@ def _learnt(
     A stem that breaks loose lands where it is to. One that goes not half as far, and no farther than a packing gives
     way, did not. One that lands elsewhere, as behind a slow I/P, has slid, and its way says nothing of the margin. If
     that is not half as far, friction has grown: nor do the slides before it that held, by a balance that is no more.
-    One that rests where it was to has slid, though it came there so slowly that it seemed to creep.
+    One that rests where it was to, as far as is seen, has slid, though it came there so slowly that it seemed to creep.
     What may be either, for it went elsewhere, is a slide where its way has been seen to break loose; of a stem that
     turns round it was too short, for a soft packing gives way, where a longer one has landed; and that however far
     landings scatter.
@@ -249,7 +249,7 @@ def _learnt(
     way_m = s * (memory.aim_m - anchor.position_m) if ours else balance.way_m(outcome)
     missed_m = abs(memory.aim_m - to_m) if ours else 0.0
     short = missed_m > GAVE_WAY * way_m
-    arrived = ours and missed_m <= MISSED * way_m
+    arrived = ours and missed_m <= max(MISSED * way_m, quantum_m)
     slid = arrived or (outcome.moved and (not short or abs(to_m - outcome.from_m) > CREEP * settings.stroke_m))
     unsure_m = max(SURELY * balance.scatter_m, settings.dead_band_m, outcome.std_m, quantum_m)
     hit = slid and missed_m <= max(MISSED * way_m, unsure_m)

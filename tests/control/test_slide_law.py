@@ -1011,6 +1011,18 @@ def test_a_slide_that_stuck_short_behind_a_slow_pressure_is_none_that_held() -> 
     assert after.anchor == Anchor(0.0614, -1)
 
 
+@pytest.mark.parametrize(("quantum_m", "held_m"), [(1e-4, 0.0), (1e-6, 0.00052)])
+def test_a_slide_too_short_to_be_seen_has_not_held_where_it_rests_within_a_quantum_of_its_aim(
+    quantum_m: float, held_m: float
+) -> None:
+    """By 10 bits one of 0.51 % of stroke showed as 0.46, was told "held", and no way so short was tried again."""
+    margins = Margins(*(4 * [Margin(broke_m=0.0006)]))
+    memory = SlideMemory(target_m=0.06, aim_m=0.06, direction=-1, anchor=Anchor(0.06052, 1), margins=margins)
+    came = SlideOutcome(1.0, -1, 0.06052, 27e3, 0.06006, 1e-6, moved=False, landing=False)
+    after = step(memory, StemObservation(1.0, 0.06006, True, None, quantum_m, came), 0.06, BALANCE, SETTINGS)
+    assert after.margins.turning_down.held_m == pytest.approx(held_m)
+
+
 def test_a_stem_that_rests_where_it_was_to_has_slid_though_it_seemed_to_creep_there() -> None:
     """Behind an I/P of 0.13 s one came there to 0.3 %: its way was told "held", and margins were a third too long."""
     known = Margins(*(4 * [Margin(broke_m=0.011)]))
