@@ -72,7 +72,7 @@ class Controller:
             excitation=None,
             experiment=PlayedExperiment(),
             identifying=False,
-            law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored),
+            law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored, settings.limits.stroke_m),
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
             restoration=Restoration.of(restored, settings.valve),
             cut_off=WITHIN,

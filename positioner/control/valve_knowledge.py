@@ -10,7 +10,9 @@ from math import isfinite, sqrt
 from config.extended_valve import ExtendedValve
 from positioner.control.breakaway_memory import BreakawayMemory, LearntPush
 from positioner.control.law_memory import LawMemory
+from positioner.control.margins_over_travel import with_margins_at
 from positioner.control.move_memory import MoveMemory
+from positioner.control.slide_balance import Balance
 from positioner.control.slide_margins import Margins
 from positioner.control.slide_memory import SlideMemory
 from positioner.estimation.acceptance import Ratios
@@ -22,6 +24,8 @@ from positioner.estimation.landings.static_identification import StaticIdentific
 
 Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
+MIDDLE = 0.5
+"""Of the stroke: where the margins are that are kept."""
 LARGEST_STD = 0.05
 """Of κ and φ: the deviation of what was applied, where nobody knows it any more."""
 UNANSWERED = Answers()
@@ -40,7 +44,7 @@ class ValveKnowledge:
         residual_m: how far landings lie off these, a standard deviation.
         landings, held: slides that landed and changes of the command that moved nothing, the latest first.
         answers: how long the stem takes to answer.
-        margins: of the law of slides.
+        margins: of the law of slides, at the middle of the travel.
         pushes: of the law for small moves by pulses, up and down.
         tracked: what else is followed, by name, for whoever knows the name.
     """
@@ -117,28 +121,37 @@ def known(
         landings=statics.landings,
         held=statics.held,
         answers=statics.detector.answers,
-        margins=slides.learnt if isinstance(slides, SlideMemory) else None,
+        margins=_in_the_middle(slides, ratios, statics, stroke_m) if isinstance(slides, SlideMemory) else None,
         pushes=(pulses.up, pulses.down) if isinstance(pulses, BreakawayMemory) else None,
     )
 
 
-def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None) -> LawMemory | None:
+def _in_the_middle(slides: SlideMemory, ratios: Ratios, statics: StaticIdentification, stroke_m: float) -> Margins:
+    """Return what slides have taught of margins, at the middle of the travel."""
+    balance = Balance(ratios, statics.balances, statics.held, stroke_m, statics.valve)
+    return with_margins_at(slides, MIDDLE * stroke_m, balance).learnt
+
+
+def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None, stroke_m: float) -> LawMemory | None:
     """Return the memory of a law with what it had learnt, if it is the same law."""
     if knowledge is None:
         return law
     match law:
         case MoveMemory():
-            return replace(law, pulses=_with_pushes(law.pulses, knowledge), slides=_with_margins(law.slides, knowledge))
+            slides = _with_margins(law.slides, knowledge, stroke_m)
+            return replace(law, pulses=_with_pushes(law.pulses, knowledge), slides=slides)
         case SlideMemory():
-            return _with_margins(law, knowledge)
+            return _with_margins(law, knowledge, stroke_m)
         case BreakawayMemory():
             return _with_pushes(law, knowledge)
         case _:
             return law
 
 
-def _with_margins(law: SlideMemory, knowledge: ValveKnowledge) -> SlideMemory:
-    return law if knowledge.margins is None else replace(law, margins=knowledge.margins)
+def _with_margins(law: SlideMemory, knowledge: ValveKnowledge, stroke_m: float) -> SlideMemory:
+    if knowledge.margins is None:
+        return law
+    return replace(law, margins=knowledge.margins, margins_at_m=MIDDLE * stroke_m)
 
 
 def _with_pushes(law: BreakawayMemory, knowledge: ValveKnowledge) -> BreakawayMemory:

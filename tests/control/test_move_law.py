@@ -146,7 +146,7 @@ def test_what_either_hand_has_learnt_is_kept() -> None:
         margins=Margins(margin, margin, margin, margin),
         pushes=pushes,
     )
-    law = with_learnt(first_memory(settings.law_with_memory, 0.0), knowledge)
+    law = with_learnt(first_memory(settings.law_with_memory, 0.0), knowledge, STROKE_M)
     assert isinstance(law, MoveMemory)
     assert law.slides.margins.onward_up == margin
     assert (law.pulses.up, law.pulses.down) == pushes

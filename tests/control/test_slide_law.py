@@ -12,6 +12,7 @@ from config.daemon_file import DaemonFile, HealthTable
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller_memory import Decision
+from positioner.control.margins_over_travel import with_margins_at
 from positioner.control.reference_course import ReferenceCourse
 from positioner.control.requests import Requests
 from positioner.control.slide_balance import Balance
@@ -19,6 +20,7 @@ from positioner.control.slide_law import MOST_SLIDES, step, while_not_commanding
 from positioner.control.slide_margins import Margin, Margins
 from positioner.control.slide_memory import DAY_S, Anchor, Held, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
+from positioner.control.valve_knowledge import with_learnt
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.valve_health import HealthSettings
 from positioner.estimation.acceptance import Ratios
@@ -975,6 +977,33 @@ def test_a_slide_that_a_far_reference_cuts_off_has_broken_loose_if_it_has_gone_i
     cut_off = step(memory, StemObservation(1.0, 0.05 + went_m, True, None, 0.0, None), 0.08, BALANCE, SETTINGS)
     assert cut_off.target_m == 0.08
     assert cut_off.margins.turning_up.broke_m == pytest.approx(broke_m)
+
+
+def test_margins_are_kept_over_a_restart_as_they_are_in_the_middle_of_the_travel() -> None:
+    """Learnt at 80 % of a spring that hardens: at 30 %, where the next daemon begins, they are half as long again."""
+    loop = Loop(0.05, {"name": "spring_hardening", "cubic_n_per_m3": 0.3 * VALVE.spring_n_per_m / STROKE_M**2})
+    for at in (0.8, 0.803, 0.8, 0.803, 0.8):
+        loop.step_to(at)
+    knowledge, law = loop.cycle._controller.knowledge, loop.cycle._controller._memory.law
+    assert knowledge is not None
+    assert isinstance(law, SlideMemory)
+    kept, restored = knowledge.margins, with_learnt(SlideMemory(), knowledge, STROKE_M)
+    assert kept is not None
+    assert isinstance(restored, SlideMemory)
+    assert restored.margins_at_m == 0.5 * STROKE_M
+    longer = [(1.0 + 0.9 * 0.8**2) / (1.0 + 0.9 * x**2) for x in (0.5, 0.3)]
+    there = with_margins_at(restored, 0.3 * STROKE_M, loop_balance(loop))
+    for before, middle, after in zip(law.margins.all, kept.all, there.margins.all, strict=True):
+        assert middle.broke_m == pytest.approx(longer[0] * before.broke_m, rel=0.03)
+        assert after.broke_m == pytest.approx(longer[1] * before.broke_m, rel=0.05)
+
+
+def loop_balance(loop: Loop) -> Balance:
+    """Return what the law of a loop knows of its valve."""
+    statics = loop.cycle._controller._statics
+    ratios = loop.decision.applied.ratios
+    assert ratios is not None
+    return Balance(ratios, statics.balances, statics.held, STROKE_M)
 
 
 def test_the_shortest_slide_of_the_staircase_says_less_where_the_spring_is_softer() -> None:
