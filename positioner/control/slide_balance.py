@@ -15,7 +15,7 @@ from math import isnan
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.extended_balance import extended_landing_pa
-from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import bent_by_pa, landing_pa, scatter_m, sliding_pa
 from positioner.estimation.landings.short_slides import ALIKE
 
@@ -23,8 +23,6 @@ KNOWN = 1e-3
 """Of the stroke: how well an extended valve is known."""
 SURE = 1.02
 """Factor on a margin that is known: a slide of just that length may hold."""
-LEAST = 5e-3
-"""Of the stroke: a slide shorter than this would not be seen for one."""
 BESIDE = 0.02
 """Of the stroke, to either side: by what is between, a slope is known."""
 FLATTEST = 0.25
@@ -93,7 +91,7 @@ class Balance:
     def going_on_m(self, position_m: float, direction: int) -> float:
         """Return what margins of slides that go on are in proportion to, m: m_s of an extended valve, or φ/κ."""
         if self.valve is not None:
-            return max(SURE * self.valve.margin_m(position_m, direction), LEAST * self.stroke_m)
+            return max(SURE * self.valve.margin_m(position_m, direction), VISIBLE * self.stroke_m)
         there_m = [position_m + each * BESIDE * self.stroke_m for each in (-1, 1)]
         down_pa, up_pa = (sum(self._shape_pa(each, s) for s in (1, -1)) for each in there_m)
         straight_pa = -self.ratios.b_over_c * 4 * BESIDE * self.stroke_m

@@ -348,8 +348,8 @@ def _next_slide(
     memory = replace(memory, anchor=anchor)
     way_m = _way_m(memory, memory.margin(s), settings)
     if memory.excursion and s == -memory.direction:  # planned by what may do: it is tried before more is asked for
-        rounded_m = ROUNDED * observation.quantum_m + beside_m
-        way_m = min(way_m, max(memory.margin(s).way_m, LEAST * settings.stroke_m - rounded_m))
+        least_m = LEAST * settings.stroke_m - _rounded_m(observation, balance, settings)
+        way_m = min(way_m, max(memory.margin(s).way_m, least_m))
     to_m = target_m + _lead_m(memory, observation.now_s, s, way_m, balance, settings)
     asked_m = s * (to_m - anchor.position_m)
     if asked_m >= way_m:
@@ -436,6 +436,11 @@ def _beside_m(balance: Balance, settings: SlideSettings) -> float:
     return 0.5 * settings.command_step_pa / -balance.ratios.b_over_c
 
 
+def _rounded_m(observation: StemObservation, balance: Balance, settings: SlideSettings) -> float:
+    """Return by how much sensor and device round where a slide lands, m."""
+    return ROUNDED * observation.quantum_m + _beside_m(balance, settings)
+
+
 def _way_m(memory: SlideMemory, margin: Margin, settings: SlideSettings) -> float:
     """Return how far a slide must be sent, m: at first in a move as short as may do, then as surely does.
 
@@ -517,8 +522,7 @@ def _back_m(
 ) -> float:
     """Return how far beyond its target a stem is sent, m, that is to come back by a slide in a direction."""
     turning_m = _breaks_loose_m(memory, memory.margins.of(direction, turning=True), settings)
-    rounded_m = ROUNDED * observation.quantum_m + _beside_m(balance, settings)
-    return max(RETURN * turning_m + rounded_m, LEAST * settings.stroke_m)
+    return max(RETURN * turning_m + _rounded_m(observation, balance, settings), LEAST * settings.stroke_m)
 
 
 def _return_pa(memory: SlideMemory, position_m: float, balance: Balance, settings: SlideSettings) -> float:

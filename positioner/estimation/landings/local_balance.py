@@ -78,8 +78,7 @@ def landing_pa(
     bend = _bend(ratios, tuple(landings), stroke_m)
 
     def bent_pa(position_m: float, direction: int) -> float:
-        straight_pa = ratios.balance_pa(position_m, direction) + bend.ways[direction > 0].lately_pa
-        return straight_pa + _bent_by_pa(bend.q, position_m / stroke_m, direction)
+        return _bent_pa(position_m, direction, ratios, bend, stroke_m)
 
     landed = (each for each in landings if each.direction == direction)
     missed = missed_pa(position_m, landed, bent_pa, WIDTH * stroke_m)
@@ -102,7 +101,7 @@ def sliding_pa(
     """
     bend = _bend(ratios, tuple(landings), stroke_m)
     way = bend.ways[direction > 0]
-    bent_pa = ratios.balance_pa(to_m, direction) + way.lately_pa + _bent_by_pa(bend.q, to_m / stroke_m, direction)
+    bent_pa = _bent_pa(to_m, direction, ratios, bend, stroke_m)
     near_pa = mean_nearby(((each_m - to_m) / (WIDTH * stroke_m) for each_m in way.at_m), way.left_pa, FADING, HELD_BACK)
     return bent_pa + near_pa + direction * ratios.b_over_c * beyond_m(abs(to_m - from_m), way.sent)
 
@@ -145,6 +144,12 @@ class _Bend(NamedTuple):
     """Of the landings from one to the next, a standard deviation: friction that drifts is gone by, and no scatter."""
     ways: tuple[_Way, ...]
     """Down and up."""
+
+
+def _bent_pa(position_m: float, direction: int, ratios: Ratios, bend: _Bend, stroke_m: float) -> float:
+    """Return B without n_s, Pa: the straight law, l_s and q."""
+    straight_pa = ratios.balance_pa(position_m, direction) + bend.ways[direction > 0].lately_pa
+    return straight_pa + _bent_by_pa(bend.q, position_m / stroke_m, direction)
 
 
 _STRAIGHT = (0.0,) * len(BENDS)
