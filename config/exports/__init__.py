@@ -13,6 +13,8 @@ From the file to the recording:
     export_units                            units, by all the names people give them
     column_mapping                          `OURS=THEIRS:UNIT`, `--status`, and how else an export is read
     header_search                           the line that names the columns, and the units about it
+    column_names                            what columns are called, by language and trade
+    control_loop                            whether it is a loop's, OP, PV and SP, and tells of no stem
     number_notation                         decimal signs and thousands separators
     time_stamps                             dates and times as seconds
     time_order                              newest first, disorder, repeated rows and hours

@@ -14,10 +14,12 @@ import numpy as np
 
 from config.drive import KINDS, VALVE
 from config.errors import InputError
-from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_in_header, unit_named
+from config.exports.column_names import COMMON, SETPOINT, STATUS, is_called, rank_by_name
+from config.exports.control_loop import LoopColumn, LoopColumns, loops_of
+from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_named
 from config.exports.file_kind import raw_tables
 from config.exports.header_search import SHOWN, Header, begins_number, guess_header
-from config.exports.number_notation import decimal_sign, is_numeral
+from config.exports.number_notation import decimal_sign, is_numeral, number
 from config.exports.raw_table import Cell, RawTable
 from config.exports.time_stamps import clock_unit, proposed_formats
 from config.results.block import Block, Table, as_text
@@ -27,27 +29,7 @@ FIRST = 3
 MOST_SIGNALS = 20
 MOST_TABLES = 5
 WIDEST = 24
-SETPOINT = r"soll|\bsp\b|set ?point"
-COMMON = {
-    "time_s": (r"time|zeit|stamp|date|datum|^ts?\b|uhr",),
-    "position_m": (
-        r"travel|stroke|hub|lift|stem|\bz[ti]|\bweg\b|rückm|stellung",
-        r"position|\bpos|feedback|opening|öffnung",
-        r"\bpv\b|\bist|^x\b",
-    ),
-    "command_pa": (
-        r"command|cmd|\bout\b|\bop\b|\bmv\b|\bao\b|output|stell|demand|^u\b",
-        r"signal|drive|pressure|druck",
-        SETPOINT,
-    ),
-}
-"""What columns are called, by ours, from what is said of nothing else to what may be said of a loop's flow or level.
-
-Names are taken apart at _, . and - and where capitals follow small letters.
-"""
 STAMP = r"\d{4}-\d\d-\d\d"
-STATUS = re.compile(r"status|quality|qualität|güte|\bqual\b", re.IGNORECASE)
-"""What columns are called that say which rows are good."""
 GOOD = "192"
 """What OPC calls good, where qualities are numbers."""
 
@@ -90,8 +72,9 @@ class ExportPreview:
         what: how it was taken.
         header: where its columns are named, or that they are not.
         columns: in their order.
-        words: what would read it, words of the command line.
+        words: what would read it, words of the command line; none of a loop's without a stem.
         open: what a person must say or look at.
+        loops: the loops that it is of.
     """
 
     what: str
@@ -99,6 +82,7 @@ class ExportPreview:
     columns: tuple[ColumnPreview, ...]
     words: tuple[str, ...]
     open: tuple[str, ...]
+    loops: tuple[LoopColumns, ...] = ()
 
     def summary(self) -> str:
         """Say the columns, the proposal and what is open."""
@@ -114,7 +98,7 @@ class ExportPreview:
             f"{self.what}; {self.header}",
             Table(("column", "unit", "first", "values", ""), rows),
             *self.open,
-            f"proposed, look at it: {proposed}" if proposed else "no column looks like time, position or command",
+            f"proposed, look at it: {proposed}" if proposed else "nothing is proposed",
         ]
 
 
@@ -147,8 +131,31 @@ def preview(path: Path, sheet: str | None = None) -> ExportPreview:
     place = f"{header.table.place} {header.line} names the columns"
     if not header.line:
         place = "no line names the columns" if header.names[0] == "#1" else "its columns"
+    loops = tuple(loops_of([_of_loop(each, header) for each in columns if each.numbers]))
     words, open_ = _proposal(columns, header)
-    return ExportPreview(what, place, columns, words, (*open_, *_besides(header.table, tables)))
+    if loops and not any(each.position for each in loops):
+        words, open_ = (), tuple(_no_stem(each) for each in loops)
+    return ExportPreview(what, place, columns, words, (*open_, *_besides(header.table, tables)), loops)
+
+
+def _of_loop(column: ColumnPreview, header: Header) -> LoopColumn:
+    """Return a column as a loop's are recognised."""
+    texts = [cell for cell in column.cells if isinstance(cell, str)]
+    try:
+        decimal = decimal_sign("", texts, header.table.separator)
+    except InputError:  # a person must say, and is told so
+        decimal = "."
+    read = [cell if isinstance(cell, float) else number(cell, decimal) for cell in column.cells]
+    values = np.array([np.nan if each is None else each for each in read])
+    return LoopColumn(column.name, column.unit or header.unknown.get(column.name, ""), values)
+
+
+def _no_stem(loop: LoopColumns) -> str:
+    """Return what to say of a loop whose stem is not measured."""
+    return (
+        f"{loop.because}: {loop.process_value!r} is what a loop controls and no stem's position, and nothing is "
+        "compared with it; export the stem's own position (ZT, travel, feedback) beside the command"
+    )
 
 
 def _besides(shown: RawTable, tables: Sequence[RawTable]) -> list[str]:
@@ -273,7 +280,7 @@ def _likeliest(ours: str, columns: Sequence[ColumnPreview]) -> ColumnPreview | N
 
 def _rank(ours: str, column: ColumnPreview) -> int | None:
     """Return how surely a column is ours by its name, 0 best, None if it is not."""
-    rank = next((rank for rank, words in enumerate(COMMON[ours]) if _is_called(words, column)), None)
+    rank = rank_by_name(ours, column.name)
     if rank is None or STATUS.search(column.name):
         return None
     if ours == "time_s":
@@ -281,23 +288,12 @@ def _rank(ours: str, column: ColumnPreview) -> int | None:
     if not column.numbers or not (column.unit is None or column.unit in allowed_units(ending_of(ours))):
         return None
     # The set point of a position is none, unless there is no other.
-    return rank if ours != "position_m" or not _is_called(SETPOINT, column) else rank + len(COMMON[ours])
+    return rank if ours != "position_m" or not is_called(SETPOINT, column.name) else rank + len(COMMON[ours])
 
 
 def _is_setpoint(column: ColumnPreview) -> bool:
     """Whether a column taken for the command is the set point of a valve behind its own positioner."""
     return _rank("command_pa", column) == COMMON["command_pa"].index(SETPOINT) and column.unit not in UNITS["_pa"]
-
-
-def _is_called(words: str, column: ColumnPreview) -> bool:
-    # Of a structure's field, log.t, the field's own name counts as well; the unit behind a name does not.
-    plain = unit_in_header(column.name)[0]
-    names = (_taken_apart(each) for each in (column.name, plain, plain.rpartition(".")[2]))
-    return any(re.search(words, each, re.IGNORECASE) for each in names)
-
-
-def _taken_apart(name: str) -> str:
-    return re.sub(r"[_.-]+|(?<=[a-zäöü0-9])(?=[A-Z])", " ", name).strip()
 
 
 def _unit_of(ours: str, column: ColumnPreview) -> tuple[str, list[str]]:

@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 from config.errors import InputError
 from config.exports.column_mapping import Source, read_mapping
-from config.exports.export_preview import COMMON, GOOD, ColumnPreview, ExportPreview
+from config.exports.column_names import COMMON
+from config.exports.export_preview import GOOD, ColumnPreview, ExportPreview
 from config.exports.export_units import SHARES
 from config.exports.mapping_file import MappingTable
 
