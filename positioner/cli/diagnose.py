@@ -12,7 +12,6 @@ from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
-    from config.valve_file import ValveFile
     from workbench.diagnosis.diagnosis import Diagnosis
     from workbench.select.tangent_preview import TangentScore
 
@@ -42,7 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the input that would tell apart what the recordings do not",
     )
     parser.add_argument(
-        "-o", "--out", type=Path, metavar="BETTER.toml", help="write the valve with what is missing, if that is sure"
+        "-o",
+        "--out",
+        type=Path,
+        metavar="BETTER.toml",
+        help="write the valve with what is missing, or refitted where its parameters alone were off; if that is sure",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     parser.add_argument(
@@ -99,13 +102,14 @@ def run(arguments: argparse.Namespace) -> int:
     print(diagnosis.summary())
     _tell_experiment(diagnosis, arguments.experiment)
     for command in commands:
-        print(f"to add it: {command}" if len(commands) == 1 else f"one of: {command}")
+        alone = "to refit it" if diagnosis.parameters_off else "to add it"
+        print(f"{alone}: {command}" if len(commands) == 1 else f"one of: {command}")
     if diagnosis.by_pressure:
         print(f"to diagnose the stem by the measured pressure: {by_pressure_command(arguments)}")
     if diagnosis.verdict == "unexplained":
         print(f"to look for a form of what the library lacks: {discover_command(arguments)}")
     if arguments.out is not None:
-        _write_valve(diagnosis, valve, arguments)
+        _write_valve(diagnosis, arguments)
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment and arguments.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
@@ -143,7 +147,7 @@ def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
     print(f"{path}: the experiment that would tell apart what the recordings do not")
 
 
-def _write_valve(diagnosis: "Diagnosis", valve: "ValveFile", arguments: argparse.Namespace) -> None:
+def _write_valve(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> None:
     """Write what was found with its journal, where the diagnosis is sure of it; say so where it is not."""
     from config.valve_file import find_valve
     from positioner.cli.parts.next_step import not_written
@@ -153,7 +157,7 @@ def _write_valve(diagnosis: "Diagnosis", valve: "ValveFile", arguments: argparse
     if not diagnosis.sure:
         print(not_written(arguments.out, diagnosis))
         return
-    journal = write_extended(extension_of(diagnosis, valve), find_valve(arguments.valve), arguments.out)
+    journal = write_extended(extension_of(diagnosis), find_valve(arguments.valve), arguments.out)
     print(f"{arguments.out}: {journal.steps[-1].why}")
 
 

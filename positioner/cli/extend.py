@@ -8,7 +8,7 @@ from positioner.cli.parts.noise_argument import add_noise_argument, noise_said
 from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.pressure_argument import add_pressure_argument
 
-HELP = "add effects to a valve file, refit it, and print the held-out error before and after"
+HELP = "add effects to a valve file, or none, refit it, and print the held-out error before and after"
 EXAMPLE = "positioner extend seed --effect backlash --fit rec.csv -o new.toml"
 
 
@@ -18,9 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--effect",
         nargs="+",
-        required=True,
+        default=[],
         metavar="NAME",
-        help="added together; an own effect by its .py file",
+        help="added together; an own effect by its .py file; none: the valve is refitted as it is",
     )
     parser.add_argument("--fit", type=Path, nargs="+", required=True, metavar="REC", help="one or several recordings")
     parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     journal = write_extended(extension, path, arguments.out)
     print(extension.summary())
-    worth = "" if extension.falls else "written, though the effect is not worth it: "
+    worth = "" if extension.falls else "written, though the error falls by no more than chance may: "
     print(f"{arguments.out}: {worth}{journal.steps[-1].why}")
     if arguments.json is not None:
         whole = as_json(extension) | {"valve": str(arguments.out), "seconds": time.monotonic() - began_s}

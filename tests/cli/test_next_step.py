@@ -18,7 +18,7 @@ MORE = ["--stroke-m", "0.04", "--decimal", ",", "--status", "Quality=Good", "--s
 MORE += ["--from-s", "-3.5", "--to-s", "1234567.25", "--noise-m", "5e-05"]
 
 
-def diagnosed(verdict: str, *steps: tuple[str, ...]) -> Any:
+def diagnosed(verdict: str, *steps: tuple[str, ...], parameters_off: bool = False) -> Any:
     """A diagnosis as far as its next step goes: of each step what was added, then what does as well."""
     named = [
         SimpleNamespace(
@@ -27,7 +27,8 @@ def diagnosed(verdict: str, *steps: tuple[str, ...]) -> Any:
         )
         for names in steps
     ]
-    found: Any = SimpleNamespace(verdict=verdict, steps=named, missing=tuple(names[0] for names in steps))
+    missing = tuple(names[0] for names in steps)
+    found: Any = SimpleNamespace(verdict=verdict, steps=named, missing=missing, parameters_off=parameters_off)
     choices: Any = Diagnosis.choices
     found.choices = choices.fget(found)
     return found
@@ -62,6 +63,11 @@ def test_effects_found_one_after_another_are_added_together() -> None:
     found = diagnosed("missing", ("ip_lag",), ("backlash",))
     (command,) = extend_commands(found, asked("r.csv", "--valve", "seed"))
     assert read_by_extend(command).effect == ["ip_lag", "backlash"]
+
+
+def test_where_the_parameters_alone_were_off_the_valve_is_refitted_with_nothing_added() -> None:
+    (command,) = extend_commands(diagnosed("adequate", parameters_off=True), asked("r.csv", "--valve", "seed"))
+    assert read_by_extend(command).effect == []
 
 
 def test_each_rival_has_its_command() -> None:

@@ -84,7 +84,7 @@ def test_a_valve_is_no_experiment_away_from_itself(diagnosed: Diagnosis, monkeyp
 def test_what_was_found_is_written_as_extend_writes_it(diagnosed: Diagnosis, tmp_path: Path) -> None:
     given, out = tmp_path / "given.toml", tmp_path / "better.toml"
     given.write_text(valve_toml(SEED), encoding="utf-8")
-    extension = extension_of(diagnosed, SEED)
+    extension = extension_of(diagnosed)
     assert extension.effects == ("ip_lag",)
     assert extension.falls
     assert extension.given_test_rmse_m >= extension.refitted_errors.test_rmse_m > extension.extended_errors.test_rmse_m
@@ -121,8 +121,10 @@ def test_nothing_hidden_nothing_found(tmp_path: Path, capsys: pytest.CaptureFixt
     (tmp_path / "valve.toml").write_text(valve_toml(SEED), encoding="utf-8")
     said = _diagnosed(tmp_path, "sensor_gain")
     assert said["status"] == 0
-    assert capsys.readouterr().out.endswith("better.toml: not written: nothing is missing\n")
-    assert not (tmp_path / "better.toml").exists()
+    assert said["parameters_off"]
+    assert "No effect is missing: the parameters were off. Refitted, the held-out error" in said["sentence"]
+    assert capsys.readouterr().out.endswith("better.toml: the parameters were off\n")
+    assert load_valve(tmp_path / "better.toml").effect == ()
     assert said["verdict"] == "adequate"
     assert said["missing"] == said["suspected"] == []
     assert said["base"]["parameters"] == said["best"]["parameters"]

@@ -134,7 +134,7 @@ def test_what_hangs_together_is_few_independent_samples() -> None:
         (Gain(9.0, 0.5, 9.0, 1.0), "evidence 9"),
         (Gain(90.0, 0.04, 9.0, 1.0), "falls by 4 %"),
         (Gain(90.0, -0.11, -9.0, 1.0), "rises by 11 %, a fall of more than 5 % needed"),
-        (Gain(90.0, 0.5, 1.9, 1.0), "1.9 standard errors"),
+        (Gain(90.0, 0.5, 1.9, 1.0), "1.9 times its own uncertainty"),
     ],
 )
 def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> None:
@@ -143,9 +143,9 @@ def test_each_part_of_the_rule_can_refuse_and_says_so(gain: Gain, said: str) -> 
 
 def test_what_passes_every_part_is_not_refused() -> None:
     assert not Gain(11.0, 0.06, 2.1, 0.3).rejection_reason(at_floor=False)
-    assert "10 % are independent: 1.1, more than 3" in Gain(11.0, 0.06, 2.1, 0.1).rejection_reason(at_floor=False)
+    assert "evidence 11 counts for 1.1, more than 3" in Gain(11.0, 0.06, 2.1, 0.1).rejection_reason(at_floor=False)
     assert not Gain(1e3, 0.4, 3.1, 1e-5).rejection_reason(at_floor=False), "one arc, held out too"
-    assert "10 % are independent: 9, more than 10" in Gain(90.0, 0.5, 9.0, 0.1).rejection_reason(at_floor=True)
+    assert "evidence 90 counts for 9, more than 10" in Gain(90.0, 0.5, 9.0, 0.1).rejection_reason(at_floor=True)
     assert "more than 3 needed" in Gain(11.0, 0.06, 2.9, 1.0).rejection_reason(at_floor=True)
     assert not Gain(11.0, 0.06, 3.1, 1.0).rejection_reason(at_floor=True)
 

@@ -153,7 +153,10 @@ def test_what_narrowly_falls_short_of_the_rule_stands_beside_what_narrowly_passe
         friction_drift=POOR,
     )
     assert {each.name for each in step.candidates if each.accepted} == {"sensor_lag"}
-    assert reasons(step)["dead_time"] == "the held-out error falls by 1.9 standard errors, more than 2 needed"
+    assert (
+        reasons(step)["dead_time"]
+        == "may be chance: the held-out error falls by 1.9 times its own uncertainty, more than 2 needed"
+    )
     assert set(names(step)) == {"dead_time", "sensor_lag"}
 
 
@@ -182,7 +185,10 @@ def test_what_nothing_proves_beside_a_valve_that_explains_all_is_suspected_and_n
     )
     assert step.added is None
     assert [each.name for each in step.suspected] == ["spring_hardening"]
-    assert reasons(step)["spring_hardening"] == "the held-out error falls by 2.5 standard errors, more than 3 needed"
+    assert (
+        reasons(step)["spring_hardening"]
+        == "may be chance: the held-out error falls by 2.5 times its own uncertainty, more than 3 needed"
+    )
     assert judged(EXPLAINED, spring_hardening=off_by(3.1, EXPLAINED, "spring_hardening", 1.1 * AT_FLOOR)).added
 
 

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from config.valve_file import ValveFile
 from sim.effect import Effect
 from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, fit_of, model_of, valve_with
 from workbench.data.held_out import split
+from workbench.fit.breaking_off import BrokenOff
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
 from workbench.select import effect_search
@@ -112,8 +114,13 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         all_of: list[str] | None = None,
         strengths: Mapping[str, Fitted] | None = None,
         noise: bool = False,
+        broken_off_after: float = np.inf,
     ) -> tuple[EffectStep, ...]:
+        fits = count()
+
         def made(valve: ValveFile, effects: Sequence[str]) -> Fit:
+            if next(fits) >= broken_off_after:
+                raise BrokenOff
             there = tuple(each.name for each in valve.effect)
             floors = ends(frozenset(there), frozenset(effects))
             return fit_of(*there, *effects, cost=floors * AT_FLOOR, rms_m=floors * FLOOR_M)
@@ -144,7 +151,11 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[EffectStep,
         monkeypatch.setattr(EffectSearch, "_local_minimum", lambda *_: local_minimum)
         monkeypatch.setattr(EffectSearch, "_noise", lambda *_: noise)
         search = search_of({name: LIBRARY[name] for name in library}, workers)
-        steps = search.steps(search.base(valve_with()))
+        base = search.base(valve_with())
+        try:
+            steps = search.steps(base)
+        except BrokenOff:
+            return search.so_far(base)
         return search.proved(steps)[0] if strengths else steps
 
     return searched
@@ -300,6 +311,27 @@ def ends_of_two(there: Effects, *, runner_up: float, in_the_way: bool = False) -
     if "presliding" in there:
         return 4.95 if len(there) == 1 else 4.0
     return runner_up if "ip_lag" in there else 20.0
+
+
+def test_broken_off_anywhere_the_model_is_the_one_of_the_effects_that_are_named(
+    searched: Callable[..., tuple[EffectStep, ...]],
+) -> None:
+    """A runner-up was being tried: what was named was the effect before, what was printed the runner-up's error."""
+    library = "presliding", "ip_lag", "asymmetric_friction", "backlash"
+    turned = 0
+    for fits in range(1, 60):
+        steps = searched(
+            lambda there, added: ends_of_two(there | added, runner_up=5.0, in_the_way=True),
+            *library,
+            workers=1,
+            broken_off_after=fits,
+        )
+        named = tuple(step.added.name for step in steps if step.added)
+        here = steps[-1].added.model if steps[-1].added else steps[-1].before
+        assert here
+        assert here.effects == named, f"broken off after {fits} fits"
+        turned += named[:1] == ("ip_lag",)
+    assert turned, "some of them after the search had turned to the runner-up"
 
 
 def test_the_runner_up_is_tried_where_the_added_one_leads_nowhere(

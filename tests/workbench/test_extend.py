@@ -12,8 +12,9 @@ from config.valve_file import load_valve
 from config.writing import valve_toml
 from positioner.cli.main import main
 from sim.valve import Valve
-from tests.workbench.valves import drawn_valve, record_of, with_effect
+from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
 from workbench.diagnosis.extension_journal import Journal
+from workbench.report import report_journal
 
 BARE = drawn_valve(np.random.default_rng(11))
 LAG_S = 0.08
@@ -57,6 +58,26 @@ def test_compare_holds_the_new_file_against_the_same_recording(folder: Path) -> 
         main(["compare", str(folder / "rec.csv"), "--valve", str(folder / f"{name}.toml"), "--json", str(out)])
         errors[name] = json.loads(out.read_text())["robust_m"]
     assert errors["new"] < 0.5 * errors["old"]
+
+
+def test_without_an_effect_the_valve_is_refitted_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_recording(tmp_path / "rec.csv", record_of(BARE, 4, COUNT))
+    (tmp_path / "seed.toml").write_text(valve_toml(SEED), encoding="utf-8")
+    words = [
+        "extend",
+        str(tmp_path / "seed.toml"),
+        "--fit",
+        str(tmp_path / "rec.csv"),
+        "-o",
+        str(tmp_path / "own.toml"),
+    ]
+    assert main(words) == 0
+    assert "refitted, nothing added: the held-out error falls from" in capsys.readouterr().out
+    (step,) = Journal.beside(tmp_path / "own.toml").steps
+    assert (step.effects, step.why) == ((), "the parameters were off")
+    assert step.extended_test_rmse_m < 0.1 * step.given_test_rmse_m
+    report_journal(Journal.beside(tmp_path / "own.toml"), tmp_path / "own.html", "own", BARE.valve.own)
+    assert "Step 1: refitted, nothing added" in (tmp_path / "own.html").read_text(encoding="utf-8")
 
 
 def test_an_effect_that_is_there_already_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,13 +1,18 @@
 """A parameter of the valve file that the recording wants elsewhere is said, with what may look the same."""
 
+import numpy as np
 import pytest
 
 from config.drive import KINDS
 from config.valve_file import EffectTable, ValveFile
 from tests.workbench.hand_made import LIBRARY, fit_of
-from tests.workbench.valves import SEED
+from tests.workbench.valves import SEED, drawn_valve, record_of, with_effect
+from workbench.data.held_out import split
+from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.moved_parameters import Moved, moved_parameters
 from workbench.fit.fitted_parameter import Fitted
+from workbench.fit.fitting import fit
+from workbench.select.block_errors import block_errors
 
 
 def moved(before_n: float, lower_n: float, upper_n: float) -> tuple[Moved, ...]:
@@ -35,3 +40,13 @@ def test_one_that_is_not_excluded_or_hardly_moved_is_no_news(lower_n: float, upp
 def test_what_the_file_leaves_at_nothing_counts_however_little_it_moves() -> None:
     (found,) = moved(0.0, 2.0, 4.0)
     assert found.before == 0.0
+
+
+def test_a_right_file_is_not_called_wrong_though_a_fit_would_have_it_otherwise() -> None:
+    """Break-aways scatter, so that the interval of the asymmetry is too narrow: 0.132, 95 % 0.125 to 0.139."""
+    right = with_effect(drawn_valve(np.random.default_rng(103)), "asymmetric_friction", asymmetry=0.12)
+    parts = split([record_of(right, 3, 2000, dirty=True)])
+    found = fit(parts.train.recording, right)
+    assert AsGiven.of(right, parts, found).holds(block_errors(found, parts))
+    twice = with_effect(drawn_valve(np.random.default_rng(103)), "asymmetric_friction", asymmetry=0.24)
+    assert not AsGiven.of(twice, parts, found).holds(block_errors(found, parts))

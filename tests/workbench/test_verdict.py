@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from config.recording import Column, Recording
-from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, model_of
+from tests.workbench.hand_made import AT_FLOOR, FLOOR_M, LIBRARY, errors_of, model_of
 from tests.workbench.valves import SEED
 from workbench.data.held_out import Split, split
+from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.diagnosis_json import as_json
+from workbench.diagnosis.extension import extension_of
 from workbench.diagnosis.judged_landings import JudgedLandings
 from workbench.diagnosis.verdict import verdict
 from workbench.diagnosis.verdict_sentence import REPEAT, rivals_sentence, verdict_sentence
@@ -35,11 +37,12 @@ def step(before: EvaluatedModel, number: int = 1, **models: EvaluatedModel) -> E
     return judged_step(before, models, number, LIBRARY)
 
 
-def diagnosed(parts: Split, *steps: EffectStep) -> Diagnosis:
+def diagnosed(parts: Split, *steps: EffectStep, given_m: float = FLOOR_M) -> Diagnosis:
     added = steps[-1].added
     best = added.model if added and added.model else steps[-1].before
     found = verdict(best, steps, parts.motion_std_m, parts.floor_m)
-    sentence = verdict_sentence(found, best, steps, LIBRARY, parts)
+    given = AsGiven(errors_of(given_m), FLOOR_M)
+    sentence = verdict_sentence(found, best, steps, LIBRARY, parts, given)
     return Diagnosis(
         steps=steps,
         verdict=found,
@@ -48,6 +51,7 @@ def diagnosed(parts: Split, *steps: EffectStep) -> Diagnosis:
         preview=(),
         experiment=None,
         split=parts,
+        given=given,
         sentence=sentence,
     )
 
@@ -100,7 +104,21 @@ def test_a_valve_that_explains_all_is_adequate(parts: Split) -> None:
     found = diagnosed(parts, step(EXPLAINED, ip_lag=EXPLAINED))
     assert (found.verdict, found.missing, found.suspected) == ("adequate", (), ())
     assert found.best is found.base
-    assert found.sentence == "Nothing is missing: no effect lowers the held-out error of 0.06 mm as it must."
+    assert (
+        found.sentence == "Nothing is missing: no effect lowers the held-out error, 0.06 mm, by more than chance may."
+    )
+
+
+def test_a_valve_whose_parameters_alone_were_off_is_said_to_be_off_and_is_refitted(parts: Split) -> None:
+    found = diagnosed(parts, step(EXPLAINED, ip_lag=EXPLAINED), given_m=98.0 * FLOOR_M)
+    assert (found.verdict, found.choices, found.sure) == ("adequate", ((),), True)
+    assert found.sentence == (
+        "No effect is missing: the parameters were off. Refitted, the held-out error falls from 4.9 to 0.06 mm."
+    )
+    assert extension_of(found).stages == {
+        "as given": (98.0 * FLOOR_M,) * 2,
+        "refitted, nothing added": (1.2 * FLOOR_M,) * 2,
+    }
 
 
 def test_of_static_friction_at_its_least_a_slow_recording_says_that_it_may_be_more(parts: Split) -> None:
@@ -122,7 +140,7 @@ def test_of_an_adequate_valve_what_is_suspected_is_said(parts: Split) -> None:
     (candidate,) = found.candidates
     said = f" Suspected, not proved: spring_hardening; of spring_hardening, {candidate.rejection_reason}. A longer"
     assert said in found.sentence
-    assert "standard errors, more than 3 needed" in said
+    assert "times its own uncertainty, more than 3 needed" in said
 
 
 def test_of_what_is_left_unexplained_what_is_suspected_is_said(parts: Split) -> None:
@@ -132,7 +150,7 @@ def test_of_what_is_left_unexplained_what_is_suspected_is_said(parts: Split) -> 
     found = diagnosed(parts, step(before, preload=suspect))
     assert (found.verdict, found.missing, found.suspected) == ("untrusted", (), ("preload",))
     assert found.sentence.startswith("Not to be trusted: ")
-    assert " Suspected, not proved: preload; of preload, the held-out error falls by " in found.sentence
+    assert " Suspected, not proved: preload; of preload, may be chance: the held-out error " in found.sentence
 
 
 def test_what_is_suspected_is_nothing_that_the_library_does_not_have(parts: Split) -> None:
@@ -149,7 +167,10 @@ def test_of_what_is_left_beside_what_is_missing_what_is_suspected_is_no_explanat
     suspect = model_of("sensor_lag", "preload", cost=1.2 * AT_FLOOR, error_m=1.25 * FLOOR_M, scatter=0.3)
     found = diagnosed(parts, step(POOR, sensor_lag=found_first), step(found_first, 2, preload=suspect))
     assert (found.verdict, found.missing, found.suspected) == ("missing", ("sensor_lag",), ("preload",))
-    assert "what is left, 1.4 floors, no other effect is proved to explain. Suspected, not proved: " in found.sentence
+    assert (
+        "1.4 times the floor are left, which no other effect is proved to explain. Suspected, not proved: "
+        in found.sentence
+    )
 
 
 def test_beside_rivals_what_is_suspected_is_said_too(parts: Split) -> None:
@@ -159,7 +180,7 @@ def test_beside_rivals_what_is_suspected_is_said_too(parts: Split) -> None:
     steps = step(POOR, preload=found_first, sensor_offset=rival), step(found_first, 2, backlash=suspect)
     found = diagnosed(parts, *steps)
     assert (found.verdict, found.suspected) == ("one_of", ("backlash",))
-    assert "; of backlash, the held-out error falls by " in found.sentence
+    assert "; of backlash, may be chance: the held-out error falls by " in found.sentence
 
 
 def test_a_parameter_that_was_kept_and_is_off_is_said(parts: Split) -> None:

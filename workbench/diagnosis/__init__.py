@@ -5,6 +5,7 @@ Its files:
     diagnosis, diagnosis_json                     puts it together; the same as JSON
     verdict, verdict_sentence                     what follows, and how it is said
     judged_landings                               how many landings a verdict rests on, where nothing else is judged
+    as_given                                      what the file leaves before anything is fitted
     moved_parameters                              what the file's own effects are by the recording
     kept_mass                                     what another mass than the valve file's would leave
     measured_pressure                             what the stem is from the measured pressure on

@@ -19,6 +19,7 @@ from sim.effect import Effect, find_effect, find_effects, tried_effects
 from workbench.compare.comparison_sentences import shortened
 from workbench.data.held_out import Split, split
 from workbench.data.noise_floor import UNKNOWN, told
+from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.by_command import ByCommand, by_command
 from workbench.diagnosis.judged_landings import judged_landings
 from workbench.diagnosis.kept_mass import KeptMass, kept_mass
@@ -58,6 +59,8 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
     preview: tuple[TangentScore, ...]
     experiment: Experiment | None
     split: Split
+    given: AsGiven
+    """What the valve file leaves before anything is fitted."""
     sentence: str
     unseen: Mapping[str, str] = field(default_factory=dict)
     """Effects that were not tried, and why a recording sampled like this one cannot show them."""
@@ -82,6 +85,11 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
         return self.best.fit.kind
 
     @property
+    def parameters_off(self) -> bool:
+        """Whether no effect is missing, and yet the valve file is off: its parameters are."""
+        return self.verdict == "adequate" and self.given.is_off(self.best.errors)
+
+    @property
     def nothing_off(self) -> bool:
         """Whether the valve file holds as it is: no effect is missing, and nothing in it is off."""
         off = self.moved or self.kept_mass or self.by_pressure or self.pressure_scale or by_another_name(self.steps)
@@ -89,8 +97,10 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
 
     @property
     def sure(self) -> bool:
-        """Whether what is missing is known, by forces that are the valve's."""
-        return self.verdict == "missing" and not (self.pressure_scale and self.best.fit.from_pressure)
+        """Whether what is missing, or which parameters are off, is known, by forces that are the valve's."""
+        return (self.verdict == "missing" or self.parameters_off) and not (
+            self.pressure_scale and self.best.fit.from_pressure
+        )
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -104,8 +114,13 @@ class Diagnosis(Result, ForwardSelection[EvaluatedModel, EffectCandidate]):
 
     @property
     def choices(self) -> tuple[tuple[str, ...], ...]:
-        """The sets of effects that may be added: what was found first, then one a rival; none where nothing helps."""
+        """The sets of effects that may be added: what was found first, then one a rival; none where nothing helps.
+
+        Where the parameters alone were off, the empty set: the valve refitted as it is.
+        """
         added = self.missing
+        if self.parameters_off:
+            return ((),)
         if self.verdict not in ("missing", "one_of") or not added:
             return ()
         rivals = [
@@ -259,7 +274,10 @@ def diagnose(
             steps, found, chosen, asked = search.so_far(base), "unfinished", None, Asked()
             base, best = steps[0].before, _last(steps)
     own = {each.name: find_effect(each.name, "effects") for each in valve.effect}
-    moved = moved_parameters(valve, best.fit, library | own) if found in EXPLAINED else ()
+    given = AsGiven.of(valve, parts, base.fit)
+    moved = (
+        moved_parameters(valve, best.fit, library | own) if found in EXPLAINED and not given.holds(best.errors) else ()
+    )
     return Diagnosis(
         steps=steps,
         verdict=found,
@@ -268,7 +286,8 @@ def diagnose(
         preview=scores,
         experiment=chosen,
         split=parts,
-        sentence=verdict_sentence(found, best, steps, library, parts)
+        given=given,
+        sentence=verdict_sentence(found, best, steps, library, parts, given)
         + (f" {asked.stand_in.sentence}." if asked.stand_in else "")
         + "".join(f" But {each.sentence(best.fit.kind)}." for each in moved)
         + (f" But {asked.kept_mass.sentence}." if asked.kept_mass else "")

@@ -51,6 +51,11 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         and {"span": diagnosis.pressure_scale.span, "above_pa": diagnosis.pressure_scale.above_pa},
         "stand_in": diagnosis.stand_in
         and {"form": diagnosis.stand_in.form, "test_rmse_m": diagnosis.stand_in.form_rmse_m},
+        "parameters_off": diagnosis.parameters_off,
+        "given": {
+            "train_rmse_m": diagnosis.given.errors.train_rmse_m,
+            "test_rmse_m": diagnosis.given.errors.test_rmse_m,
+        },
         "base": _model(diagnosis.base),
         "best": _model(diagnosis.best),
         "floor_m": diagnosis.split.floor_m,

@@ -2,14 +2,12 @@
 
 as given     the valve file as it is
 refitted     its own parameters fitted to the recording, nothing added: what the effects have to beat
-extended     the effects added, everything fitted
+extended     the effects added, everything fitted; without effects the refitted valve itself
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from config.arguments import kinds_held
 from config.errors import InputError
@@ -17,15 +15,14 @@ from config.recording import Recording
 from config.results.block import Block, Table
 from config.results.result import Result
 from config.valve_file import ValveFile
-from sim.composition import Composition
 from sim.effect import find_effect, find_effects
-from workbench.data.held_out import Part, Split, residual_m, split
+from workbench.data.held_out import Split, residual_m, split
+from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.pressure_scale import pressure_scale
 from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import parameter_table
 from workbench.fit.fitting import fit, profiled
-from workbench.model.free_run import FreeRun
 from workbench.select.block_errors import BlockErrors, block_errors
 from workbench.select.effect_acceptance import Gain, gain
 from workbench.select.pressure_scatter import with_pressure_scatter
@@ -57,24 +54,32 @@ class Extension(Result):
 
     @property
     def falls(self) -> bool:
-        """Whether the effects lower the held-out error below that of the refitted valve without them."""
+        """Whether the effects, or without any the refit, lower the held-out error below that of the valve before."""
+        if not self.effects:
+            return self.extended_errors.test_rmse_m < self.given_test_rmse_m
         return self.gain.held_out > 0.0 and self.extended_errors.test_rmse_m < self.refitted_errors.test_rmse_m
 
     @property
     def stages(self) -> Mapping[str, tuple[float, float]]:
         """The rms error, m, fitted and held out, of each valve on the way."""
         before, after = self.refitted_errors, self.extended_errors
-        return {
+        stages = {
             "as given": (self.given_train_rmse_m, self.given_test_rmse_m),
             "refitted, nothing added": (before.train_rmse_m, before.test_rmse_m),
-            f"with {', '.join(self.effects)}": (after.train_rmse_m, after.test_rmse_m),
         }
+        return stages | ({self.named: (after.train_rmse_m, after.test_rmse_m)} if self.effects else {})
+
+    @property
+    def named(self) -> str:
+        """What the new valve is, in words."""
+        return f"with {', '.join(self.effects)}" if self.effects else "refitted, nothing added"
 
     def blocks(self) -> list[Block]:
         """Say whether the effects help, the errors on the way, and the parameters of the new valve."""
-        before_m, after_m = self.refitted_errors.test_rmse_m, self.extended_errors.test_rmse_m
+        before_m = self.refitted_errors.test_rmse_m if self.effects else self.given_test_rmse_m
+        after_m = self.extended_errors.test_rmse_m
         length = self.extended.kind.length
-        falls = "falls from" if self.falls else "does not fall as it must: from"
+        falls = "falls from" if self.falls else "does not fall by more than chance may: from"
         rows = [
             (what, length.number(train_m, ".4g"), length.number(test_m, ".4g"))
             for what, (train_m, test_m) in self.stages.items()
@@ -84,7 +89,7 @@ class Extension(Result):
         rows.append(("floor: what no model undercuts" + BY_COMMAND * by_command, floor, floor))
         scale = pressure_scale(self.split.train.record) if self.extended.from_pressure else None
         return [
-            f"with {', '.join(self.effects)} the held-out error {falls} {length.number(before_m, '.4g')} to "
+            f"{self.named}{'' if self.effects else ':'} the held-out error {falls} {length.number(before_m, '.4g')} to "
             f"{length.said(after_m, '.4g')} rms",
             Table((f"error, {length.unit} rms", "fitted", "held out"), rows),
             parameter_table(self.extended.parameters, self.extended.kind),
@@ -108,7 +113,7 @@ class Extension(Result):
         figure, (axes,) = panels((4.0,))
         for name, found, errors, colour in (
             ("refitted, nothing added", self.refitted, self.refitted_errors, MODEL),
-            (f"with {', '.join(self.effects)}", self.extended, self.extended_errors, BETTER),
+            *([(self.named, self.extended, self.extended_errors, BETTER)] if self.effects else []),
         ):
             error_m = residual_m(part, found.indicated_m(part.record))
             label = f"{name}: {length.said(errors.test_rmse_m)} rms"
@@ -141,7 +146,7 @@ def extend(
     Args:
         recording: one or several.
         valve: the valve to be extended.
-        effects: names, or paths of own effects' files, to be added together.
+        effects: names, or paths of own effects' files, to be added together; none: the valve is refitted as it is.
         test: held out; by default the last third of the recording.
         diagnosis: of the same recordings and valve: its fits are gone on from, so that nothing ends worse than there.
         seed: of the searches.
@@ -170,58 +175,47 @@ def extend(
         )
     else:
         before = diagnosis.base.fit
-    after = fit(
-        train,
-        valve,
-        effects=tuple(effects),
-        base=before,
-        seed=seed,
-        workers=workers,
-        progress=lambda done: tell(f"fitting with {', '.join(effects)}", done),
-    )
+    after = before
+    if effects:
+        after = fit(
+            train,
+            valve,
+            effects=tuple(effects),
+            base=before,
+            seed=seed,
+            workers=workers,
+            progress=lambda done: tell(f"fitting with {', '.join(effects)}", done),
+        )
     on = with_pressure_scatter(on, before)
-    there_already = diagnosis.fit_with(effects) if diagnosis else None
+    there_already = diagnosis.fit_with(effects) if diagnosis and effects else None
     if there_already is not None and there_already.cost < after.cost:
         after = profiled(there_already, train)
-    before_errors, after_errors = block_errors(before, on), block_errors(after, on)
+    before_errors = block_errors(before, on)
+    given = AsGiven.of(valve, on, before).errors
     return Extension(
         effects=tuple(effects),
-        given_train_rmse_m=_rmse_m(valve, on.train, before),
-        given_test_rmse_m=_rmse_m(valve, on.test, before),
+        given_train_rmse_m=given.train_rmse_m,
+        given_test_rmse_m=given.test_rmse_m,
         refitted=before,
         refitted_errors=before_errors,
         extended=after,
-        extended_errors=after_errors,
+        extended_errors=(after_errors := block_errors(after, on) if effects else before_errors),
         gain=gain(before, after, before_errors, after_errors),
         split=on,
     )
 
 
-def extension_of(diagnosis: Diagnosis, valve: ValveFile) -> Extension:
-    """Return what a diagnosis has added to the valve that it began with; nothing is fitted again.
-
-    Args:
-        diagnosis: that named what is missing.
-        valve: as it was given.
-    """
-    before, after, on = diagnosis.base, diagnosis.best, diagnosis.split
+def extension_of(diagnosis: Diagnosis) -> Extension:
+    """Return what a diagnosis has added to the valve that it began with; nothing is fitted again."""
+    before, after, given = diagnosis.base, diagnosis.best, diagnosis.given.errors
     return Extension(
         effects=diagnosis.missing,
-        given_train_rmse_m=_rmse_m(valve, on.train, before.fit),
-        given_test_rmse_m=_rmse_m(valve, on.test, before.fit),
+        given_train_rmse_m=given.train_rmse_m,
+        given_test_rmse_m=given.test_rmse_m,
         refitted=before.fit,
         refitted_errors=before.errors,
         extended=after.fit,
         extended_errors=after.errors,
         gain=gain(before.fit, after.fit, before.errors, after.errors),
-        split=on,
+        split=diagnosis.split,
     )
-
-
-def _rmse_m(valve: ValveFile, part: Part, like: Fit) -> float:
-    """Return what a valve as it is leaves, m, simulated as a fit was."""
-    composition = Composition.from_file(valve)
-    by = like.by.of(part.record, valve.valve)
-    run = FreeRun(composition, part.record, from_pressure=like.from_pressure, by=by)
-    error_m = residual_m(part, run.require_answer(run.position_m(composition.theta)))
-    return float(np.sqrt(np.nanmean(error_m**2)))

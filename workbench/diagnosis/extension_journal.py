@@ -29,16 +29,29 @@ class ExtensionStep(Schema):
     parameters: dict[str, float]
     """All that was fitted."""
 
+    @property
+    def words(self) -> str:
+        """What was done."""
+        return f"{', '.join(self.effects)} added" if self.effects else "refitted, nothing added"
+
+    @property
+    def before_test_rmse_m(self) -> float:
+        """Of the valve before, m, held out: refitted without the effects, or, where none is added, as given."""
+        return self.refitted_test_rmse_m if self.effects else self.given_test_rmse_m
+
     @classmethod
     def of(cls, extension: Extension) -> Self:
         """Return the step that an extension is."""
         length = extension.extended.kind.length
         found, before, after = extension.gain, extension.refitted_errors, extension.extended_errors
+        said = (
+            f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
+            f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
+            f"over all seconds by {found.standard_errors:.3g} standard errors"
+        )
         return cls(
             effects=extension.effects,
-            why=f"evidence {found.bic:.4g}; the error in a typical held-out second goes from "
-            f"{length.number(before.test_block_m, '.4g')} to {length.said(after.test_block_m, '.4g')}, "
-            f"over all seconds by {found.standard_errors:.3g} standard errors",
+            why=said if extension.effects else "the parameters were off",
             given_train_rmse_m=extension.given_train_rmse_m,
             given_test_rmse_m=extension.given_test_rmse_m,
             refitted_train_rmse_m=before.train_rmse_m,
@@ -82,8 +95,8 @@ class Journal(Schema):
     def remarks(self, length: Scale) -> tuple[str, ...]:
         """Return one line a step, lengths as they are read."""
         return tuple(
-            f"step {i}: {', '.join(each.effects)} added; held-out error "
-            f"{length.number(each.refitted_test_rmse_m, '.4g')} to {length.said(each.extended_test_rmse_m, '.4g')} "
+            f"step {i}: {each.words}; held-out error "
+            f"{length.number(each.before_test_rmse_m, '.4g')} to {length.said(each.extended_test_rmse_m, '.4g')} "
             f"rms; {each.why}"
             for i, each in enumerate(self.steps, start=1)
         )

@@ -8,6 +8,7 @@ from sim.effect import Effect
 from workbench.data.clocks import SAME_CLOCK
 from workbench.data.held_out import Split
 from workbench.data.noise_floor import UNKNOWN
+from workbench.diagnosis.as_given import AsGiven
 from workbench.diagnosis.judged_landings import unknown_between_samples
 from workbench.diagnosis.verdict import EXPLAINED, Verdict, by_another_name
 from workbench.fit.fit_result import Fit
@@ -31,15 +32,25 @@ def verdict_line(verdict: Verdict, sentence: str) -> str:
 
 
 def verdict_sentence(
-    verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
+    verdict: Verdict,
+    best: EvaluatedModel,
+    steps: Sequence[EffectStep],
+    library: Mapping[str, Effect],
+    parts: Split,
+    given: AsGiven,
 ) -> str:
     """Return the verdict in one or a few sentences, in the names and units of what was diagnosed."""
-    said = _said(verdict, best, steps, library, parts)
+    said = _said(verdict, best, steps, library, parts, given)
     return best.fit.kind.text(said + (_no_break_away(best.fit) if verdict in EXPLAINED else ""))
 
 
 def _said(
-    verdict: Verdict, best: EvaluatedModel, steps: Sequence[EffectStep], library: Mapping[str, Effect], parts: Split
+    verdict: Verdict,
+    best: EvaluatedModel,
+    steps: Sequence[EffectStep],
+    library: Mapping[str, Effect],
+    parts: Split,
+    given: AsGiven,
 ) -> str:
     length = best.fit.kind.length
     names = " and ".join(step.added.name for step in steps if step.added)
@@ -54,7 +65,7 @@ def _said(
         return f"{begun} {off}{apart}"
     suspicion = _suspicion(steps[-1].suspected)
     if verdict == "adequate":
-        said = _adequate(best.errors, parts, length) + knife_edges_sentence(best.errors, length)
+        said = _adequate(best.errors, parts, length, given) + knife_edges_sentence(best.errors, length)
         return said + suspicion + _scatter(parts, length)
     if verdict == "missing":
         said = f"Missing: {names}; {fell}, and {_left(best.errors, parts, steps[-1].suspected)}."
@@ -124,15 +135,15 @@ def _kept_off(equivalent: EffectCandidate | None, best: EvaluatedModel) -> str:
     )
 
 
-def _adequate(errors: BlockErrors, parts: Split, length: Scale) -> str:
-    """Say that the valve as it is explains the record, and what it leaves of it."""
+def _adequate(errors: BlockErrors, parts: Split, length: Scale, given: AsGiven) -> str:
+    """Say that the valve explains the record, whether it had to be refitted for that, and what it leaves of it."""
     after, floors = length.said(errors.test_rmse_m), _floors_left(errors, parts)
-    if floors <= NOISE_KNOWN_TO:
-        return f"Nothing is missing: no effect lowers the held-out error of {after} as it must."
-    return (
-        f"Nothing is missing that an effect here would explain: none lowers the held-out error of {after} as it must; "
-        f"what is left are {floors:.2g} floors."
-    )
+    much = floors > NOISE_KNOWN_TO
+    left = f" What is left is {floors:.2g} times the floor: no effect here explains it." if much else ""
+    if given.is_off(errors):
+        fell = f"from {length.number(given.errors.test_rmse_m)} to {after}"
+        return f"No effect is missing: the parameters were off. Refitted, the held-out error falls {fell}.{left}"
+    return f"Nothing is missing: no effect lowers the held-out error, {after}, by more than chance may.{left}"
 
 
 def _floors_left(errors: BlockErrors, parts: Split) -> float:
@@ -145,8 +156,8 @@ def _left(errors: BlockErrors, parts: Split, suspected: Sequence[EffectCandidate
     if floors <= NOISE_KNOWN_TO:
         return "nothing is left to explain"
     if suspected:
-        return f"what is left, {floors:.2g} floors, no other effect is proved to explain"
-    return f"what is left, {floors:.2g} floors, no other effect here explains"
+        return f"{floors:.2g} times the floor are left, which no other effect is proved to explain"
+    return f"{floors:.2g} times the floor are left, which no other effect here explains"
 
 
 def _unproved(

@@ -188,7 +188,10 @@ def _verdict(
             f"strokes repeat each other to {floor_n:.3g} N.{part}"
         )
     if not names:
-        return "adequate", f"Nothing is missing: no effect lowers the held-out error of {after_n:.3g} N as it must."
+        return (
+            "adequate",
+            f"Nothing is missing: no effect lowers the held-out error, {after_n:.3g} N, by more than chance may.",
+        )
     open_end = "" if floor_n is not None else " What is left is not judged: the curve passes each place once."
     if rivals:
         return "one_of", f"Missing: {names}, or another that does as well; {fell}.{rivals}{open_end}"

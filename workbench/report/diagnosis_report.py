@@ -119,7 +119,7 @@ def _facts(diagnosis: Diagnosis, validation: _Validation) -> str:
 
 def _verdict(diagnosis: Diagnosis, validation: _Validation) -> Html:
     return verdict(
-        *headline(diagnosis.verdict, diagnosis.missing),
+        *headline(diagnosis.verdict, diagnosis.missing, parameters_off=diagnosis.parameters_off),
         text(diagnosis.sentence, "Where the model failed before:"),
         bullets(validation.base.sentences),
     )

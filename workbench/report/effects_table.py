@@ -15,7 +15,7 @@ VERDICTS = {
     "adequate": ("good", "Nothing is missing that this recording could show."),
     "missing": ("good", "The missing effect is found."),
     "one_of": ("open", "It is one of several effects; this recording does not tell which."),
-    "unexplained": ("bad", "Something is missing that the library of effects does not have."),
+    "unexplained": ("bad", "Something is missing that no effect here explains."),
     "unjudged": ("open", "Of this recording nobody can say whether anything is missing."),
     "unfinished": ("open", "Broken off: this is what was known by then."),
     "untrusted": ("bad", "The fit is not to be trusted: searches from different starts disagree."),
@@ -33,8 +33,10 @@ class RankedStep:
     tried: Sequence[RankedEffect]
 
 
-def headline(verdict: str, missing: Sequence[str]) -> tuple[str, str]:
-    """Return how a verdict is marked, and its first words."""
+def headline(verdict: str, missing: Sequence[str], *, parameters_off: bool = False) -> tuple[str, str]:
+    """Return how a verdict is marked, and its first words; `parameters_off`: nothing is missing, once refitted."""
+    if parameters_off:
+        return "open", "No effect is missing: the parameters were off."
     if verdict == "missing" and len(missing) > 1:
         return "good", "The missing effects are found."
     return VERDICTS[verdict]

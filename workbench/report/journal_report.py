@@ -49,7 +49,7 @@ def report_journal(journal: Journal, path: Path, name: str, kind: Kind) -> None:
         f"Error on held-out data {read.said(last.extended_test_rmse_m)} rms, "
         f"{times(last.extended_test_rmse_m, last.floor_m)} the floor"
     )
-    better = last.extended_test_rmse_m < last.refitted_test_rmse_m
+    better = last.extended_test_rmse_m < last.before_test_rmse_m
     write(
         path,
         f"{kind.noun} {name}: how its model grew",
@@ -92,13 +92,15 @@ def _stages(steps: Sequence[ExtensionStep]) -> list[tuple[str, float, float]]:
         ("refitted", first.refitted_train_rmse_m, first.refitted_test_rmse_m),
     ]
     for i, each in enumerate(steps, start=1):
-        stages.append((f"{i}: + {', '.join(each.effects)}", each.extended_train_rmse_m, each.extended_test_rmse_m))
+        if i > 1 or each.effects:
+            named = f"+ {', '.join(each.effects)}" if each.effects else "refitted"
+            stages.append((f"{i}: {named}", each.extended_train_rmse_m, each.extended_test_rmse_m))
     return stages
 
 
 def _remark(number: int, step: ExtensionStep, read: Reading) -> str:
     return (
-        f"step {number}, {', '.join(step.effects)} added: held-out error {read.length(step.refitted_test_rmse_m).text} "
+        f"step {number}, {step.words}: held-out error {read.length(step.before_test_rmse_m).text} "
         f"to {read.said(step.extended_test_rmse_m)}"
     )
 
@@ -114,7 +116,7 @@ def _step(number: int, step: ExtensionStep, read: Reading) -> Html:
         rows.append(Row([words, Shown(f"{factor * value:.4g}", f"{read.kind.text(name)} = {value:.6g}"), unit]))
     return section(
         f"step-{number}",
-        f"ExtensionStep {number}: {', '.join(step.effects)}",
+        f"Step {number}: {step.words}",
         text(f"Why: {step.why}."),
         subheading("What was fitted"),
         table(f"table-step-{number}", ["Parameter", "Value", "Unit"], rows),

@@ -63,26 +63,29 @@ class Gain:
         least = COMPLETE if complete else least
         however_small = complete and self.standard_errors > LEAST_STANDARD_ERRORS
         if self.bic <= LEAST_BIC:
-            return f"evidence {self.bic:.3g} on the fitted part, more than {LEAST_BIC:g} needed"
+            return f"may be chance: evidence {self.bic:.3g}, more than {LEAST_BIC:g} needed"
         independent = LEAST_BIC if at_floor else LEAST_INDEPENDENT
         surely_held_out = not at_floor and self.standard_errors > AT_THE_FLOOR
         if self.independent_bic <= independent and not surely_held_out:
             return (
-                f"evidence {self.bic:.3g} on the fitted part, of whose samples {100 * self.independent_share:.2g} % "
-                f"are independent: {self.independent_bic:.2g}, more than {independent:g} needed"
+                f"may be chance: neighbouring samples err alike, so evidence {self.bic:.3g} counts for "
+                f"{self.independent_bic:.2g}, more than {independent:g} needed"
             )
         if self.held_out <= LEAST_REDUCTION and not however_small:
             way = "falls" if self.held_out >= 0.0 else "rises"
             changes = f"the held-out error {way} by {100 * abs(self.held_out):.2g} %"
             return f"{changes}, a fall of more than {100 * LEAST_REDUCTION:g} % needed"
         if self.standard_errors <= least:
-            return f"the held-out error falls by {self.standard_errors:.2g} standard errors, more than {least:g} needed"
+            return (
+                f"may be chance: the held-out error falls by {self.standard_errors:.2g} times its own uncertainty, "
+                f"more than {least:g} needed"
+            )
         return ""
 
 
 def no_better(first: str) -> str:
     """Say why an effect is refused that comes after another and has not `LEAST_BIC` more evidence."""
-    return f"explains no better than {first}, after which it is tried"
+    return f"explains no better than {first}, which is tried before it"
 
 
 def gain(

@@ -147,11 +147,20 @@ class EffectSearch:
         return tuple(self._asked_beside(each, steps[i:]) for i, each in enumerate(steps, start=1))
 
     def so_far(self, base: EvaluatedModel) -> tuple[EffectStep, ...]:
-        """Return the steps made so far, and the one being made as far as it has come; for a search broken off."""
+        """Return the steps made so far, and the one being made as far as it has come; for a search broken off.
+
+        What is tried beside other effects than those that the steps have added, to judge one of them anew, is left out.
+        """
         known = self._known
-        before = known.before or base
-        models = {name: each for name, each in known.models.items() if name not in before.effects}
+        before = (_best(known.steps[-1]) if known.steps else known.before) or base
+        models = {name: each for name, each in known.models.items() if self._is_beside(before, name, each)}
         return (*known.steps, judged_step(before, models, len(known.steps) + 1, self._library))
+
+    def _is_beside(self, before: EvaluatedModel, name: str, tried: EvaluatedModel | str) -> bool:
+        """Whether a model is that before it with the named effect added, and nothing else."""
+        if isinstance(tried, str):
+            return name not in before.effects
+        return sorted(tried.effects) == sorted((*before.effects, self._library[name].name))
 
     def _forward(self, steps: list[EffectStep], here: EvaluatedModel) -> list[EffectStep]:
         """Go on from the model that the steps so far have come to."""

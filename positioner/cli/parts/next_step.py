@@ -25,9 +25,10 @@ def extend_commands(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> li
 
 
 def extend_command(effects: Sequence[str], arguments: argparse.Namespace) -> str:
-    """Return the `positioner extend` command that adds effects to the valve of a diagnosis or a discovery."""
+    """Return the `positioner extend` command that adds effects, or none, to the valve of a diagnosis or a discovery."""
     fitted = ["--fit", *map(str, arguments.recordings), *_besides(arguments), *_driven(arguments)]
-    return shlex.join(["positioner", "extend", arguments.valve, "--effect", *effects, *fitted, "-o", OUT])
+    adding = ["--effect", *effects] if effects else []
+    return shlex.join(["positioner", "extend", arguments.valve, *adding, *fitted, "-o", OUT])
 
 
 def discover_command(arguments: argparse.Namespace) -> str:

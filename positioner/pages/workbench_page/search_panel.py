@@ -205,7 +205,7 @@ class SearchPanel:
         diagnosis: Diagnosis = search.result
         self._result.clear()
         may_add = search.journal == len(self._desk.journal)
-        kind, first = headline(diagnosis.verdict, diagnosis.missing)
+        kind, first = headline(diagnosis.verdict, diagnosis.missing, parameters_off=diagnosis.parameters_off)
         with self._result:
             plain = self._desk.plain
             ui.label(plain(first)).classes("text-weight-medium").props(f'data-testid="found" data-kind="{kind}"')
@@ -213,7 +213,7 @@ class SearchPanel:
             with ui.row():
                 for effects in diagnosis.choices if may_add else ():
                     named = plain(", ".join(effects))
-                    button = ui.button(f"Add {named}", icon="add")
+                    button = ui.button(f"Add {named}" if named else "Take the fitted parameters", icon="add")
                     button.on_click(lambda effects=effects: self._add(search, effects))
                     button.props('no-caps data-testid="add"')
             if diagnosis.experiment is not None:
@@ -253,11 +253,11 @@ class SearchPanel:
 
     async def _add(self, search: Search, effects: Sequence[str]) -> None:
         """Add what was found: what is sure is not fitted again, one of several is."""
-        if search.result.verdict != "missing":
+        if not search.result.sure or effects != search.result.choices[0]:
             self._extend(effects)
             return
         with errors_told():
-            extension = await aside(extension_of, search.result, search.valve)
+            extension = await aside(extension_of, search.result)
             await aside(self._desk.add, extension)
             self._changed("journal")
 

@@ -1,0 +1,44 @@
+"""What a valve file leaves of a recording as it was given, before any parameter is fitted.
+
+holds     second by second it does no worse than the model that was found: whatever a fit would rather have, the
+          recording does not refute the file
+is off    it does worse, and leaves more than `compare` calls adequate: where the refitted valve explains all, no
+          effect is missing
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from config.results.result import Brief
+from config.valve_file import ValveFile
+from workbench.compare.comparison import ADEQUATE
+from workbench.data.held_out import Split, residual_m
+from workbench.fit.fit_result import Fit
+from workbench.select.block_errors import BlockErrors, block_errors, indistinguishable
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class AsGiven(Brief):
+    """The errors of a valve file as it was given; the floor, m, None if it is unknown."""
+
+    errors: BlockErrors
+    floor_m: float | None
+
+    @classmethod
+    def of(cls, valve: ValveFile, split: Split, like: Fit) -> Self:
+        """Simulate a valve file as a fit was."""
+        given = replace(like, valve=valve, parameters={})
+        error_m = residual_m(split.train, given.indicated_m(split.train.record))
+        given = replace(given, rms_m=float(np.sqrt(np.nanmean(error_m**2))))
+        return cls(block_errors(given, split), split.floor_m)
+
+    def holds(self, best: BlockErrors) -> bool:
+        """Whether the recording does not tell the file from the model that was found, whose errors these are."""
+        return indistinguishable(best.all_logs, self.errors.all_logs)
+
+    def is_off(self, best: BlockErrors) -> bool:
+        """Whether it leaves what `compare` would not call adequate, and the model that was found does better."""
+        most_m = max(self.errors.train_rmse_m, self.errors.test_rmse_m)
+        return self.floor_m is not None and most_m > ADEQUATE * self.floor_m and not self.holds(best)
