@@ -14,7 +14,7 @@ from itertools import product
 
 from positioner.cli.parts.flow_cases import FlowCase, virtual_outcome
 from positioner.cli.parts.flow_demo import PERIODS_S
-from positioner.control.conventional_law import ConventionalSettings
+from positioner.control.laws.conventional.conventional_law import ConventionalSettings
 from positioner.control.settings import Settings
 from positioner.virtual.flow_course import FlowFigures
 
@@ -43,9 +43,9 @@ def figures_of_conventional(period_s: float, gain: float, rate_per_s: float) -> 
     """Return the figures of a conventional positioner so tuned."""
 
     def tuned(settings: Settings) -> Settings:
-        law = settings.law_with_memory
+        law = settings.law
         assert isinstance(law, ConventionalSettings)
-        return replace(settings, law_with_memory=replace(law, gain=gain, integral_rate_per_s=rate_per_s))
+        return replace(settings, law=replace(law, gain=gain, integral_rate_per_s=rate_per_s))
 
     return virtual_outcome(FlowCase("conventional", period_s), tuned).figures
 

@@ -25,8 +25,8 @@ left for an hour at its last reference, and changes of the command after the fir
 without a limit cycle. With `--disturbance 0.01` the I/P meanwhile drifts to and fro by 1 % of the bench range, once in
 `DRIFTS_S`: what moves the stem has to be answered, what does not, not. With `--reference-noise 2e-4` a DCS writes every
 `WRITTEN_S` a reference that is off by that share of the stroke, a standard deviation; what the stem travels in that
-time stands beside the changes. `--steps 0` only identifies, in seconds a valve. `--law moves` has the law that chooses
-the move, and a staircase at every period. `--periods-ms 1 20` gives every valve each of these in place of its own.
+time stands beside the changes. `--steps 0` only identifies, in seconds a valve. `--law conventional` has
+another law. `--periods-ms 1 20` gives every valve each of these in place of its own.
 """
 
 import argparse
@@ -40,6 +40,7 @@ import numpy as np
 from benchmarks.small_moves import Late
 from config.codes import Mode
 from config.daemon_file import DaemonFile
+from config.law_names import law_names
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile
 from drivers.boundary import NoReply, Reading
@@ -443,7 +444,7 @@ def main() -> None:
     parser.add_argument("--left-alone-s", type=float, default=0.0)
     parser.add_argument("--disturbance", type=float, default=0.0, help="of an I/P that drifts, over the bench range")
     parser.add_argument("--reference-noise", type=float, default=0.0, help="of the stroke, every 0.5 s, meanwhile")
-    parser.add_argument("--law", choices=("slides", "moves"), default="slides")
+    parser.add_argument("--law", choices=law_names(), default="slides")
     parser.add_argument("--periods-ms", type=float, nargs="+", default=[], help="in place of the valves' own")
     arguments = parser.parse_args()
     alone = Alone(arguments.left_alone_s, arguments.disturbance, arguments.reference_noise)

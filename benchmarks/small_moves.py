@@ -1,4 +1,4 @@
-"""Small moves: the three laws on the same random steps of the seed's valve, in one run.
+"""Small moves: the seed's law and slides on the same random steps of the seed's valve, in one run.
 
     python -m benchmarks.small_moves [--steps 100] [--rest-s 120] [--seed 0] [--laws NAME...]
     python -m benchmarks.small_moves --following [--noise-pu 1e-4] [--seed 0]
@@ -13,14 +13,13 @@ column of the first is the processor time of one step of the control core, on av
 
 `--following` prints another table alone: a DCS that writes every 0.5 s, first a ramp of 1 % of stroke a second up and
 down for a minute, then for another the noise of a controller's output, steps of 0.2 % (standard deviation) about 60 %.
-All three laws have the valve's true numbers there, typed in, for a sine identifies nothing in a slow loop.
+Both laws have the valve's true numbers there, typed in, for a sine identifies nothing in a slow loop.
 """
 
 import argparse
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import inf, log
 from typing import Any, Literal
 
 import numpy as np
@@ -32,7 +31,6 @@ from config.valve_file import ValveFile, load_valve, shipped_valve
 from drivers.in_memory import MemoryDriver
 from positioner.control.controller import Controller
 from positioner.control.controller_memory import Decision
-from positioner.control.pulse import Pulse, unidentified_response
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
@@ -50,7 +48,7 @@ LOWEST, HIGHEST = 0.4, 0.9
 SMALLEST, LARGEST = 1e-3, 0.1
 
 
-Law = Literal["seed", "breakaway", "slides", "moves"]
+Law = Literal["seed", "conventional", "slides"]
 WRITTEN_S, FOLLOWED_S = 0.5, 60.0
 RAMP_PER_S, WANDER = 0.01, 2e-3
 """Of the stroke."""
@@ -61,8 +59,8 @@ KNOWN = {
     "b_over_c_pa_per_m": -SEED.spring_n_per_m / SEED.diaphragm_area_m2,
     "k_over_c_pa": -SEED.coulomb_n / SEED.diaphragm_area_m2,
 }
-LAWS: tuple[Law, ...] = ("seed", "breakaway", "slides", "moves")
-SLIDES: tuple[Law, ...] = ("slides", "moves")
+LAWS: tuple[Law, ...] = ("seed", "slides")
+SLIDES: tuple[Law, ...] = ("slides",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,23 +304,8 @@ def following(seed: int, noise_pu: float, laws: Sequence[Law], periods_s: Sequen
             yield f"{1e3 * period_s:4g} ms {law:>10}{said}"
 
 
-def shortest_lines() -> Iterator[str]:
-    """Yield what the shortest pulse does, by the true parameters: no law with this loop can make a smaller move."""
-    omega = (SEED.spring_n_per_m / SEED.mass_kg) ** 0.5
-    zeta = SEED.viscous_ns_per_m / (2 * SEED.mass_kg * omega)
-    known = replace(unidentified_response(0.0), theta=(log(omega), log(zeta), 0.0, 0.0))
-    push_m = (SEED.static_n - SEED.coulomb_n) / SEED.spring_n_per_m
-    middle_m = -SEED.coulomb_n / SEED.spring_n_per_m
-    yield "shortest pulse, % of stroke: push of one period just above F_s, and 10 % of F_s - F_c more; then braked"
-    for period_s in (5e-4, 1e-3, 2e-3, 5e-3, 1e-2):
-        ends = (known.end(Pulse(f * push_m, middle_m, period_s, 1), inf).travel_m for f in (1.0, 1.1))
-        yield f"{1e3 * period_s:7g} ms" + "".join(f"{100 * end_m / STROKE_M:9.3f}" for end_m in ends)
-
-
 def report(steps: int, rest_s: float, seed: int, laws: Sequence[Law]) -> Iterator[str]:
-    """Yield lines: the shortest pulses, the table of steps, the table of rests."""
-    yield from shortest_lines()
-    yield ""
+    """Yield lines: the table of steps, the table of rests."""
     yield f"{steps} steps, % of stroke; ov.: overshoot; then the share of steps that end so near, %"
     yield f"{'':34}{'law':>10}{HEAD}"
     for case in CASES:

@@ -14,7 +14,7 @@ Its files:
     device, canopen_device                        table [device], on Modbus and on CANopen
     supervision_table, record_tables              tables [safety] and [supervision]; [recorder] and [history]
     hosts, serial_port, tls_table                 where it is, and how it is secured
-    bus_plugins, extras                           buses of other packages; which package is not installed
+    bus_plugins, law_names, extras                buses of other packages; laws; which package is not installed
     quantities, modbus_map, register_format       what a device measures and obeys; its registers; values in words
     registers, codes, roles                       the supervisory table; every code and its text; who may write
     passwords, role_passwords                     passwords as they are kept; the file with those of the roles

@@ -105,7 +105,7 @@ class InhibitReason(Code):
     EXCITATION_TOO_LONG = 6, "excitation too long"
     AMPLITUDE_ZERO = 7, "amplitude is zero"
     LAW_BEYOND_LIMITS = 8, "the law asks for a pressure beyond the limits"
-    STUCK = 9, "stuck: the strongest pulse allowed does not move the stem"
+    STUCK = 9, "stuck: the longest slide allowed does not move the stem"
     TRIM_ENDED = 10, "the trim ended outside its dead band"
     EXCURSION_BEYOND_LIMIT = 11, "a small move needs an excursion beyond the limit set"
     EXCURSION_WAITS = 12, "a small move waits, for the last excursion was too recent"

@@ -13,12 +13,13 @@ from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, IPvAnyNetwork, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, IPvAnyNetwork, model_validator
 
 from config.bus_plugins import AnyDevice
 from config.device import Host, ModbusTcpDevice
 from config.errors import InputError
 from config.file_kinds import require_kind
+from config.law_names import one_of_the_laws
 from config.loading import (
     FolderName,
     Fraction,
@@ -99,8 +100,8 @@ class IdentificationTable(Schema):
         return self
 
 
-BY_SLIDES = ("slides", "moves")
-"""Laws that identify by a staircase of slides."""
+BY_A_SINE = "seed"
+"""The law that identifies by a sine, as its paper does, where nobody says; all others by a staircase of slides."""
 NARROWEST_WINDOW = 0.2
 """Of the stroke, for a staircase."""
 
@@ -179,15 +180,13 @@ class LawTable(Schema):
 class ControlTable(Schema):
     """Table `[control]`: which law follows the reference, and what it may do."""
 
-    law: Literal["seed", "moves", "breakaway", "slides", "conventional"] = "seed"
+    law: Annotated[str, AfterValidator(one_of_the_laws)] = "seed"
     dead_band: Annotated[float, Field(gt=0, le=0.1)] = 5e-4
     """Error at rest that is left alone, as a fraction of the stroke."""
     cutoff_low: Annotated[float, Field(gt=0, le=0.25)] | None = None
     """Reference below which the stem is pressed onto its lower stop, as a fraction of the stroke; else it never is."""
     cutoff_high: Annotated[float, Field(ge=0.75, lt=1)] | None = None
     """Reference above which it is pressed onto its upper stop."""
-    push_limit_pa: Positive | None = None
-    """The most a pulse may push beyond the balance of the moving stem; F_c / A as identified where nobody says."""
     excursion_limit: Fraction = 0.2
     """How far the law of slides may take the stem beyond a small move, as a share of the stroke."""
     excursion_interval_s: NonNegative = 0.0
@@ -316,9 +315,9 @@ class DaemonFile(Schema):
     def by_slides(self) -> bool:
         """Whether S3 excites by a staircase of slides.
 
-        Where nobody says, laws that slide do: at any period, and whatever the valve has that the seed's model lacks.
+        Where nobody says, all laws but the seed's do: at any period, and whatever the valve has that its model lacks.
         """
-        asked = self.excitation.kind or ("staircase" if self.control.law in BY_SLIDES else "sine")
+        asked = self.excitation.kind or ("sine" if self.control.law == BY_A_SINE else "staircase")
         return asked == "staircase"
 
 

@@ -14,8 +14,7 @@ from positioner.control.controller_memory import ConsumedRequests, ControllerMem
 from positioner.control.cutoffs import HIGH, WITHIN, sent_to_m
 from positioner.control.excitation import NOTHING, ActiveExcitation, climbed, excitation_after
 from positioner.control.identifying import estimates_tested, identify
-from positioner.control.law_memory import LawInput, LawMemory, after_step, first_memory
-from positioner.control.law_memory import held_pa as held_by_law_pa
+from positioner.control.laws.boundary import Law, Seen
 from positioner.control.monitors import MonitorMemory, after_cycle
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
 from positioner.control.pressure_path import PathMemory, long_held
@@ -26,7 +25,7 @@ from positioner.control.sample import Sample
 from positioner.control.settings import Settings
 from positioner.control.states import Situation, law_inhibit_reason, state_in
 from positioner.control.supervision import NO_FAULT, SupervisionMemory, supervise, usable
-from positioner.control.valve_knowledge import ValveKnowledge, known, with_learnt
+from positioner.control.valve_knowledge import ValveKnowledge, known
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
 from positioner.estimation.landings.static_identification import StaticIdentification
@@ -57,7 +56,9 @@ class Controller:
         self._settings = settings
         self._identification = Identification(settings.identification, refiner)
         self._statics = StaticIdentification(settings.limits.stroke_m, valve=settings.valve)
+        law = settings.law.begin(held_pa)
         if restored is not None:
+            law = law.restored(restored)
             self._statics.restore(restored.landings, restored.held, restored.answers)
         self._memory = ControllerMemory(
             command_pa=held_pa,
@@ -72,7 +73,7 @@ class Controller:
             excitation=None,
             experiment=PlayedExperiment(),
             identifying=False,
-            law=with_learnt(first_memory(settings.law_with_memory, held_pa), restored, settings.limits.stroke_m),
+            law=law,
             path=long_held(held_pa) if settings.valve is not None and settings.valve.inverse.delays else None,
             restoration=Restoration.of(restored, settings.valve),
             cut_off=WITHIN,
@@ -86,7 +87,7 @@ class Controller:
     @property
     def left_pa(self) -> float:
         """What it holds from now on if it is left: no push, and no lead."""
-        return held_by_law_pa(self._memory.law, self._memory.wanted_pa)
+        return self._memory.law.interrupted_pa(self._memory.wanted_pa)
 
     @property
     def knowledge(self) -> ValveKnowledge | None:
@@ -101,9 +102,9 @@ class Controller:
         # What is kept says where slides balance; of a stem that swings past that, it would not agree with a landing.
         if memory.applied.ratios is None or not found or exciting or self._statics.law.swing:
             return None
-        settings, estimates = self._settings, self._identification.estimates
-        stroke_m = settings.limits.stroke_m
-        return known(memory.applied.ratios, estimates, self._statics, memory.law, stroke_m, settings.valve)
+        settings, statics, estimates = self._settings, self._statics, self._identification.estimates
+        seen = known(memory.applied.ratios, estimates, statics, settings.limits.stroke_m, settings.valve)
+        return memory.law.known(seen, statics)
 
     def step(self, sample: Sample, requests: Requests) -> Decision:
         """Decide on one sample."""
@@ -159,20 +160,18 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     held_pa = _held_pa(now, state, supervision)
     cut_off = settings.cutoffs.after(memory.cut_off, reference.value_m) if state in FOLLOWING else WITHIN
     follows = state in FOLLOWING and cut_off == WITHIN
-    law = _law_memory(now, reference, applied.ratios if follows else None, outcome, restoration)
+    law = _law(now, reference, applied.ratios if follows else None, outcome)
 
     asked_pa = _asked_pa(now, consumed, supervision, held_pa)
     if asked_pa is None:
         exciting = experiment if experiment.commands else excitation
-        asked_pa = _pressure_pa(now, state, held_pa, exciting, reference, applied, law, cut_off)
+        asked_pa = _pressure_pa(now, state, held_pa, exciting, law, cut_off)
     limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
     wanted_pa = settings.delivered_pa(limited_pa)
     path = _path(now, wanted_pa, lead=not supervision.fault and follows)
     command_pa = wanted_pa if path is None else path.command_pa
 
-    by_law = NOTHING if law is None else law.inhibit_reason
-    if cut_off != WITHIN:
-        by_law = InhibitReason.CUT_OFF
+    by_law = InhibitReason.CUT_OFF if cut_off != WITHIN else law.inhibit_reason
     inhibit_reason = (
         excitation_inhibit
         or (NOTHING if experiment.commands or excitation is None else excitation.waits_for(now.statics))
@@ -180,40 +179,40 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
         or (by_law if limited_pa == asked_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
     decision = Decision(
-        command_pa,
-        state,
-        supervision.mode,
-        supervision.fault,
-        inhibit_reason,
-        reference.value_m,
-        reference.delta_m,
-        sample.now_s - supervision.good_s,
-        estimates_tested(excitation, now.identification, now.statics),
-        applied,
-        now.statics.law,
-        restoration,
-        experiment,
-        monitoring.holding,
-        supervision.position_m is not None,
-        cut_off,
+        command_pa=command_pa,
+        state=state,
+        mode=supervision.mode,
+        fault=supervision.fault,
+        inhibit_reason=inhibit_reason,
+        reference_m=reference.value_m,
+        delta_r_m=reference.delta_m,
+        sample_age_s=sample.now_s - supervision.good_s,
+        estimates=estimates_tested(excitation, now.identification, now.statics),
+        applied=applied,
+        static_law=now.statics.law,
+        restoration=restoration,
+        experiment=experiment,
+        alarms=monitoring.holding,
+        measured=supervision.position_m is not None,
+        cut_off=cut_off,
     )
     return ControllerMemory(
-        command_pa,
-        wanted_pa,
-        held_pa,
-        supervision,
-        monitoring,
-        reference,
-        applied,
-        consumed,
-        state,
-        excitation,
-        experiment,
-        identifying,
-        law,
-        path,
-        restoration,
-        cut_off,
+        command_pa=command_pa,
+        wanted_pa=wanted_pa,
+        held_pa=held_pa,
+        supervision=supervision,
+        monitoring=monitoring,
+        reference=reference,
+        applied=applied,
+        consumed=consumed,
+        state=state,
+        excitation=excitation,
+        experiment=experiment,
+        identifying=identifying,
+        law=law,
+        path=path,
+        restoration=restoration,
+        cut_off=cut_off,
     ), decision
 
 
@@ -287,26 +286,20 @@ def _confirmed(
     return memory, found, restoration
 
 
-def _law_memory(
-    now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None, restoration: Restoration
-) -> LawMemory | None:
-    """Return what the law remembers after this sample; its ratios are None where it does not command."""
-    if now.memory.law is None:
-        return None
-    seen = LawInput(
+def _law(now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOutcome | None) -> Law:
+    """Return the law after this sample; its ratios are None where it does not command."""
+    seen = Seen(
         sample=now.sample,
         usable=now.stem_m is not None,
         command_pa=now.memory.wanted_pa,
         reference_m=reference.value_m,
+        direction=(reference.delta_m > 0.0) - (reference.delta_m < 0.0),
         ratios=ratios,
-        estimates=now.identification.estimates,
         outcome=outcome,
         statics=now.statics,
-        stroke_m=now.settings.limits.stroke_m,
         valve=now.settings.valve,
-        provisional=restoration.provisional,
     )
-    return after_step(now.memory.law, now.settings.law_with_memory, seen)
+    return now.memory.law.observe(seen)
 
 
 def _asked_pa(now: Now, consumed: ConsumedRequests, supervision: SupervisionMemory, held_pa: float) -> float | None:
@@ -342,7 +335,7 @@ def _experiment(now: Now, supervision: SupervisionMemory) -> PlayedExperiment:
         excited=requests.eta[0] == 0,
         position_m=supervision.position_m,
         command_pa=memory.command_pa,
-        held_pa=held_by_law_pa(memory.law, memory.wanted_pa),
+        held_pa=memory.law.interrupted_pa(memory.wanted_pa),
     )
     return experiment_after(before, requests.experiment, around, now.settings.experiment)
 
@@ -386,7 +379,7 @@ def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
 def _nothing_known(now: Now, applied: Applied) -> tuple[ControllerMemory, Applied]:
     """Forget what was restored, with all that a law has learnt by it: nothing is left to command by."""
     now.statics.restart()
-    law = first_memory(now.settings.law_with_memory, now.memory.wanted_pa)
+    law = now.settings.law.begin(now.memory.wanted_pa)
     return now.memory._replace(law=law), replace(applied, ratios=None, last_refusal=Refusal.CONTRADICTED_BY_LANDINGS)
 
 
@@ -395,7 +388,7 @@ def _waits(now: Now, mode: Mode) -> bool:
 
     A law that commands all the while has no such moves.
     """
-    return _tries_restored(now, mode) and now.settings.moves_by_single_steps and now.statics.detector.rest is None
+    return _tries_restored(now, mode) and now.settings.law.by_single_steps and now.statics.detector.rest is None
 
 
 def _tries_restored(now: Now, mode: Mode) -> bool:
@@ -467,7 +460,7 @@ def _held_pa(now: Now, state: State, supervision: SupervisionMemory) -> float:
             return sample.pressure_pa
     if state is S3 or memory.state is S3:
         return memory.held_pa
-    return held_by_law_pa(memory.law, memory.wanted_pa)
+    return memory.law.interrupted_pa(memory.wanted_pa)
 
 
 def _pressure_pa(
@@ -475,9 +468,7 @@ def _pressure_pa(
     state: State,
     held_pa: float,
     exciting: ActiveExcitation | PlayedExperiment | None,
-    reference: Reference,
-    applied: Applied,
-    law: LawMemory | None,
+    law: Law,
     cut_off: int,
 ) -> float:
     """Return the pressure of a state, Pa."""
@@ -485,11 +476,4 @@ def _pressure_pa(
         return now.settings.maximum_pa if cut_off == HIGH else now.settings.minimum_pa
     if state is S3 and exciting is not None:
         return exciting.pressure_pa(now.sample.now_s)
-    if state in FOLLOWING and applied.ratios is not None:
-        if law is not None:
-            return law.level_pa
-        s = 1 if state is S1 else -1
-        if now.statics.valve is not None:
-            return now.statics.valve.landing_pa(reference.value_m, s)
-        return now.settings.law(reference.value_m, s, applied.ratios)
-    return held_pa
+    return law.command_pa if state in FOLLOWING else held_pa

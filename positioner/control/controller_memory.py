@@ -6,7 +6,7 @@ from typing import NamedTuple
 from config.codes import Fault, InhibitReason, Mode, State
 from positioner.control.cutoffs import WITHIN
 from positioner.control.excitation import ActiveExcitation
-from positioner.control.law_memory import LawMemory
+from positioner.control.laws.boundary import Law
 from positioner.control.monitors import MonitorMemory
 from positioner.control.played_experiment import PlayedExperiment
 from positioner.control.pressure_path import PathMemory
@@ -44,8 +44,7 @@ class ControllerMemory(NamedTuple):
     excitation: ActiveExcitation | None
     experiment: PlayedExperiment
     identifying: bool
-    law: LawMemory | None
-    """None: a law without a memory."""
+    law: Law
     path: PathMemory | None
     """None: nothing is known of a pressure that arrives late."""
     restoration: Restoration

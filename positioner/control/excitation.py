@@ -12,7 +12,6 @@ too: where the stem is nobody knows, so the command before S3 is held until some
 from dataclasses import dataclass, replace
 
 from config.codes import AUTOMATIC, InhibitReason, Mode
-from positioner.control.balance_law import balance_pa
 from positioner.control.permissives import MEASURED, TIME, ExcitationLimits, missing
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
@@ -108,7 +107,7 @@ def excitation_after(
     alpha_pa = requests.alpha_pa
     if alpha_pa <= 0:
         direction = -1 if reference.delta_m < 0 else 1
-        alpha_pa = held_pa if ratios is None else balance_pa(reference.value_m, direction, ratios)
+        alpha_pa = held_pa if ratios is None else ratios.balance_pa(reference.value_m, direction)
     sine = SineExcitation(alpha_pa, requests.beta_pa, requests.omega_rad_per_s)
     inhibit_reason = sine.problem(settings.minimum_pa, settings.maximum_pa, settings.breakaway_pa)
     if inhibit_reason is not NOTHING:

@@ -8,25 +8,17 @@ from config.codes import Fault
 from config.daemon_file import DaemonFile, LawTable
 from config.extended_valve import ExtendedValve
 from config.supervision_table import FaultActionName
-from positioner.control.balance_law import balance_pa
-from positioner.control.breakaway_memory import BreakawaySettings
-from positioner.control.conventional_law import ConventionalSettings
 from positioner.control.cutoffs import HYSTERESIS, Cutoffs
-from positioner.control.law_memory import LawSettings
+from positioner.control.laws.boundary import LawSettings
+from positioner.control.laws.by_name import law_named
 from positioner.control.monitors import MonitorSettings
-from positioner.control.move_memory import MoveSettings
 from positioner.control.permissives import ExcitationLimits
 from positioner.control.played_experiment import ExperimentLimits
-from positioner.control.slide_memory import DAY_S, SlideSettings
 from positioner.control.staircase_excitation import StaircaseLimits
 from positioner.control.supervision import Limits
 from positioner.estimation.acceptance import Applied, Ratios
 from positioner.estimation.landings.extended_balance import straight_law
 from positioner.estimation.online import IdentificationSettings
-
-LAWS: dict[str, Callable[[float, int, Ratios], float]] = {"seed": balance_pa}
-"""The laws without a memory, by name: reference, m, direction, +1 up or -1 down, and ratios in; pressure, Pa, out.
-Laws with a memory are in `WITH_MEMORY`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +35,7 @@ class Settings:
     identification: IdentificationSettings
     applied: Applied
     """What the law may use before anything was identified."""
-    law: Callable[[float, int, Ratios], float]
-    """Without a memory, see `LAWS`; what commands unless `law_with_memory` does."""
-    law_with_memory: LawSettings | None
+    law: LawSettings
     cutoffs: Cutoffs
     staircase: StaircaseLimits | None
     """Of the excitation by slides; None: it is a sine."""
@@ -54,11 +44,6 @@ class Settings:
     """The command, Pa, that the device can be told in place of one."""
     valve: ExtendedValve | None
     """Whose static inverse the laws work with, in place of a straight law."""
-
-    @property
-    def moves_by_single_steps(self) -> bool:
-        """Whether the law commands a pressure and waits for what it does."""
-        return self.law_with_memory is None or isinstance(self.law_with_memory, MoveSettings | SlideSettings)
 
     @classmethod
     def of(cls, file: DaemonFile, valve: ExtendedValve | None = None) -> "Settings":
@@ -103,10 +88,7 @@ class Settings:
                 derivative_window_s=identification.derivative_window_s,
             ),
             applied=Applied(_ratios(file.law) if valve is None else straight_law(valve)),
-            law=LAWS.get(file.control.law, balance_pa),
-            law_with_memory=WITH_MEMORY[file.control.law](_within_supply(file, valve))
-            if file.control.law in WITH_MEMORY
-            else None,
+            law=law_named(file.control.law).of(_within_supply(file, valve)),
             cutoffs=_cutoffs(file),
             staircase=_staircase(file) if file.by_slides else None,
             experiment=_experiment(file),
@@ -146,52 +128,6 @@ def _within_supply(file: DaemonFile, valve: ExtendedValve | None) -> DaemonFile:
         "maximum_pa": min(file.pressure.maximum_pa, valve.inverse.most_pa),
     }
     return file.model_copy(update={"pressure": file.pressure.model_copy(update=pressure)})
-
-
-def _breakaway(file: DaemonFile) -> BreakawaySettings:
-    return BreakawaySettings(
-        stroke_m=file.valve.stroke_m,
-        dead_band_m=file.control.dead_band * file.valve.stroke_m,
-        minimum_pa=file.pressure.minimum_pa,
-        maximum_pa=file.pressure.maximum_pa,
-        breakaway_pa=file.valve.breakaway_pa,
-        push_limit_pa=file.control.push_limit_pa,
-    )
-
-
-def _slides(file: DaemonFile) -> SlideSettings:
-    return SlideSettings(
-        stroke_m=file.valve.stroke_m,
-        dead_band_m=file.control.dead_band * file.valve.stroke_m,
-        minimum_pa=file.pressure.minimum_pa,
-        maximum_pa=file.pressure.maximum_pa,
-        breakaway_pa=file.valve.breakaway_pa,
-        excursion_limit_m=file.control.excursion_limit * file.valve.stroke_m,
-        excursion_interval_s=file.control.excursion_interval_s,
-        budget_m_per_s=file.control.excursion_budget_strokes_per_day * file.valve.stroke_m / DAY_S,
-        command_step_pa=file.device.command_step_pa,
-    )
-
-
-def _moves(file: DaemonFile) -> MoveSettings:
-    return MoveSettings(_breakaway(file), _slides(file))
-
-
-def _conventional(file: DaemonFile) -> ConventionalSettings:
-    return ConventionalSettings(
-        dead_band_m=file.control.dead_band * file.valve.stroke_m,
-        minimum_pa=file.pressure.minimum_pa,
-        maximum_pa=file.pressure.maximum_pa,
-    )
-
-
-WITH_MEMORY: dict[str, Callable[[DaemonFile], LawSettings]] = {
-    "moves": _moves,
-    "breakaway": _breakaway,
-    "slides": _slides,
-    "conventional": _conventional,
-}
-"""The laws with a memory, by name, and their settings of a file; `law_memory.py` runs them."""
 
 
 def _cutoffs(file: DaemonFile) -> Cutoffs:

@@ -8,18 +8,12 @@ from dataclasses import dataclass, field, replace
 from math import isfinite, sqrt
 
 from config.extended_valve import ExtendedValve
-from positioner.control.breakaway_memory import BreakawayMemory, LearntPush
-from positioner.control.law_memory import LawMemory
-from positioner.control.margins_over_travel import with_margins_at
-from positioner.control.move_memory import MoveMemory
-from positioner.control.slide_balance import Balance
-from positioner.control.slide_margins import Margins
-from positioner.control.slide_memory import SlideMemory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, Estimates
 from positioner.estimation.landings.extended_balance import extended_scatter_m
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 from positioner.estimation.landings.parting import FINEST
+from positioner.estimation.landings.slide_margins import Margins
 from positioner.estimation.landings.static_identification import StaticIdentification
 
 Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
@@ -45,7 +39,6 @@ class ValveKnowledge:
         landings, held: slides that landed and changes of the command that moved nothing, the latest first.
         answers: how long the stem takes to answer.
         margins: of the law of slides, at the middle of the travel.
-        pushes: of the law for small moves by pulses, up and down.
         tracked: what else is followed, by name, for whoever knows the name.
     """
 
@@ -56,7 +49,6 @@ class ValveKnowledge:
     held: tuple[SlideOutcome, ...] = ()
     answers: Answers = UNANSWERED
     margins: Margins | None = None
-    pushes: tuple[LearntPush, LearntPush] | None = None
     tracked: Mapping[str, float] = field(default_factory=dict)
 
     def landing_m(self, command_pa: float, direction: int) -> float:
@@ -87,26 +79,19 @@ class ValveKnowledge:
 
 
 def known(
-    ratios: Ratios,
-    estimates: Estimates,
-    statics: StaticIdentification,
-    law: LawMemory | None,
-    stroke_m: float,
-    valve: ExtendedValve | None,
+    ratios: Ratios, estimates: Estimates, statics: StaticIdentification, stroke_m: float, valve: ExtendedValve | None
 ) -> ValveKnowledge:
-    """Return what a controller knows of its valve.
+    """Return what a controller knows of its valve; what its law has learnt is for the law to add.
 
     Args:
         ratios: in use.
         estimates: from motions, the latest.
         statics: from landings.
-        law: the memory of the law in force.
         stroke_m: full travel.
         valve: the extended valve that the law works with, if there is one: its shape is given, so landings alone say
             how far it is off.
     """
     static_law = statics.law
-    pulses, slides = (law.pulses, law.slides) if isinstance(law, MoveMemory) else (law, law)
     residual_m, covariance = FINEST * stroke_m, NO_DOUBT
     if valve is not None:
         residual_m = max(residual_m, extended_scatter_m(valve, statics.landings))
@@ -121,41 +106,7 @@ def known(
         landings=statics.landings,
         held=statics.held,
         answers=statics.detector.answers,
-        margins=_in_the_middle(slides, ratios, statics, stroke_m) if isinstance(slides, SlideMemory) else None,
-        pushes=(pulses.up, pulses.down) if isinstance(pulses, BreakawayMemory) else None,
     )
-
-
-def _in_the_middle(slides: SlideMemory, ratios: Ratios, statics: StaticIdentification, stroke_m: float) -> Margins:
-    """Return what slides have taught of margins, at the middle of the travel."""
-    balance = Balance(ratios, statics.balances, statics.held, stroke_m, statics.valve)
-    return with_margins_at(slides, MIDDLE * stroke_m, balance).learnt
-
-
-def with_learnt(law: LawMemory | None, knowledge: ValveKnowledge | None, stroke_m: float) -> LawMemory | None:
-    """Return the memory of a law with what it had learnt, if it is the same law."""
-    if knowledge is None:
-        return law
-    match law:
-        case MoveMemory():
-            slides = _with_margins(law.slides, knowledge, stroke_m)
-            return replace(law, pulses=_with_pushes(law.pulses, knowledge), slides=slides)
-        case SlideMemory():
-            return _with_margins(law, knowledge, stroke_m)
-        case BreakawayMemory():
-            return _with_pushes(law, knowledge)
-        case _:
-            return law
-
-
-def _with_margins(law: SlideMemory, knowledge: ValveKnowledge, stroke_m: float) -> SlideMemory:
-    if knowledge.margins is None:
-        return law
-    return replace(law, margins=knowledge.margins, margins_at_m=MIDDLE * stroke_m)
-
-
-def _with_pushes(law: BreakawayMemory, knowledge: ValveKnowledge) -> BreakawayMemory:
-    return law if knowledge.pushes is None else replace(law, up=knowledge.pushes[0], down=knowledge.pushes[1])
 
 
 def _before(outcomes: tuple[SlideOutcome, ...], now_s: float) -> tuple[SlideOutcome, ...]:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from config.valve_file import ValveFile, ValveParameters
-from positioner.control.balance_law import balance_pa
 from positioner.estimation import Ratios
 from positioner.estimation.array import Array
 from positioner.paper.formulas import (
@@ -209,7 +208,7 @@ def by_the_seeds_law(run: ScenarioRun, file: ValveFile, ratios: Ratios) -> tuple
     commands, periods = [excitation_pa], [np.full(len(excitation_pa), run.period_s)]
     for duration_s, reference_pu, direction in steps:
         count = round(duration_s / SEED_LAW_GRID_S)
-        commands.append(np.full(count, max(0.0, balance_pa(reference_pu * stroke_m, direction, ratios))))
+        commands.append(np.full(count, max(0.0, ratios.balance_pa(reference_pu * stroke_m, direction))))
         periods.append(np.full(count, SEED_LAW_GRID_S))
     response = Valve.from_file(file).run(np.concatenate(commands), np.concatenate(periods))
     return response.time_s, response.position_m

@@ -16,7 +16,6 @@ import numpy as np
 from config.errors import InputError
 from config.loading import validated
 from config.valve_file import ValveFile, ValveParameters
-from positioner.control.balance_law import balance_pa
 from positioner.estimation import Ratios
 from positioner.estimation.array import Array
 from positioner.estimation.derivatives import weights
@@ -293,13 +292,13 @@ def _control(run: ScenarioRun, valve: ValveParameters) -> list[Erratum]:
             acceleration - a * velocity - b * x - c * u,
             k,
         ),
-        Erratum("(23)", "u in S1", "Pa", (r_up - b * k) / c, balance_pa(r_up, 1, ratios), float(run.pressure_pa[up])),
+        Erratum("(23)", "u in S1", "Pa", (r_up - b * k) / c, ratios.balance_pa(r_up, 1), float(run.pressure_pa[up])),
         Erratum(
             "(24)",
             "u in S2",
             "Pa",
             (r_down + b * k) / c,
-            balance_pa(r_down, -1, ratios),
+            ratios.balance_pa(r_down, -1),
             float(run.pressure_pa[down]),
         ),
         Erratum("4.2", "y when x = r", "m", float(run.true_m[up]) + r_up, float(run.true_m[up]) - r_up, 0.0),

@@ -1,4 +1,4 @@
-"""`positioner play --law breakaway`: what the seed's law cannot do, by the command a person types."""
+"""`positioner play --law slides`: what the seed's law cannot do, by the command a person types."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from positioner.cli.main import main
 
 STROKE_M = 0.1016
 STEPS_M = (0.06, 0.0605, 0.0602, 0.0615, 0.0612)
-HOLD_S = 0.6
+HOLD_S = 2.0
 
 
 def played(tmp_path: Path, law: str) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def played(tmp_path: Path, law: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_small_steps_are_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    asked_m, found_m = played(tmp_path, "breakaway")
+    asked_m, found_m = played(tmp_path, "slides")
     assert np.abs(found_m - asked_m)[1:].max() < 1e-3 * STROKE_M + 5e-5
     assert "identified b/c" in capsys.readouterr().out
 
@@ -42,4 +42,4 @@ def test_another_law_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[st
     with pytest.raises(SystemExit) as caught:
         main(["play", "seed", "--reference", str(tmp_path / "r.csv"), "--law", "pid", "-o", str(tmp_path / "o.csv")])
     assert caught.value.code == 2
-    assert "breakaway" in capsys.readouterr().err
+    assert "slides" in capsys.readouterr().err

@@ -52,7 +52,7 @@ class Loop(VirtualLoop):
                 "cycle": {"pace": "device", "period_s": PERIOD_S},
                 "pressure": {"maximum_pa": 140e3},
                 "safety": {"stale_after_s": 4 * PERIOD_S},
-                "control": {"law": "moves"},
+                "control": {"law": "slides"},
             }
         )
         self.valve = PneumaticValve(measured)

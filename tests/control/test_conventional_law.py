@@ -1,24 +1,22 @@
 """The conventional law: PI with a dead band of the integral, by hand; and in the control core."""
 
-from dataclasses import replace
-
 import pytest
 
-from positioner.control.conventional_law import ConventionalMemory, ConventionalSettings, step, while_not_commanding
+from positioner.control.laws.conventional.conventional_law import ConventionalLaw, ConventionalSettings
 from positioner.estimation.acceptance import Ratios
 from tests.control.test_controller import HELD_PA, STROKE_M, automatic
 
 RATIOS = Ratios(b_over_c=-800e3, k_over_c=-20e3)
 SETTINGS = ConventionalSettings(1e-3, 0.0, 100e3, gain=0.1, integral_rate_per_s=8.0)
-BEGUN = ConventionalMemory(40e3, 40e3, 1.0)
+BEGUN = ConventionalLaw(40e3, SETTINGS, 40e3, 1.0)
 """After a sample without error."""
 ERROR_M = 0.01
 """8000 Pa of the spring."""
 
 
 def test_it_takes_over_without_a_bump() -> None:
-    begun = step(while_not_commanding(40e3), 1.0, ERROR_M, RATIOS, SETTINGS)
-    assert (begun.level_pa, begun.now_s) == (40e3, 1.0)
+    begun = SETTINGS.begin(40e3).after(1.0, ERROR_M, RATIOS)
+    assert (begun.command_pa, begun.now_s) == (40e3, 1.0)
     assert begun.integral_pa == pytest.approx(39_200.0)
 
 
@@ -26,31 +24,31 @@ def test_it_takes_over_without_a_bump() -> None:
     ("elapsed_s", "share"), [(0.01, 0.08), (0.05, 0.4), (0.2, 0.8)], ids=["10 ms", "50 ms", "at gain margin 2"]
 )
 def test_the_integral_grows_with_the_time_that_passed(elapsed_s: float, share: float) -> None:
-    after = step(BEGUN, 1.0 + elapsed_s, ERROR_M, RATIOS, SETTINGS)
+    after = BEGUN.after(1.0 + elapsed_s, ERROR_M, RATIOS)
     assert after.integral_pa == pytest.approx(40e3 + share * 8e3)
-    assert after.level_pa == pytest.approx(40e3 + (0.1 + share) * 8e3)
+    assert after.command_pa == pytest.approx(40e3 + (0.1 + share) * 8e3)
 
 
 @pytest.mark.parametrize(("error_m", "stands"), [(0.9e-3, True), (-0.9e-3, True), (1.1e-3, False), (-1.1e-3, False)])
 def test_within_the_dead_band_the_integral_stands(error_m: float, stands: bool) -> None:
-    after = step(BEGUN, 1.1, error_m, RATIOS, SETTINGS)
+    after = BEGUN.after(1.1, error_m, RATIOS)
     assert (after.integral_pa == 40e3) == stands
-    assert after.level_pa != 40e3
+    assert after.command_pa != 40e3
 
 
 @pytest.mark.parametrize(("error_m", "limit_pa"), [(0.09, 100e3), (-0.09, 0.0)])
 def test_at_a_limit_of_the_pressure_the_integral_stands(error_m: float, limit_pa: float) -> None:
-    after = step(BEGUN, 2.0, error_m, RATIOS, SETTINGS)
-    assert (after.level_pa, after.integral_pa) == (limit_pa, 40e3)
+    after = BEGUN.after(2.0, error_m, RATIOS)
+    assert (after.command_pa, after.integral_pa) == (limit_pa, 40e3)
 
 
 @pytest.mark.parametrize("period_s", [0.02, 0.1, 1.0])
 def test_a_stem_without_friction_comes_to_its_reference(period_s: float) -> None:
-    memory, position_m, now_s = BEGUN, 0.03, 1.0
+    law, position_m, now_s = BEGUN, 0.03, 1.0
     for _ in range(round(3 / period_s) + 10):
         now_s += period_s
-        memory = step(memory, now_s, 0.05 - position_m, RATIOS, SETTINGS)
-        position_m = memory.level_pa / 800e3
+        law = law.after(now_s, 0.05 - position_m, RATIOS)
+        position_m = law.command_pa / 800e3
     assert position_m == pytest.approx(0.05, abs=SETTINGS.dead_band_m)
 
 
@@ -71,7 +69,3 @@ def test_a_lost_measurement_changes_nothing() -> None:
     bench.step()
     before_pa = bench.step().command_pa
     assert bench.step(position_m=float("nan")).command_pa == before_pa
-
-
-def test_what_is_remembered_is_forgotten_where_another_state_commands() -> None:
-    assert while_not_commanding(30e3) == replace(ConventionalMemory(30e3), integral_pa=None)

@@ -8,9 +8,9 @@ from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
-from positioner.control.margins_over_travel import with_margins_at
-from positioner.control.slide_balance import Balance
-from positioner.control.slide_memory import Held, SlideMemory
+from positioner.control.laws.slides.margins_over_travel import with_margins_at
+from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.slide_memory import Held, SlideMemory
 from positioner.estimation.landings.extended_balance import straight_law
 from sim.composition import Composition
 from sim.static_inverse import extended_valve

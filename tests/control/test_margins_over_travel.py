@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from positioner.control.margins_over_travel import with_margins_at
-from positioner.control.slide_balance import Balance
-from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
-from positioner.control.slide_memory import Held, SlideMemory
+from positioner.control.laws.slides.margins_over_travel import with_margins_at
+from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.slide_memory import Held, SlideMemory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.slide_margins import NO_MARGINS, Margin, Margins
 from positioner.estimation.landings.static_law import static_law
 
 STROKE_M, SLOPE, F_C = 0.1, 800e3, 8e3

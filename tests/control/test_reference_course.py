@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from positioner.control.reference_course import ReferenceCourse
+from positioner.control.laws.slides.reference_course import ReferenceCourse
 
 SCAN_S, WAY_M = 0.5, 5e-3
 

@@ -221,7 +221,7 @@ def test_what_a_device_did_by_itself_is_no_landing_and_drops_nothing(told: dict[
     assert (after.restoration, after.static_law.landings) == (agreed, 2)
 
 
-@pytest.mark.parametrize("law", ["slides", "seed", "breakaway"])
+@pytest.mark.parametrize("law", ["slides", "seed", "conventional"])
 @pytest.mark.parametrize("changed_first", [Mode.AUTOMATIC, Mode.HOLD])
 def test_another_valve_is_not_moved_by_what_is_known_of_this_one(
     knowledge: ValveKnowledge, law: str, changed_first: Mode

@@ -12,19 +12,19 @@ from config.daemon_file import DaemonFile, HealthTable
 from config.slave_file import SlaveFile
 from config.valve_file import ValveFile, load_valve, shipped_valve
 from positioner.control.controller_memory import Decision
-from positioner.control.margins_over_travel import with_margins_at
-from positioner.control.reference_course import ReferenceCourse
+from positioner.control.laws.slides.law import SlideLaw
+from positioner.control.laws.slides.margins_over_travel import with_margins_at
+from positioner.control.laws.slides.reference_course import ReferenceCourse
+from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.slide_law import MOST_SLIDES, step, while_not_commanding
+from positioner.control.laws.slides.slide_memory import DAY_S, Anchor, Held, SlideMemory, SlideSettings, StemObservation
 from positioner.control.requests import Requests
-from positioner.control.slide_balance import Balance
-from positioner.control.slide_law import MOST_SLIDES, step, while_not_commanding
-from positioner.control.slide_margins import Margin, Margins
-from positioner.control.slide_memory import DAY_S, Anchor, Held, SlideMemory, SlideSettings, StemObservation
 from positioner.control.staircase_excitation import Staircase, StaircaseLimits
-from positioner.control.valve_knowledge import with_learnt
 from positioner.daemon.health import Health, ne107_condition
 from positioner.daemon.health.valve_health import HealthSettings
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.slide_margins import Margin, Margins
 from positioner.estimation.landings.static_law import static_law
 from positioner.estimation.landings.stem_at_rest import Rest
 from positioner.virtual.virtual_cycle import identified, virtual_cycle
@@ -270,10 +270,9 @@ def test_noise_of_a_reference_is_not_chased_and_what_stays_of_it_is_reached() ->
     assert abs(loop.step_to(0.603)[-1] - 0.603) < 1e-3
 
 
-@pytest.mark.parametrize("law", ["slides", "moves"])
-def test_steps_to_and_fro_within_the_scan_of_a_dcs_are_each_reached_once(law: str) -> None:
+def test_steps_to_and_fro_within_the_scan_of_a_dcs_are_each_reached_once() -> None:
     """The last of them stands: the stem does not leave it for the middle of those before."""
-    loop = Loop(0.02, law=law)
+    loop = Loop(0.02)
     for at in (0.5, 0.4, 0.55, 0.45):
         assert abs(loop.step_to(at, cycles=50)[-1] - at) < 1e-3
     path = loop.step_to(0.6, cycles=350)
@@ -298,6 +297,12 @@ STUCK_N = 20e3
 NEW_HEALTH = Health(HealthSettings.of(HealthTable(), STROKE_M))
 
 
+def memory_of(loop: Loop) -> SlideMemory:
+    law = loop.cycle._controller._memory.law
+    assert isinstance(law, SlideLaw)
+    return law.memory
+
+
 def stuck_at(loop: Loop, reference_pu: float, seconds: float = 20.0) -> list[float]:
     """Return the pressures, Pa, that a reference draws from a stem that nothing breaks loose, and set it free again."""
     loop.valve.change(static_n=STUCK_N, coulomb_n=STUCK_N)
@@ -316,8 +321,8 @@ def free(loop: Loop) -> None:
 
 @pytest.mark.parametrize(
     "control",
-    few_always([{}, {"excursion_limit": 0.08}, {"excursion_interval_s": 5.0}, {"law": "moves"}]),
-    ids=["as shipped", "a short excursion", "an interval", "moves"],
+    few_always([{}, {"excursion_limit": 0.08}, {"excursion_interval_s": 5.0}]),
+    ids=["as shipped", "a short excursion", "an interval"],
 )
 def test_a_stem_that_nothing_breaks_loose_is_stuck_whichever_bound_is_met_first(control: dict[str, Any]) -> None:
     loop = Loop(0.05, **control)
@@ -341,12 +346,10 @@ def test_a_stem_that_comes_free_goes_to_its_reference_and_is_as_movable_as_befor
     loop = Loop(0.05)
     for at in (0.5, 0.503, 0.6, 0.597, 0.5):
         loop.step_to(at)
-    law = loop.cycle._controller._memory.law
-    assert isinstance(law, SlideMemory)
+    law = memory_of(loop)
     margins = law.margins
     stuck_at(loop, 0.6)
-    law = loop.cycle._controller._memory.law
-    assert isinstance(law, SlideMemory)
+    law = memory_of(loop)
     for now, before in zip(law.margins.all, margins.all, strict=True):
         assert (now.held_m, now.broke_m) == pytest.approx((before.held_m, before.broke_m), rel=1e-3)
     free(loop)
@@ -984,12 +987,10 @@ def test_margins_are_kept_over_a_restart_as_they_are_in_the_middle_of_the_travel
     loop = Loop(0.05, {"name": "spring_hardening", "cubic_n_per_m3": 0.3 * VALVE.spring_n_per_m / STROKE_M**2})
     for at in (0.8, 0.803, 0.8, 0.803, 0.8):
         loop.step_to(at)
-    knowledge, law = loop.cycle._controller.knowledge, loop.cycle._controller._memory.law
+    knowledge, law = loop.cycle._controller.knowledge, memory_of(loop)
     assert knowledge is not None
-    assert isinstance(law, SlideMemory)
-    kept, restored = knowledge.margins, with_learnt(SlideMemory(), knowledge, STROKE_M)
+    kept, restored = knowledge.margins, SlideLaw(SETTINGS, SlideMemory()).restored(knowledge).memory
     assert kept is not None
-    assert isinstance(restored, SlideMemory)
     assert restored.margins_at_m == 0.5 * STROKE_M
     longer = [(1.0 + 0.9 * 0.8**2) / (1.0 + 0.9 * x**2) for x in (0.5, 0.3)]
     there = with_margins_at(restored, 0.3 * STROKE_M, loop_balance(loop))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from positioner.control.slide_margins import CLOSE, RAISE, Margin
+from positioner.estimation.landings.slide_margins import CLOSE, RAISE, Margin
 
 KNOWN = Margin(held_m=2.1e-3, broke_m=2.4e-3)
 

@@ -22,7 +22,7 @@ from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle
 from positioner.daemon.link import Link
-from positioner.daemon.pacing import DevicePace, RealTimePace
+from positioner.daemon.pacing import RealTimePace
 from tests.certificates import folder, tls
 from tests.children import Child, child
 
@@ -100,54 +100,6 @@ def cycles_until(cycle: Cycle, holds: Callable[[], bool], what: str, most: int =
         if holds():
             return number
     raise AssertionError(f"{what} did not come within {most} cycles: {cycle.snapshot}")
-
-
-LOCKSTEP = "[clock]\nmode = 'lockstep'\n"
-PUSH_LIMIT_PA = 6000.0
-
-
-@pytest.mark.parametrize(("action", "left_pa"), [("hold", None), ("vent", 0.0), ("fill", 420e3)])
-def test_a_slave_killed_in_a_breakaway_pulse_ends_in_the_safe_state_and_no_pulse_follows(
-    action: str, left_pa: float | None, tmp_path: Path
-) -> None:
-    """In lockstep, so that the slave surely dies with the push in force, of which it has obeyed one period."""
-    tables = {"control": {"law": "breakaway", "push_limit_pa": PUSH_LIMIT_PA}, "safety": {"action": action}}
-    file = DaemonFile.model_validate(
-        {"valve": {"stroke_m": STROKE_M}, "law": LAW, "cycle": {"pace": "device"}, **tables}
-    )
-    wire = tcp(secured=False)
-    with slave(tmp_path / "slave.toml", wire.slave(None) + LOCKSTEP, "--port", "0") as (process, ready):
-        link = Link(driver_for(wire.device(ready)), DevicePace())
-        held_pa, _ = link.open()
-        cycle = Cycle(link, Controller(Settings.of(file), held_pa), DevicePace(), Requests(), None)
-        cycle.requests = replace(
-            cycle.requests, mode=Mode.AUTOMATIC, mode_writes=1, reference_m=0.03 + 0.01 * STROKE_M, reference_writes=1
-        )
-
-        def push_in_force() -> bool:
-            """Return whether this cycle's exchange has brought a push, after which less is to follow."""
-            return cycle.snapshot.sample.pressure_pa - cycle.snapshot.decision.command_pa > 100.0
-
-        cycles_until(cycle, push_in_force, "a pulse")
-        pushed_pa, to_follow_pa = cycle.snapshot.sample.pressure_pa, cycle.snapshot.decision.command_pa
-        balance_pa = -(LAW["b_over_c_pa_per_m"] * cycle.snapshot.sample.position_m + LAW["k_over_c_pa"])
-        assert pushed_pa <= balance_pa + PUSH_LIMIT_PA
-        process.kill()
-    took = cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.NO_REPLY, "the fault")
-    assert took <= 3
-    for _ in range(2000):
-        decision = cycle.snapshot.decision
-        assert (decision.mode, decision.command_pa) == (Mode.HOLD, to_follow_pa if left_pa is None else left_pa)
-        cycle.once()
-    with slave(tmp_path / "slave.toml", wire.slave(port_of(ready)) + LOCKSTEP):
-        cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.RESTARTED, "its being another's command")
-        cycle.requests = replace(cycle.requests, acknowledgements=1)
-        cycles_until(cycle, lambda: cycle.snapshot.decision.fault is Fault.NONE, "the acknowledgement")
-        for _ in range(500):
-            held = 24000.0 if left_pa is None else left_pa
-            assert cycle.snapshot.decision.command_pa == pytest.approx(held), "the pulse is forgotten"
-            cycle.once()
-    link.release()
 
 
 @pytest.mark.parametrize("bus", ["modbus", "tls", "rtu", "canopen"])

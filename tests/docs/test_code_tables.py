@@ -8,7 +8,7 @@ import pytest
 
 from config import codes
 from config.codes import Code, Fault, InhibitReason
-from config.daemon_file import ControlTable
+from config.law_names import law_names
 from docs import code_tables
 from workbench.diagnosis.verdict import Verdict
 
@@ -44,8 +44,8 @@ def test_the_table_of_faults_has_every_code_of_a_fault() -> None:
 
 def test_the_documents_have_every_verdict_and_every_law() -> None:
     assert re.findall(r"^\| `(\w+)` \|", said("diagnosis.md"), re.MULTILINE) == list(get_args(Verdict))
-    laws = get_args(ControlTable.model_fields["law"].annotation)
-    assert re.findall(r'"(\w+)"', said("law.md").partition("chooses:")[2].partition("\n")[0]) == list(laws)
+    laws = re.findall(r'"(\w+)"', said("law.md").partition("chooses:")[2].partition("\n")[0])
+    assert sorted(laws) == list(law_names())
 
 
 @pytest.mark.parametrize("path", sorted(DOCS.rglob("*.md")), ids=lambda path: path.name)

@@ -11,7 +11,14 @@ GUIDE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 QUESTIONS = ROW.findall(GUIDE.partition("\n## Where is it?\n")[2].partition("\n## ")[0])
 ROOMS = (
     *("config", "drivers", "drivers/canopen", "fieldbus/canopen", "fieldbus/modbus", "sim", "sim/effects", "sim/slave"),
-    *("positioner/cli", "positioner/control", "positioner/daemon", "positioner/daemon/health", "positioner/estimation"),
+    *(
+        "positioner/cli",
+        "positioner/control",
+        "positioner/control/laws",
+        "positioner/daemon",
+        "positioner/daemon/health",
+        "positioner/estimation",
+    ),
     *("positioner/paper", "positioner/response", "positioner/virtual"),
     *("workbench/blind", "workbench/compare", "workbench/data", "workbench/fit", "workbench/forces", "workbench/model"),
     *("workbench/report", "workbench/select"),

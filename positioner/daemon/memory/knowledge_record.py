@@ -6,11 +6,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from positioner.control.breakaway_memory import LearntPush
-from positioner.control.slide_margins import Margin, Margins
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
+from positioner.estimation.landings.slide_margins import Margin, Margins
 
 MOST = 40
 """Landings, and changes that held."""
@@ -46,11 +45,6 @@ class _Margin(_Record):
     guessed: bool = False
 
 
-class _Push(_Record):
-    push_m: Length
-    moved: bool
-
-
 class KnowledgeRecord(_Record):
     """What is kept of a valve; SI units."""
 
@@ -63,7 +57,6 @@ class KnowledgeRecord(_Record):
     held: list[_Slide] = Field(max_length=MOST)
     answers: list[Annotated[float, Field(ge=0.0, le=1e9)]] = Field(min_length=3, max_length=3)
     margins: list[_Margin] | None = Field(min_length=4, max_length=4)
-    pushes: list[_Push] | None = Field(min_length=2, max_length=2)
     tracked: dict[str, Figure]
 
 
@@ -80,7 +73,6 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "held": [each._asdict() for each in knowledge.held[:MOST] if _finite(each)],
         "answers": list(knowledge.answers),
         "margins": _each(None if knowledge.margins is None else knowledge.margins.all, "held_m", "broke_m", "guessed"),
-        "pushes": _each(knowledge.pushes, "push_m", "moved"),
         "tracked": dict(knowledge.tracked),
     }
 
@@ -106,12 +98,11 @@ def knowledge_in(content: object) -> ValveKnowledge:
         held=_outcomes(record.held),
         answers=Answers(*record.answers),
         margins=_margins(record.margins),
-        pushes=_pushes(record.pushes),
         tracked=record.tracked,
     )
 
 
-def _each(learnt: Sequence[Margin] | Sequence[LearntPush] | None, *names: str) -> list[dict[str, Any]] | None:
+def _each(learnt: Sequence[Margin] | None, *names: str) -> list[dict[str, Any]] | None:
     return None if learnt is None else [{name: getattr(each, name) for name in names} for each in learnt]
 
 
@@ -119,13 +110,6 @@ def _margins(four: list[_Margin] | None) -> Margins | None:
     if four is None:
         return None
     return Margins(*(Margin(each.held_m, each.broke_m, guessed=each.guessed) for each in four))
-
-
-def _pushes(both: list[_Push] | None) -> tuple[LearntPush, LearntPush] | None:
-    if both is None:
-        return None
-    up, down = (LearntPush(each.push_m, each.moved) for each in both)
-    return up, down
 
 
 def _row(row: list[float]) -> Row:

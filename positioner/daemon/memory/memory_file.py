@@ -1,6 +1,6 @@
 """The file that keeps what is known of one valve: JSON, with a version and a checksum, replaced whole.
 
-    {"version": 2, "sha256": of `content` as compact JSON with sorted keys,
+    {"version": 3, "sha256": of `content` as compact JSON with sorted keys,
      "content": {"valve", "written": date, "conditions": key to value, "digest": of the conditions, "knowledge"}}
 
 A crash leaves the old file or the new one (`config.whole_file`). What is torn, tampered with, another valve's or of a
@@ -20,7 +20,7 @@ from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.memory.conditions import Conditions, changed
 from positioner.daemon.memory.knowledge_record import knowledge_in, record_of
 
-VERSION = 2
+VERSION = 3
 SET_ASIDE = ".set_aside"
 KEYS = frozenset({"valve", "written", "conditions", "digest", "knowledge"})
 

@@ -11,13 +11,12 @@ from typing import Any
 import pytest
 
 from config.daemon_file import DaemonFile
-from positioner.control.breakaway_memory import LearntPush
-from positioner.control.slide_margins import Margin, Margins
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
+from positioner.estimation.landings.slide_margins import Margin, Margins
 
 SLIDE = SlideOutcome(-1.25, 1, 0.05, 70e3, 0.06, 1e-6, True, True)
 KNOWLEDGE = ValveKnowledge(
@@ -28,7 +27,6 @@ KNOWLEDGE = ValveKnowledge(
     held=(SLIDE._replace(moved=False, landing=False, time_s=-3.5),),
     answers=Answers(0.04, 1e-7, 2e4),
     margins=Margins(Margin(5e-3, 6e-3), turning_down=Margin(0.0, 7e-3, guessed=True)),
-    pushes=(LearntPush(1e-3, True), LearntPush(2e-3, False)),
     tracked={"friction_up_n": 1.5e3},
 )
 FILE: dict[str, Any] = {"valve": {"name": "FV-1", "stroke_m": 0.1}, "cycle": {"period_s": 0.05}}
@@ -43,7 +41,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_what_was_written_is_read_to_the_last_bit(path: Path) -> None:
-    for knowledge in (KNOWLEDGE, replace(KNOWLEDGE, margins=None, pushes=None, landings=(), tracked={})):
+    for knowledge in (KNOWLEDGE, replace(KNOWLEDGE, margins=None, landings=(), tracked={})):
         write_memory(path, "FV-1", NOW, knowledge)
         kept = read_memory(path, "FV-1", NOW)
         assert (kept.knowledge, kept.problem) == (knowledge, None)
@@ -106,7 +104,7 @@ def test_a_part_of_a_new_file_beside_the_old_one_is_never_read(path: Path) -> No
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda file: file.update(version=3), "version: allowed is 2, got 3"),
+        (lambda file: file.update(version=4), "version: allowed is 3, got 4"),
         (lambda file: file.update(version=True), "has no version"),
         (lambda file: file.update(more=1), "must hold version, sha256 and a content"),
         (lambda file: file["content"].pop("knowledge"), "must hold version, sha256 and a content"),

@@ -8,7 +8,7 @@ The law works with positions of the stem, not with what is indicated of it.
 from dataclasses import replace
 
 from config.extended_valve import ExtendedValve
-from positioner.control.slide_memory import StemObservation
+from positioner.control.laws.slides.slide_memory import StemObservation
 
 
 def stem_observed(observation: StemObservation, valve: ExtendedValve, direction: int) -> StemObservation:

@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass, replace
 from math import inf, isnan, nan
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from config.codes import InhibitReason
-from positioner.control.reference_course import ReferenceCourse
-from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
+from config.daemon_file import DaemonFile
+from positioner.control.laws.slides.reference_course import ReferenceCourse
 from positioner.estimation.landings.landing_detector import SlideOutcome
+from positioner.estimation.landings.slide_margins import NO_MARGINS, Margin, Margins
 from positioner.estimation.landings.stem_at_rest import Rest
+
+if TYPE_CHECKING:
+    from positioner.control.laws.slides.law import SlideLaw
 
 DAY_S = 86400.0
 CREEP = 0.03
@@ -31,6 +36,30 @@ class SlideSettings:
     """Travel that excursions may cost, of which a day's may be spent at once; 0: no limit."""
     command_step_pa: float = 0.0
     """The least difference of two commands that the device is told."""
+
+    by_single_steps: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, file: DaemonFile) -> Self:
+        """Return what a daemon's file says of the law."""
+        stroke_m, control = file.valve.stroke_m, file.control
+        return cls(
+            stroke_m=stroke_m,
+            dead_band_m=control.dead_band * stroke_m,
+            minimum_pa=file.pressure.minimum_pa,
+            maximum_pa=file.pressure.maximum_pa,
+            breakaway_pa=file.valve.breakaway_pa,
+            excursion_limit_m=control.excursion_limit * stroke_m,
+            excursion_interval_s=control.excursion_interval_s,
+            budget_m_per_s=control.excursion_budget_strokes_per_day * stroke_m / DAY_S,
+            command_step_pa=file.device.command_step_pa,
+        )
+
+    def begin(self, held_pa: float) -> "SlideLaw":
+        """Return the law under a command, Pa."""
+        from positioner.control.laws.slides.law import SlideLaw
+
+        return SlideLaw(self, SlideMemory(level_pa=held_pa))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,9 @@ margins of an extended valve are its own.
 from dataclasses import replace
 from math import isnan
 
-from positioner.control.slide_balance import SURE, Balance
-from positioner.control.slide_margins import NO_MARGINS, Margin, Margins
-from positioner.control.slide_memory import SlideMemory
+from positioner.control.laws.slides.slide_balance import SURE, Balance
+from positioner.control.laws.slides.slide_memory import SlideMemory
+from positioner.estimation.landings.slide_margins import NO_MARGINS, Margin, Margins
 
 SHRINKS = 0.25
 """Factor on a margin, at the least."""

@@ -36,9 +36,8 @@ from math import isnan, nan
 from typing import NamedTuple
 
 from config.codes import InhibitReason
-from positioner.control.slide_balance import Balance
-from positioner.control.slide_margins import BESIDE, GROWS, NO_MARGINS, Margin
-from positioner.control.slide_memory import (
+from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.slide_memory import (
     CREEP,
     DAY_S,
     NONE_HELD,
@@ -50,6 +49,7 @@ from positioner.control.slide_memory import (
     StemObservation,
 )
 from positioner.estimation.landings.landing_detector import STOP, SlideOutcome
+from positioner.estimation.landings.slide_margins import BESIDE, GROWS, NO_MARGINS, Margin
 
 RETURN = 1.02
 """Margins that the second slide is given, for a stem must not stay where the first took it."""
