@@ -129,6 +129,15 @@ def test_effects_keep_their_parameters_for_the_model_side(tmp_path: Path) -> Non
             "[valve]\nstroke_m = 0.1\n[identification]\nwindow_s = 0.1\n",
             "identification: minimum_window_s must be at most window_s (0.1 s)",
         ),
+        ("[valve]\nstroke_m = 0.1\n[control]\nlaw = 'moves'\n", "control.law: it moved by pulses, and slides where"),
+        (
+            "[valve]\nstroke_m = 0.1\n[control]\nlaw = 'breakaway'\n",
+            'control.law: it moved by pulses, and is gone: "slides" replaces it',
+        ),
+        (
+            "[valve]\nstroke_m = 0.1\n[control]\nlaw = 'pid'\n",
+            'control.law: allowed is "conventional" or "seed" or "slides"',
+        ),
     ],
 )
 def test_the_daemon_file_is_held_to_its_schema(tmp_path: Path, text: str, said: str) -> None:

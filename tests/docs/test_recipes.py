@@ -40,6 +40,7 @@ def test_a_recipe_can_be_followed(name: str, tmp_path: Path) -> None:
             change(tree / file, text)
         else:
             assert not (tree / file).exists(), f"{file} is no new file"
+            (tree / file).parent.mkdir(exist_ok=True)
             (tree / file).write_text(text, encoding="utf-8")
     install(tree)
     assert commands
