@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from config.hosts import is_host
-from config.loading import Port, Schema
+from config.loading import Many, Port, Schema
 from config.modbus_map import SIMULATED_MAP, ModbusMap, words_of
-from config.quantities import ActionName
+from config.quantities import WRITABLE, ActionName
 from config.serial_port import RtuUnit, SerialPort
 from config.tls_table import Tls
 
@@ -97,12 +97,18 @@ class ModbusDevice(Device):
     reply_timeout_s: Annotated[float, Field(gt=0, le=60)] = 0.05
     communication_timeout_s: Annotated[float, Field(ge=0)] = 1.0
     communication_action: ActionName = "hold"
+    write_functions: Many[Literal[23, 16, 6]] = (23, 16, 6)
+    """Functions that it answers. One that it refuses is found out; one that it passes over in silence is not."""
+    pause_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """What the device needs from its reply to the next request."""
+    connect_pause_s: Annotated[float, Field(ge=0, le=60)] = 0.0
+    """What it needs from being connected to, to the first request."""
     map: ModbusMap = SIMULATED_MAP
 
     @property
     def longest_exchange_s(self) -> float:
-        """The reply's time-out."""
-        return self.reply_timeout_s
+        """The reply's time-out, and the pause before the request."""
+        return self.reply_timeout_s + self.pause_s
 
     @property
     def acts_alone_after_s(self) -> float:
@@ -146,6 +152,15 @@ class ModbusDevice(Device):
         return self
 
     @model_validator(mode="after")
+    def _can_be_written(self) -> Self:
+        places = {name: each for name, each in self.map.places.items() if name in WRITABLE}
+        one_by_one = next((name for name, each in places.items() if each.format.words > 1), None)
+        if 16 not in self.write_functions and (one_by_one is not None or 6 not in self.write_functions):
+            wanted, what = "16" if one_by_one else "16 or 6", one_by_one or "command_pa"
+            raise ValueError(f"write_functions: map.{what} is written by {wanted}, which is missing")
+        return self
+
+    @model_validator(mode="after")
     def _timeout_survives_the_registers(self) -> Self:
         place = self.map.communication_timeout_s
         if place is None or self.communication_timeout_s == 0:
@@ -167,6 +182,12 @@ class ModbusTcpDevice(ModbusDevice):
     host: Host = "127.0.0.1"
     port: Port = 5020
     unit: Annotated[int, Field(ge=0, le=255)] = 1
+    framing: Literal["mbap", "rtu"] = "mbap"
+    """"rtu": frames of a serial line, as a plain converter hands them through ("RTU over TCP")."""
+    echoes_transaction: bool = True
+    """Whether a reply has the number of its request; else whatever number comes is taken."""
+    reply_unit: Annotated[int, Field(ge=0, le=255)] | None = None
+    """The unit that replies say where it is another than the one that is asked."""
     tls: Tls | None = None
     """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
 
@@ -204,7 +225,7 @@ class ModbusRtuDevice(ModbusDevice):
     def longest_exchange_s(self) -> float:
         """Silence, the longest request (function 23: 13 bytes and the command), and the reply's time-out."""
         request = 13 + 2 * self.map.command_pa.format.words
-        return self.serial.silence_s + request * self.serial.character_s + self.reply_timeout_s
+        return self.serial.silence_s + request * self.serial.character_s + super().longest_exchange_s
 
     @model_validator(mode="after")
     def _a_reply_fits_into_its_timeout(self) -> Self:

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from config.loading import Schema
 from config.quantities import QUANTITIES, WRITABLE, ActionName, CommunicationAction, DeviceStatus
-from config.register_format import Format, WireType, WordOrder
+from config.register_format import Format, Order, WireType
 
 MOST_REGISTERS = 125
 """A Modbus reply carries at most this many registers."""
@@ -24,7 +24,8 @@ class Place(Schema):
     table: Literal["holding", "input"] = "holding"
     address: Annotated[int, Field(ge=0, le=65535)]
     type: WireType = "float32"
-    word_order: WordOrder = "big"
+    word_order: Order = "big"
+    byte_order: Order = "big"
     scale: float = 1.0
     offset: float = 0.0
 
@@ -39,7 +40,7 @@ class Place(Schema):
     @property
     def format(self) -> Format:
         """How the raw value lies in its registers."""
-        return Format(self.type, self.word_order)
+        return Format(self.type, self.word_order, self.byte_order)
 
     @property
     def end(self) -> int:
@@ -81,12 +82,13 @@ class StatusBits(Schema):
     communication_lost: Mask = 0
     sensor_fault: Mask = 0
     not_ready: Mask = 0
+    device_fault: Mask = 0
     ready: Mask = 0
     """Bits that are 1 while the device works."""
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
-        if not self.communication_lost | self.sensor_fault | self.not_ready | self.ready:
+        if not self.communication_lost | self.sensor_fault | self.not_ready | self.device_fault | self.ready:
             raise ValueError("names no bit; leave the table out where the status has the bits of DeviceStatus")
         return self
 
@@ -99,6 +101,8 @@ class StatusBits(Schema):
             said |= DeviceStatus.SENSOR_FAULT
         if raw & self.not_ready or self.ready & ~raw:
             said |= DeviceStatus.NOT_READY
+        if raw & self.device_fault:
+            said |= DeviceStatus.DEVICE_FAULT
         return said
 
 

@@ -28,6 +28,7 @@ class DeviceStatus(IntFlag):
     COMMUNICATION_LOST = 1
     SENSOR_FAULT = 2
     NOT_READY = 4
+    DEVICE_FAULT = 8
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,14 @@
 """Numbers as 16-bit registers: the one place where a value becomes words on the wire and back.
 
-A value of several words is sent most significant word first (`big`) or last (`little`); inside a word the most
-significant byte always comes first, as the Modbus specification has it.
+A value of several words is sent most significant word first (`big`) or last (`little`). Inside a word the most
+significant byte comes first, as the Modbus specification has it; some devices send it last. Of a float of the bytes
+A B C D, A the most significant:
+
+    word_order   byte_order   on the wire
+    big          big          A B C D
+    little       big          C D A B
+    big          little       B A D C
+    little       little       D C B A
 """
 
 import math
@@ -11,7 +18,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 WireType = Literal["uint16", "int16", "uint32", "int32", "uint64", "float32", "float64"]
-WordOrder = Literal["big", "little"]
+Order = Literal["big", "little"]
 
 LETTER: dict[WireType, str] = {
     "uint16": "H",
@@ -30,7 +37,9 @@ class Format:
     """How one value lies in registers."""
 
     type: WireType
-    word_order: WordOrder = "big"
+    word_order: Order = "big"
+    byte_order: Order = "big"
+    """Of the two bytes of a word."""
 
     @property
     def words(self) -> int:
@@ -60,7 +69,7 @@ class Format:
             packed = struct.pack(">" + LETTER[self.type], value)
         except (struct.error, OverflowError):
             raise ValueError(f"{value} does not fit {self.type}") from None
-        words = list(struct.unpack(f">{self.words}H", packed))
+        words = list(struct.unpack(self._words_format, packed))
         return words if self.word_order == "big" else words[::-1]
 
     def decode(self, words: Sequence[int]) -> float:
@@ -72,5 +81,9 @@ class Format:
         if len(words) != self.words:
             raise ValueError(f"{self.type} takes {self.words} registers, not {len(words)}")
         ordered = words if self.word_order == "big" else words[::-1]
-        (value,) = struct.unpack(">" + LETTER[self.type], struct.pack(f">{self.words}H", *ordered))
+        (value,) = struct.unpack(">" + LETTER[self.type], struct.pack(self._words_format, *ordered))
         return float(value)
+
+    @property
+    def _words_format(self) -> str:
+        return f"{'>' if self.byte_order == 'big' else '<'}{self.words}H"

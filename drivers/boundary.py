@@ -56,6 +56,12 @@ class BadReply(DriverError):
     """The answer is not one to the question (wrong function, count, echo): nothing on the connection can be trusted."""
 
 
+class DoubleReply(BadReply):
+    """The answer to the question before came a second time."""
+
+    kind = "duplicated reply"
+
+
 class NoNumber(DriverError):
     """A measurement holds a number that is none (NaN, infinite). The device obeyed, and the connection stays."""
 

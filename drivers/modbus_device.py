@@ -1,12 +1,14 @@
 """A device on any Modbus: its quantities by the map of its registers, in requests and replies without frames.
 
 One transaction a cycle (function 23), or more where it must be (16, or 6 where that is refused; then 3 or 4, once for
-each table, and for each run without a hole where the device refuses to read registers that it has not). Checked here:
-function, byte count, length, echo, and that every number is one. How a request travels, a subclass knows.
+each table, and for each run without a hole where the device refuses to read registers that it has not). A device that
+passes over a function in silence is told by `write_functions`, for silence may be a lost reply. Checked here: function,
+byte count, length, echo, and that every number is one. How a request travels, a subclass knows.
 """
 
 import math
 import struct
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
@@ -51,10 +53,16 @@ class ModbusDriver(ABC):
         self._settings = [_Read({"setting": place}) for place in places if place is not None]
         self._told: list[bytes] | None = None
         """What the registers of the settings said once they were told; None: they are not known, or cannot be read."""
-        self._one_register_at_a_time = False
-        """Whether the device knows function 6 and not 16; known by its first refusal."""
+        self._one_register_at_a_time = 16 not in config.write_functions
+        """Whether the device knows function 6 and not 16; known by the file, or by its first refusal."""
         # Function 23 reads holding registers only.
-        self._one_transaction = len(self._reads) == 1 and self._reads[0].table == "holding"
+        in_one = len(self._reads) == 1 and self._reads[0].table == "holding"
+        self._one_transaction = in_one and 23 in config.write_functions
+        self._free_s = -math.inf
+        """When the next request may set out."""
+        self._functions_answered: set[int] = set()
+        self._has_opened = False
+        """Whether the device was ever ready to be driven."""
 
     @abstractmethod
     def _connect(self) -> None:
@@ -105,6 +113,7 @@ class ModbusDriver(ABC):
         except BaseException:
             self.close()
             raise
+        self._has_opened = True
         return held_pa
 
     def read(self) -> Reading:
@@ -230,7 +239,52 @@ class ModbusDriver(ABC):
 
     def _ask(self, request: bytes, head: bytes, length: int) -> bytes:
         """Return what follows `head` in the reply, which must begin with it and have that length."""
-        return self._transact(request, head, length)[len(head) :]
+        return self._answer(request, head, length)[len(head) :]
+
+    def _answer(self, request: bytes, head: bytes, length: int) -> bytes:
+        """Return the reply as `_transact`, asked for no sooner than the device can take a request."""
+        self._await_pause()
+        try:
+            reply = self._transact(request, head, length)
+        except Refused:
+            self._note_answer(request)
+            raise
+        self._note_answer(request)
+        return reply
+
+    def _begin_connection(self) -> None:
+        """Let the device come to itself: it was just connected to."""
+        self._free_s = time.monotonic() + self._config.connect_pause_s
+
+    def _await_pause(self) -> None:
+        if (left_s := self._free_s - time.monotonic()) > 0:
+            time.sleep(left_s)
+
+    def _note_answer(self, request: bytes) -> None:
+        self._functions_answered.add(request[0])
+        self._rest()
+
+    def _rest(self) -> None:
+        """Let the device rest from now on, if it needs that before the next request."""
+        if self._config.pause_s:
+            self._free_s = time.monotonic() + self._config.pause_s
+
+    def _cure_of_silence(self, request: bytes) -> str:
+        """Say which key of `[device]` is for a device that was silent so; nothing where any reply may be lost."""
+        function, known = request[0], self._config.write_functions
+        if not self._functions_answered:
+            return (
+                "; nothing was answered yet: is this unit there? One that needs time after connecting: "
+                f"device.connect_pause_s{self._for_nothing_answered()}"
+            )
+        if function in known and function not in self._functions_answered and len(known) > 1:
+            others = [each for each in known if each != function]
+            return f"; function {function} was never answered: device.write_functions = {others}"
+        return "" if self._has_opened else "; one that needs time between requests: device.pause_s"
+
+    def _for_nothing_answered(self) -> str:
+        """Say what else it may be, on this bus, that nothing was answered yet."""
+        return ""
 
     def _refused(self, request: bytes, code: int) -> DriverError:
         """Return what an exception of the device means; by some a gateway says that the device itself was silent."""

@@ -50,6 +50,7 @@ class ModbusRtuDriver(ModbusDriver):
     def _connect(self) -> None:
         try:
             self._line.open()
+            self._begin_connection()
             self._await_answers()
         except OSError as error:
             self.close()
@@ -71,6 +72,7 @@ class ModbusRtuDriver(ModbusDriver):
         """Ask for the echo; return None when it is back or refused, else what was heard instead."""
         self._echoes = (self._echoes + 1) & 0xFFFF
         echo = framed(self._unit, ECHO + self._echoes.to_bytes(2))
+        self._await_pause()
         refusal = bytes((self._unit, ECHO[0] | EXCEPTION))
         until_s = self._line.send(echo, self._reply_timeout_s) + self._reply_timeout_s
         heard = b""
@@ -111,12 +113,14 @@ class ModbusRtuDriver(ModbusDriver):
 
     def _answered(self, frame: bytes, function: int, size: int) -> bytes:
         """Send a request; return what came before its time-out, as far as it can be the reply of that size."""
+        self._await_pause()
         until_s = self._line.send(frame, self._reply_timeout_s) + self._reply_timeout_s
         reply = b""
         while len(reply) < size and (data := self._line.receive(until_s)):
             reply += data
             if len(reply) > 1 and reply[1] != function:
                 size = EXCEPTION_FRAME
+        self._rest()
         return reply
 
     def _fault(self, request: bytes, frame: bytes) -> DriverError:
@@ -126,7 +130,8 @@ class ModbusRtuDriver(ModbusDriver):
         self.close()
         about = self._about(request)
         if not frame:
-            return NoReply(f"{about}: no reply within {1e3 * self._reply_timeout_s:g} ms")
+            said = f"no reply within {1e3 * self._reply_timeout_s:g} ms"
+            return NoReply(f"{about}: {said}{self._cure_of_silence(request)}")
         if request[0] in READS and frame.startswith(framed(self._unit, request)):
             return BadReply(f"{about}: the line hands back what is sent: serial.local_echo = true")
         return BadReply(f"{about}: {self._mismatch(frame)}: {frame.hex(' ')}")

@@ -11,10 +11,20 @@ from contextlib import suppress
 from itertools import cycle
 
 from config.device import ModbusTcpDevice
-from drivers.boundary import BadReply, DriverError, NoConnection, NoReply, Refused
+from drivers.boundary import BadReply, DoubleReply, DriverError, NoConnection, NoReply, Refused
 from drivers.modbus_device import READ_COUNTS, ModbusDriver
-from fieldbus.modbus.client import ModbusClient, NotConnected, ReplyTimeout, UnexpectedReply
+from fieldbus.modbus.client import ModbusClient
+from fieldbus.modbus.client_errors import (
+    DuplicatedReply,
+    NotConnected,
+    OtherTransaction,
+    OtherUnit,
+    ReplyTimeout,
+    SerialFrame,
+    UnexpectedReply,
+)
 from fieldbus.modbus.exception_codes import exception_code
+from fieldbus.modbus.framing import Framing, MbapFraming, SerialFraming
 
 
 class ModbusTcpDriver(ModbusDriver):
@@ -29,7 +39,10 @@ class ModbusTcpDriver(ModbusDriver):
 
     def __init__(self, config: ModbusTcpDevice) -> None:
         super().__init__(config, f"{config.host}:{config.port} unit {config.unit}")
-        self._client = ModbusClient(config.host, config.port, config.unit, config.reply_timeout_s, config.tls)
+        self._framing = config.framing
+        self._client = ModbusClient(
+            config.host, config.port, config.unit, config.reply_timeout_s, config.tls, _framing(config)
+        )
         self._other_counts = cycle(READ_COUNTS)
         """Lengths in turn: who is far behind would not fit for long."""
 
@@ -42,6 +55,7 @@ class ModbusTcpDriver(ModbusDriver):
             self._client.open()
         except NotConnected as error:
             raise NoConnection(f"{self._who}: {error}") from None
+        self._begin_connection()
         self._require_answers_in_step()
 
     def _require_answers_in_step(self) -> None:
@@ -56,7 +70,7 @@ class ModbusTcpDriver(ModbusDriver):
 
     def _read_words(self, count: int) -> None:
         request = self._position_read(count)
-        self._transact(request, bytes((request[0], 2 * count)), 2 + 2 * count)
+        self._answer(request, bytes((request[0], 2 * count)), 2 + 2 * count)
 
     def _transact(self, request: bytes, head: bytes, length: int) -> bytes:
         try:
@@ -64,12 +78,17 @@ class ModbusTcpDriver(ModbusDriver):
         except NotConnected as error:
             raise NoConnection(f"{self._about(request)}: {error}") from None
         except ReplyTimeout as error:
-            raise NoReply(f"{self._about(request)}: {error}") from None
+            raise NoReply(f"{self._about(request)}: {error}{self._cure_of_silence(request)}") from None
+        except DuplicatedReply as error:
+            raise DoubleReply(f"{self._about(request)}: {error}") from None
         except UnexpectedReply as error:
-            raise BadReply(f"{self._about(request)}: {error}") from None
+            raise BadReply(f"{self._about(request)}: {error}{_cure(error)}") from None
         if len(reply) == length and reply.startswith(head):
             return reply
         raise self._fault(request, reply)
+
+    def _for_nothing_answered(self) -> str:
+        return '; frames of a serial line: device.framing = "rtu"' if self._framing == "mbap" else ""
 
     def _fault(self, request: bytes, reply: bytes) -> DriverError:
         """Return what a reply without the registers means; end the connection unless it is an exception."""
@@ -78,3 +97,23 @@ class ModbusTcpDriver(ModbusDriver):
             return self._refused(request, code)
         self.close()
         return BadReply(f"{self._about(request)}: the reply does not fit: {reply.hex(' ')}")
+
+
+def _framing(config: ModbusTcpDevice) -> Framing:
+    if config.framing == "rtu":
+        return SerialFraming(config.unit, config.reply_unit)
+    return MbapFraming(config.unit, config.reply_unit, echoes_transaction=config.echoes_transaction)
+
+
+def _cure(error: UnexpectedReply) -> str:
+    """Say which key of `[device]` lets such replies be taken; nothing where none does."""
+    match error:
+        case OtherTransaction():
+            key = "echoes_transaction = false"
+        case OtherUnit():
+            key = f"reply_unit = {error.came}"
+        case SerialFrame():
+            key = 'framing = "rtu"'
+        case _:
+            return ""
+    return f" (if it always answers so: device.{key})"

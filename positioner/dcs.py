@@ -13,7 +13,8 @@ from config.errors import CommandFailed, InputError
 from config.modbus_map import MOST_REGISTERS
 from config.registers import Register, register_named
 from config.tls_table import Tls
-from fieldbus.modbus.client import ClientError, ModbusClient, NobodyThere, NotConnected, Refused
+from fieldbus.modbus.client import ModbusClient
+from fieldbus.modbus.client_errors import ClientError, NobodyThere, NotConnected, Refused
 
 POLL_S = 0.05
 CYCLE_WITHIN_S = 30.0

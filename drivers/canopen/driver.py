@@ -216,6 +216,8 @@ class CanopenDriver:
         if "status_word" in values:
             self._activation.update(round(values["status_word"]))
             unfit = 0 if self._activation.is_active else DeviceStatus.NOT_READY
+        if self._watcher.is_unfit:
+            unfit |= DeviceStatus.DEVICE_FAULT
         return replace(reading_of(values, unfit), emergency=self._watcher.emergency)
 
     def _refused(self, said: str) -> Refused:

@@ -88,21 +88,24 @@ class NodeBus:
             raise self._off(str(error)) from None
 
     def receive(self, timeout_s: float) -> can.Message | None:
-        """Return the next frame, None if none comes within the time-out.
+        """Return the next data frame, None if none comes within the time-out.
+
+        A remote frame asks a node for what it sends: it is another master's, and says nothing of the node.
 
         Raises:
             NoConnection: the bus is not open, or off.
         """
         bus = self._bus or self.require_open()
-        try:
-            message = bus.recv(timeout_s)
-        except (can.CanError, OSError) as error:
-            raise self._off(str(error)) from None
-        if message is not None and message.is_error_frame:
-            if message.arbitration_id & CAN_ERROR_BUS_OFF:
+        while True:
+            try:
+                message = bus.recv(timeout_s)
+            except (can.CanError, OSError) as error:
+                raise self._off(str(error)) from None
+            if message is None or not (message.is_error_frame or message.is_remote_frame):
+                return message
+            if message.is_error_frame and message.arbitration_id & CAN_ERROR_BUS_OFF:
                 raise self._off("the controller says so")
-            return self.receive(0.0)  # of no node; what lies behind it counts
-        return message
+            timeout_s = 0.0  # of no node; what lies behind it counts
 
     def require_open(self) -> can.BusABC:
         """Return the bus.

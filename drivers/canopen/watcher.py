@@ -4,7 +4,9 @@
     emergency   0x080 + n, error code (2 bytes), error register (1 byte), five of the manufacturer's own
 
 A node that boots, leaves OPERATIONAL or falls silent is lost: the bus is left, and the driver must be opened again.
-Emergencies are logged with their cause.
+Emergencies are logged with their cause. One of the device itself (current, voltage, temperature, hardware, software,
+modules, what is outside) makes it unfit until it says that all are over (code 0), or boots; those of communication and
+of a parameter do not, for what they tell of is seen or refused here as well.
 """
 
 import logging
@@ -48,12 +50,22 @@ EMERGENCIES = {
     0xFF00: "specific to the device",
 }
 """Error codes of CiA 301; a class ends in 00 or 000."""
+OF_THE_DEVICE = (0x1000, 0x2000, 0x3000, 0x4000, 0x5000, 0x6000, 0x7000, 0x9000, 0xF000)
+"""Classes by their first digit."""
+OF_A_PARAMETER = 0x6300
+OF_ITS_MAKER = 0xFF00
+"""What these mean only the maker's data sheet says."""
 
 
 def cause_of(code: int) -> str:
     """Return what an emergency's error code means."""
     classes = (code, code & 0xFF00, code & 0xF000)
     return next((EMERGENCIES[each] for each in classes if each in EMERGENCIES), "not in CiA 301")
+
+
+def is_of_the_device(code: int) -> bool:
+    """Return whether an emergency says that the device itself is at fault."""
+    return code & 0xF000 in OF_THE_DEVICE and code & 0xFF00 not in (OF_A_PARAMETER, OF_ITS_MAKER)
 
 
 class NodeWatcher:
@@ -77,6 +89,8 @@ class NodeWatcher:
         """Whether it booted or was stopped since this was last set to False."""
         self.emergency = 0
         """The error code of the node's last emergency; 0 when all are over, or there was none."""
+        self.is_unfit = False
+        """Whether an emergency of the device itself is not over."""
         self.refusal: str | None = None
         """Why the node refused a command since this was last set to None."""
 
@@ -128,6 +142,7 @@ class NodeWatcher:
         level, cause = (logging.WARNING, cause_of(code)) if code else (logging.INFO, "over")
         self._bus.say(level, NodeEvent.EMERGENCY, code=code, cause=cause, register=register)
         self.emergency = int(code)
+        self.is_unfit = bool(code) and (self.is_unfit or is_of_the_device(code))
         return self.emergency
 
     def require_heartbeat(self) -> None:
@@ -143,6 +158,7 @@ class NodeWatcher:
     def _consume_heartbeat(self, state: int) -> None:
         self._heard_s = time.monotonic()
         if state == BOOT_UP:
+            self.is_unfit = False
             said = "it booted, and must be configured anew"
             self.was_interrupted = True
             raise self._bus.closing_fault(NoConnection, NodeEvent.NODE_RESTARTED, said)

@@ -4,7 +4,8 @@ Its files:
 
     server, connection, register_answers    answers on TCP: the server, one client's frames, what a request gets
     admission, request_counts               who gets a place, and how often each host may ask; how often who asked
-    client                                  asks on TCP
+    client, client_errors                   asks on TCP; why there is no reply
+    framing, host_address                   how frames lie in its stream; where its server is
     serial_line, rtu                        the serial line, and the frames on it
     pdu, exception_codes, layout            what frames carry; how a refusal is said; values in registers
     tls                                     Modbus/TCP Security: mutual TLS, roles from certificates

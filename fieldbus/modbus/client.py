@@ -1,11 +1,10 @@
-"""A Modbus TCP client, on TLS where that is asked for: of the driver and of the small DCS.
+"""A Modbus client on TCP, with TLS where that is asked for: of the driver and of the small DCS.
 
-pymodbus makes and reads frames and PDUs. The connection is a socket of ours: a reply must be whole within one time-out,
-in however many pieces it comes, and a secured server's certificate must be that of the host called. Checked here:
-transaction, protocol, length and unit. After anything but a whole reply to the request the connection is closed, so
-that no late reply is ever read.
+pymodbus makes and reads frames and PDUs (`framing`). The connection is a socket of ours: a reply must be whole within
+one time-out, in however many pieces it comes, and a secured server's certificate must be that of the host called.
+After anything but a whole reply to the request the connection is closed, so that no late reply is ever read.
 
-Source: MODBUS Messaging on TCP/IP Implementation Guide V1.0b, sections 3.1.3 (header) and 4.3.2 (transactions).
+Source: MODBUS Messaging on TCP/IP Implementation Guide V1.0b, section 4.3.2 (transactions).
 """
 
 import socket
@@ -13,8 +12,6 @@ import ssl
 import time
 from collections.abc import Sequence
 
-from pymodbus.framer import FramerSocket
-from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
     ReadHoldingRegistersResponse,
@@ -22,53 +19,20 @@ from pymodbus.pdu.register_message import (
 )
 
 from config.tls_table import Tls
-from fieldbus.modbus.exception_codes import exception_code, exception_text
+from fieldbus.modbus.client_errors import NobodyThere, NotConnected, Refused, ReplyTimeout, UnexpectedReply
+from fieldbus.modbus.exception_codes import exception_code
+from fieldbus.modbus.framing import Framing, MbapFraming
+from fieldbus.modbus.host_address import HostAddress, connected
 from fieldbus.modbus.pdu import encoded
 from fieldbus.modbus.tls import client_context, failure_reason
 
 CHUNK = 512
 """More than a frame has."""
-LAST_TRANSACTION = 0xFFFF
-LENGTH_ENDS = 6
-"""Bytes of a frame up to its length, which counts those behind it."""
 CLOSED = "the connection is closed"
-
-_FRAMER = FramerSocket(DecodePDU(is_server=False))
-
-
-class ClientError(Exception):
-    """No reply to a request; the text says why, in words."""
-
-
-class NotConnected(ClientError):
-    """The server was not reached, or the connection has ended."""
-
-
-class NobodyThere(NotConnected):
-    """Nobody accepts a connection at the address."""
-
-
-class ReplyTimeout(ClientError):
-    """No whole reply came within the time-out."""
-
-
-class UnexpectedReply(ClientError):
-    """What came is no reply to the request."""
-
-    def __init__(self, frame: bytes) -> None:
-        super().__init__(f"the reply does not fit: {frame.hex(' ')}")
-
-
-class Refused(ClientError):
-    """The server refuses the request with an exception."""
-
-    def __init__(self, code: int) -> None:
-        super().__init__(exception_text(code))
-        self.code = code
 
 
 class ModbusClient:
-    """A connection to a Modbus TCP server, closed until `open`.
+    """A connection to a Modbus server on TCP, closed until `open`.
 
     Args:
         host: name or address of the server.
@@ -76,20 +40,29 @@ class ModbusClient:
         unit: the unit that is asked, 0 to 255.
         timeout_s: for connecting, and for the whole of each reply.
         tls: certificates; None talks in the clear.
+        framing: how frames lie in the stream; None, as the specification of Modbus TCP has it.
 
     Raises:
         InputError: a file of `tls` that is not there or does not fit.
     """
 
-    def __init__(self, host: str, port: int, unit: int, timeout_s: float, tls: Tls | None = None) -> None:
-        self._address = (host, port)
-        self._unit = unit
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        unit: int,
+        timeout_s: float,
+        tls: Tls | None = None,
+        framing: Framing | None = None,
+    ) -> None:
+        self._host = host
+        self._address = HostAddress(host, port)
+        self._framing = framing or MbapFraming(unit)
         self._timeout_s = timeout_s
         self._context = None if tls is None else client_context(tls)
         self._handshake_timeout_s = 0.0 if tls is None else tls.handshake_timeout_s
         self._socket: socket.socket | None = None
         self._received = b""
-        self._transaction = 0
 
     def open(self) -> None:
         """Connect (anew).
@@ -100,9 +73,13 @@ class ModbusClient:
         self.close()
         self._received = b""
         try:
-            plain = socket.create_connection(self._address, self._timeout_s)
-        except socket.gaierror as error:
+            addresses = self._address.within(self._timeout_s)
+        except TimeoutError as error:
+            raise NotConnected(str(error)) from None
+        except OSError as error:
             raise NotConnected(error.strerror) from None
+        try:
+            plain = connected(addresses, self._timeout_s)
         except OSError:
             raise NobodyThere(f"nobody accepts a connection within {1e3 * self._timeout_s:g} ms") from None
         plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -125,10 +102,9 @@ class ModbusClient:
         line = self._socket
         if line is None:
             raise NotConnected(CLOSED)
-        self._transaction = transaction = self._transaction % LAST_TRANSACTION + 1
         try:
-            line.sendall(_FRAMER.encode(pdu, self._unit, transaction))
-            return self._reply(line, transaction)
+            line.sendall(self._framing.request(pdu))
+            return self._reply(line)
         except TimeoutError:
             self.close()
             raise ReplyTimeout(f"no reply within {1e3 * self._timeout_s:g} ms") from None
@@ -172,19 +148,12 @@ class ModbusClient:
             raise UnexpectedReply(reply)
         return reply
 
-    def _reply(self, line: socket.socket, transaction: int) -> bytes:
-        """Return the PDU of the next frame, which must be the reply to a transaction."""
+    def _reply(self, line: socket.socket) -> bytes:
+        """Return the PDU of the next frame, which must be the reply to the request."""
         due_s = time.monotonic() + self._timeout_s
         stream = self._received or _some(line)
         in_pieces = False
-        while True:
-            if stream[2:5].strip(b"\0"):  # another protocol, or longer than a frame
-                raise UnexpectedReply(stream)
-            used, unit, answered, pdu = _FRAMER.decode(stream)
-            if used:
-                break
-            if b"\0\0" <= stream[4:6] < b"\0\2":  # no frame is that short; pymodbus would wait for more
-                raise UnexpectedReply(stream)
+        while (found := self._framing.reply(stream)) is None:
             in_pieces = True
             if (left_s := due_s - time.monotonic()) <= 0:
                 raise TimeoutError
@@ -192,15 +161,14 @@ class ModbusClient:
             stream += _some(line)
         if in_pieces:
             line.settimeout(self._timeout_s)
-        if answered != transaction or unit != self._unit or used != LENGTH_ENDS + stream[LENGTH_ENDS - 1]:
-            raise UnexpectedReply(stream)
+        used, pdu = found
         self._received = stream[used:]
         return pdu
 
     def _secured(self, plain: socket.socket, context: ssl.SSLContext) -> ssl.SSLSocket:
         plain.settimeout(self._handshake_timeout_s)
         try:
-            secured = context.wrap_socket(plain, server_hostname=self._address[0])
+            secured = context.wrap_socket(plain, server_hostname=self._host)
         except OSError as error:
             plain.close()
             raise NotConnected(failure_reason(error)) from None

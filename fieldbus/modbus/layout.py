@@ -21,7 +21,8 @@ class Layout:
         self.words = max(address + form.words for address, form in places) - self.address
         self._values = struct.Struct(">" + "".join(LETTER[form.type] for _, form in places))
         source = [
-            2 * (address - self.address + (word if form.word_order == "big" else form.words - 1 - word)) + byte
+            2 * (address - self.address + (word if form.word_order == "big" else form.words - 1 - word))
+            + (byte if form.byte_order == "big" else 1 - byte)
             for address, form in places
             for word in range(form.words)
             for byte in (0, 1)

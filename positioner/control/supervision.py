@@ -65,7 +65,8 @@ class SupervisionMemory(NamedTuple):
     """Commands given since the last good measurement, which the device may hold or not."""
 
 
-UNFIT_STATUS = int(DeviceStatus.SENSOR_FAULT | DeviceStatus.NOT_READY | DeviceStatus.COMMUNICATION_LOST)
+UNFIT_STATUS = sum(DeviceStatus)
+"""Every bit of it: none is set of a device that measures and obeys."""
 
 
 def usable(sample: Sample, limits: Limits) -> bool:

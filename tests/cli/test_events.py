@@ -10,7 +10,7 @@ import pytest
 
 from config.codes import EventKind, Mode
 from config.registers import BY_NAME
-from fieldbus.modbus.client import Refused
+from fieldbus.modbus.client_errors import Refused
 from positioner.cli.main import main
 from positioner.cli.parts.children import port_in
 from positioner.dcs import Dcs

@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from config.register_format import Format, WireType, WordOrder
+from config.register_format import Format, Order, WireType
 from fieldbus.modbus.layout import Layout
 
 
@@ -24,7 +24,7 @@ from fieldbus.modbus.layout import Layout
     ],
 )
 def test_known_numbers_lie_as_the_specification_has_them(
-    kind: WireType, order: WordOrder, value: float, words: list[int]
+    kind: WireType, order: Order, value: float, words: list[int]
 ) -> None:
     assert Format(kind, order).encode(value) == words
     if kind != "uint64":  # decode gives a float, which holds 53 bits

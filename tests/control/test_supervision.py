@@ -79,7 +79,7 @@ def test_an_impossible_position_counts_as_no_measurement(position_m: float) -> N
     assert faults(watched([good(0.0), *bad], AUTOMATIC))[-2:] == [Fault.NONE, Fault.IMPLAUSIBLE]
 
 
-@pytest.mark.parametrize("status", [DeviceStatus.SENSOR_FAULT, DeviceStatus.NOT_READY, DeviceStatus.COMMUNICATION_LOST])
+@pytest.mark.parametrize("status", list(DeviceStatus))
 def test_an_unfit_device_is_a_fault_at_once(status: DeviceStatus) -> None:
     assert faults(watched([replace(good(0.0), status=status)], AUTOMATIC)) == [Fault.DEVICE]
 

@@ -53,10 +53,10 @@ def played_until(site: Site, monkeypatch: pytest.MonkeyPatch, happens: Callable[
         wait = dcs._client._reply
         left = [happens]
 
-        def reply(line: socket, transaction: int) -> bytes:
+        def reply(line: socket) -> bytes:
             if left and site.panel.get("experiment_state") == ExperimentState.UNDER_WAY:
                 left.pop()()
-            return wait(line, transaction)
+            return wait(line)
 
         monkeypatch.setattr(dcs._client, "_reply", reply)
         with pytest.raises((KeyboardInterrupt, DcsError)) as ended:

@@ -7,6 +7,7 @@ import logging
 import struct
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import can
@@ -490,6 +491,44 @@ def test_a_fault_of_the_node_is_reset_by_open(driver: CanopenDriver, node: Scrip
 def test_a_status_word_that_is_no_state_is_no_actuator(driver: CanopenDriver, node: Scripted) -> None:
     node.node._reads[STATUS_WORD] = lambda: 0b0000
     assert driver.exchange(PUSH_PA).status == DeviceStatus.NOT_READY
+
+
+def says(code: int) -> can.Message:
+    return frame(0x80 + NODE, struct.pack("<HB5x", code, 1 if code else 0))
+
+
+@pytest.mark.parametrize("code", [0x1000, 0x2310, 0x4200, 0x5000, 0x5530, 0x6100, 0x9000])
+def test_an_emergency_of_the_device_itself_is_a_fault_until_all_are_over(
+    driver: CanopenDriver, third: can.BusABC, code: int
+) -> None:
+    third.send(says(code))
+    third.send(says(0x8130))
+    in_time(lambda: driver.exchange(PUSH_PA).emergency == 0x8130)
+    assert driver.exchange(PUSH_PA).status == DeviceStatus.DEVICE_FAULT, "a later one does not hide it"
+    third.send(says(0))
+    in_time(lambda: driver.exchange(PUSH_PA).status == 0)
+
+
+@pytest.mark.parametrize("code", [0x8130, 0x8250, 0x6310, 0xFF42])
+def test_an_emergency_of_communication_a_parameter_or_the_makers_own_is_none(
+    driver: CanopenDriver, third: can.BusABC, code: int
+) -> None:
+    third.send(says(code))
+    in_time(lambda: driver.exchange(PUSH_PA).emergency == code)
+    assert driver.exchange(PUSH_PA).status == 0
+
+
+def shows(driver: CanopenDriver, code: int) -> bool:
+    return driver.exchange(PUSH_PA).emergency == code
+
+
+def test_a_remote_frame_for_a_tpdo_is_no_node_clash(driver: CanopenDriver, third: can.BusABC) -> None:
+    """Another master may ask for a TPDO: its frame has the same identifier, and no data."""
+    asks = can.Message(arbitration_id=TPDO_1, is_remote_frame=True, dlc=8, is_extended_id=False)
+    for code in (0x8130, 0x8120, 0x8130):
+        third.send(asks)
+        third.send(says(code))
+        in_time(partial(shows, driver, code))  # the remote frame has come when this one has
 
 
 @pytest.mark.parametrize(

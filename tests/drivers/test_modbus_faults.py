@@ -3,6 +3,7 @@
 The scripted device below answers honestly, from a simulated device, until it is given a fault.
 """
 
+import re
 import socket
 import struct
 import threading
@@ -14,7 +15,7 @@ from config.device import ModbusTcpDevice
 from config.modbus_map import SIMULATED_MAP
 from config.slave_file import SlaveFile
 from config.valve_file import shipped_valve
-from drivers.boundary import BadReply, DriverError, NoConnection, NoNumber, NoReply, Refused
+from drivers.boundary import BadReply, DoubleReply, DriverError, NoConnection, NoNumber, NoReply, Refused
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus.server import RegisterServer
 from sim.slave.clocks import Lockstep
@@ -113,7 +114,7 @@ def recovers(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
 
 
 MISFITS: dict[str, Fault] = {
-    "another transaction": lambda t, _, reply: frame(t ^ 1, reply),
+    "another transaction": lambda t, _, reply: frame(t + 2, reply),
     "another unit": lambda t, _, reply: frame(t, reply, unit=2),
     "another protocol": lambda t, _, reply: frame(t, reply, protocol=1),
     "another function": lambda t, _, reply: frame(t, b"\3" + reply[1:]),
@@ -194,7 +195,8 @@ def test_a_late_answer_is_never_taken_for_the_next(driver: ModbusTcpDriver, scri
 def test_an_answer_sent_twice_is_taken_once(driver: ModbusTcpDriver, scripted: ScriptedDevice) -> None:
     scripted.fault = lambda transaction, _, reply: 2 * frame(transaction, reply)
     assert driver.exchange(PUSH_PA).sample_counter == 2
-    refused_as(BadReply, lambda: driver.exchange(PUSH_PA))
+    text = refused_as(DoubleReply, lambda: driver.exchange(PUSH_PA))
+    assert re.search(r"the reply to transaction \d+ came twice", text)
     recovers(driver, scripted)
 
 
@@ -267,7 +269,7 @@ def test_open_fails_whole_when_the_timeout_cannot_be_set(driver: ModbusTcpDriver
 
 
 def test_a_host_name_nobody_knows_is_no_connection(monkeypatch: pytest.MonkeyPatch) -> None:
-    def unknown(*_: object) -> None:
+    def unknown(*_: object, **__: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
     monkeypatch.setattr(socket, "getaddrinfo", unknown)

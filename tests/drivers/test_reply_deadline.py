@@ -21,7 +21,8 @@ from drivers.boundary import BadReply, NoConnection, NoReply
 from drivers.modbus_rtu import ModbusRtuDriver
 from drivers.modbus_tcp import ModbusTcpDriver
 from fieldbus.modbus import client as modbus_client
-from fieldbus.modbus.client import ModbusClient, NotConnected, ReplyTimeout
+from fieldbus.modbus.client import ModbusClient
+from fieldbus.modbus.client_errors import NotConnected, ReplyTimeout
 from fieldbus.modbus.connection import Connection, endpoint
 from fieldbus.modbus.rtu import framed
 from fieldbus.modbus.server import RegisterServer

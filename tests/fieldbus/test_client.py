@@ -11,7 +11,8 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from fieldbus.modbus.client import ModbusClient, NobodyThere, NotConnected, Refused, ReplyTimeout, UnexpectedReply
+from fieldbus.modbus.client import ModbusClient
+from fieldbus.modbus.client_errors import NobodyThere, NotConnected, Refused, ReplyTimeout, UnexpectedReply
 
 pytestmark = pytest.mark.real_time
 

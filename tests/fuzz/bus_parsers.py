@@ -20,7 +20,8 @@ from drivers.canopen.node_bus import NodeBus
 from drivers.modbus_rtu import ModbusRtuDriver
 from fieldbus.canopen import loopback
 from fieldbus.canopen.eds import read_eds
-from fieldbus.modbus.client import ClientError, ModbusClient
+from fieldbus.modbus.client import ModbusClient
+from fieldbus.modbus.client_errors import ClientError
 from fieldbus.modbus.connection import HEADER, Connection
 from fieldbus.modbus.register_answers import RegisterAnswers
 from fieldbus.modbus.rtu import framed, is_whole
