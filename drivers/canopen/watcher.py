@@ -4,9 +4,9 @@
     emergency   0x080 + n, error code (2 bytes), error register (1 byte), five of the manufacturer's own
 
 A node that boots, leaves OPERATIONAL or falls silent is lost: the bus is left, and the driver must be opened again.
-Emergencies are logged with their cause. One of the device itself (current, voltage, temperature, hardware, software,
-modules, what is outside) makes it unfit until it says that all are over (code 0), or boots; those of communication and
-of a parameter do not, for what they tell of is seen or refused here as well.
+Emergencies are logged with their cause. One of what measures and obeys (current, voltage, hardware, software, modules)
+makes the device unfit until it says that all are over (code 0), or boots. The others do not: what those of
+communication and of a parameter tell of is seen or refused here as well, and a device that is too warm still measures.
 """
 
 import logging
@@ -50,11 +50,9 @@ EMERGENCIES = {
     0xFF00: "specific to the device",
 }
 """Error codes of CiA 301; a class ends in 00 or 000."""
-OF_THE_DEVICE = (0x1000, 0x2000, 0x3000, 0x4000, 0x5000, 0x6000, 0x7000, 0x9000, 0xF000)
+OF_THE_DEVICE = (0x2000, 0x3000, 0x5000, 0x6000, 0x7000)
 """Classes by their first digit."""
 OF_A_PARAMETER = 0x6300
-OF_ITS_MAKER = 0xFF00
-"""What these mean only the maker's data sheet says."""
 
 
 def cause_of(code: int) -> str:
@@ -64,8 +62,8 @@ def cause_of(code: int) -> str:
 
 
 def is_of_the_device(code: int) -> bool:
-    """Return whether an emergency says that the device itself is at fault."""
-    return code & 0xF000 in OF_THE_DEVICE and code & 0xFF00 not in (OF_A_PARAMETER, OF_ITS_MAKER)
+    """Return whether an emergency is of what measures and obeys."""
+    return code & 0xF000 in OF_THE_DEVICE and code & 0xFF00 != OF_A_PARAMETER
 
 
 class NodeWatcher:
@@ -90,7 +88,7 @@ class NodeWatcher:
         self.emergency = 0
         """The error code of the node's last emergency; 0 when all are over, or there was none."""
         self.is_unfit = False
-        """Whether an emergency of the device itself is not over."""
+        """Whether an emergency of what measures and obeys is not over."""
         self.refusal: str | None = None
         """Why the node refused a command since this was last set to None."""
 
