@@ -357,7 +357,7 @@ def load_valves(path: Path) -> tuple[DaemonFile, ...]:
     files = tuple(validated(DaemonFile, each, where, path.parent) for each, where in each_valve)
     if problem := _conflict(files) or _crowded_line(files):
         raise InputError(source, problem)
-    return files
+    return tuple(_beside_others(file, files) for file in files)
 
 
 def _tables_of_one(tables: dict[str, Any], entry: Any, where: str) -> tuple[dict[str, Any], str]:
@@ -400,6 +400,15 @@ def _conflict(files: Sequence[DaemonFile]) -> str | None:
         if problem := first.device.conflict_with(second.device):
             return f"valve.device: {names} have {problem}, allowed is one each"
     return None
+
+
+def _beside_others(file: DaemonFile, files: Sequence[DaemonFile]) -> DaemonFile:
+    """Return a valve's file that knows whether its device shares a gateway's line with another's."""
+    device = file.device
+    if not isinstance(device, ModbusTcpDevice) or device.shared_line is not None:
+        return file
+    shares = sum(device.is_beside(each.device) for each in files) > 1
+    return file.model_copy(update={"device": device.model_copy(update={"shared_line": shares})})
 
 
 def _crowded_line(files: Sequence[DaemonFile]) -> str | None:

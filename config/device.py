@@ -29,10 +29,16 @@ RENAMED = {"untouched": "read_only", "clash": "conflict_with", "turn_s": "longes
 """Members of `Device` by the names they had in 0.1: a bus that still overrides one would be passed over in silence."""
 
 
+RETRY_S, RETRY_SHARED_S = 1.0, 60.0
+"""From one attempt to the next, where nobody says: alone on its line soon, for nobody is kept waiting."""
+
+
 class Device(Schema):
     """What table `[device]` says of a device on any bus: a bus's own schema adds how to reach it."""
 
     bus: str
+    retry_every_s: Annotated[float, Field(ge=0.01, le=86400)] | None = None
+    """A device that does not answer is asked ever more seldom, in the end so often."""
     sampling: Literal["before", "after"] = "before"
     """What the pressure of a reply is: of the command before (latched, or on the device's own clock), or already of the
     one that the reply answers (sampled on request, after the write). A device in lockstep has obeyed for a period."""
@@ -52,6 +58,16 @@ class Device(Schema):
     def line(self) -> str | None:
         """The line that only one may use at a time, if the device hangs on one; devices of one line take turns."""
         return None
+
+    @property
+    def on_shared_line(self) -> bool:
+        """Whether asking this device when it does not answer keeps others waiting."""
+        return False
+
+    @property
+    def longest_retry_s(self) -> float:
+        """How often a device that does not answer is asked in the end; more seldom where that keeps others waiting."""
+        return self.retry_every_s or (RETRY_SHARED_S if self.on_shared_line else RETRY_S)
 
     @property
     def longest_exchange_s(self) -> float:
@@ -186,10 +202,22 @@ class ModbusTcpDevice(ModbusDevice):
     """"rtu": frames of a serial line, as a plain converter hands them through ("RTU over TCP")."""
     echoes_transaction: bool = True
     """Whether a reply has the number of its request; else whatever number comes is taken."""
+    shared_line: bool | None = None
+    """Whether a gateway to one serial line is at the address, which asks one device after another, and waits for each.
+    Where nobody says: if another valve of this file has another unit there."""
     reply_unit: Annotated[int, Field(ge=0, le=255)] | None = None
     """The unit that replies say where it is another than the one that is asked."""
     tls: Tls | None = None
     """Modbus/TCP Security in place of Modbus TCP; its registered port is 802."""
+
+    @property
+    def on_shared_line(self) -> bool:
+        """Whether it is behind a gateway that others need too."""
+        return bool(self.shared_line)
+
+    def is_beside(self, other: Device) -> bool:
+        """Return whether another device is at the same address."""
+        return isinstance(other, ModbusTcpDevice) and _at(self)[:2] == _at(other)[:2]
 
     def conflict_with(self, other: Device) -> str | None:
         """Say so if the other is the same device, however it is described."""

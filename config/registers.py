@@ -223,7 +223,13 @@ def _requests() -> tuple[Register, ...]:
 STATISTICS = (
     Register("cycles", 300, "uint32", "1", "cycles run, wraps"),
     Register("missed_periods", 302, "uint32", "1", "periods in which no cycle ran"),
-    Register("lost_samples", 304, "uint32", "1", "device samples not seen"),
+    Register(
+        "lost_samples",
+        304,
+        "uint32",
+        "1",
+        "samples of the device that no cycle looked at, for it samples faster or replies were lost",
+    ),
     Register("lost_replies", 306, "uint32", "1", "transactions without a good answer"),
     Register("period", 308, "float32", "s", "median of the last cycles' periods"),
     Register("jitter_99", 310, "float32", "s", "99 % of the last periods differ from the median by less than this"),

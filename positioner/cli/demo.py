@@ -312,8 +312,13 @@ def _report(outcome: DemoOutcome) -> None:
         f"\ncycle: {cycle['cycles']:.0f} run, median period {1e3 * cycle['period']:.3f} ms, "
         f"99 % within {1e6 * cycle['jitter_99']:.0f} us of it, {1e6 * cycle['cycle_time']:.0f} us each"
     )
-    counts = ("missed_periods", "lost_samples", "lost_replies", "unrecorded")
-    print(", ".join(f"{name.replace('_', ' ')} {cycle[name]:.0f}" for name in counts))
+    counts = {
+        "missed periods": "missed_periods",
+        "samples of the device that no cycle looked at": "lost_samples",
+        "lost replies": "lost_replies",
+        "not recorded": "unrecorded",
+    }
+    print(", ".join(f"{said} {cycle[name]:.0f}" for said, name in counts.items()))
 
 
 def _jsonable(outcome: DemoOutcome, seconds: float) -> dict[str, object]:

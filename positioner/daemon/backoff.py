@@ -1,7 +1,11 @@
 """Back-off: when to try again what failed, and what to say of it.
 
-A device is asked for again at once, for a reply may be lost; then ever more seldom. A kind of failure is said once and
-then counted, and so are the lines that one host causes beyond a few a second.
+A device is asked for again at once, for a reply may be lost; then ever more seldom. An attempt on a line that others
+need too keeps them waiting: there the first wait is so long that attempts take a small share of the line's time. A kind
+of failure is said once and then counted, and so are the lines that one host causes beyond a few a second.
+
+    wait_n = min(w 2^(n - 1), w_max)      n failures that are waited after, w_max by the file
+    w      = 10 ms; on a line that is shared (1 / s - 1) T, T what the attempt took, s the share of the line's time
 """
 
 import math
@@ -11,17 +15,27 @@ from fieldbus.modbus.admission import Allowance
 
 AT_ONCE = 4
 """Failures before the first wait: a reply that was lost, and three attempts."""
-FIRST_S, LONGEST_S = 0.01, 1.0
-MOST = AT_ONCE + 8
-"""Failures that are remembered: then the wait is the longest."""
+FIRST_S = 0.01
+SHARE = 0.1
+"""Of the time of a line that is shared, which attempts may take at the most."""
+MOST_DOUBLINGS = 30
+"""Failures beyond are not counted: every wait is the longest by then."""
 MAKE_UP = 2
 """Successes that make up for a failure: a line that loses a reply now and then is no device that is away."""
 
 
 class Backoff:
-    """Of one thing that is tried: `may_try`, then `failed` or `succeeded`. Times are of any clock, s."""
+    """Of one thing that is tried: `may_try`, then `failed` or `succeeded`. Times are of any clock, s.
 
-    def __init__(self) -> None:
+    Args:
+        longest_s: between two attempts, in the end.
+        shared: whether an attempt keeps others waiting.
+    """
+
+    def __init__(self, longest_s: float = 1.0, *, shared: bool = False) -> None:
+        self._longest_s = longest_s
+        self._shared = shared
+        self._at_once = 0 if shared else AT_ONCE
         self._failures = 0.0
         self._next_s = -math.inf
 
@@ -29,16 +43,17 @@ class Backoff:
         """Return whether it is time to try."""
         return now_s >= self._next_s
 
-    def failed(self, now_s: float) -> None:
-        """Note a failure: the next attempt waits, for twice as long each time."""
-        self._failures = min(self._failures + 1.0, MOST)
-        beyond = math.ceil(self._failures - AT_ONCE)
+    def failed(self, now_s: float, took_s: float = 0.0) -> None:
+        """Note a failure, and how long the attempt took: the next one waits, for twice as long each time."""
+        self._failures = min(self._failures + 1.0, self._at_once + MOST_DOUBLINGS)
+        beyond = math.ceil(self._failures - self._at_once)
         if beyond > 0:
-            self._next_s = now_s + min(FIRST_S * 2.0 ** (beyond - 1), LONGEST_S)
+            first_s = max(FIRST_S, (1.0 / SHARE - 1.0) * took_s) if self._shared else FIRST_S
+            self._next_s = now_s + min(first_s * 2.0 ** (beyond - 1), self._longest_s)
 
     def succeeded(self) -> None:
         """Note a success: who answers is not away, however long it was."""
-        self._failures = max(0.0, min(self._failures, AT_ONCE) - 1.0 / MAKE_UP)
+        self._failures = max(0.0, min(self._failures, self._at_once) - 1.0 / MAKE_UP)
 
 
 class Sayings:

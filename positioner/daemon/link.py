@@ -62,6 +62,10 @@ class LinkSettings:
     """What is commanded in place of what it does when it vents or fills by itself."""
     acts_alone_by: ActionName | None = None
     """What it was told to do by itself; None where it cannot be told."""
+    retry_every_s: float = 1.0
+    """The longest from one attempt to reach it to the next."""
+    on_shared_line: bool = False
+    """Whether an attempt keeps others waiting."""
 
     @classmethod
     def of(cls, file: DaemonFile, tolerance_pa: float) -> "LinkSettings":
@@ -79,6 +83,8 @@ class LinkSettings:
             vented_pa=file.pressure.minimum_pa,
             filled_pa=file.pressure.maximum_pa,
             acts_alone_by=file.device.acts_alone_by,
+            retry_every_s=file.device.longest_retry_s,
+            on_shared_line=file.device.on_shared_line,
         )
 
 
@@ -117,10 +123,14 @@ class Link:
         """When the last command set out, or the device was looked at, on the gateway's clock."""
         self._begun_s = self._returned_s = math.inf
         self._unattended_s = 0.0
-        self._backoff = Backoff()
+        self._backoff = Backoff(self._settings.retry_every_s, shared=self._settings.on_shared_line)
         self._sayings = Sayings()
         self._refusals = 0
-        self._connected = False
+        self._connected = self._was_reached = False
+        self._was_away = True
+        """Whether the device was lost, or left alone, since it was looked at last."""
+        self._asked_s = math.inf
+        """When the exchange under way began."""
         self._reading: Reading | None = None
         self._sample = Sample(0.0, 0.0, math.nan, math.nan, Quality.LOST)
 
@@ -143,7 +153,8 @@ class Link:
     def _opened(self) -> tuple[float, Reading]:
         held_pa = self._driver.open()
         reading = self._driver.read()
-        self._connected = True
+        self._connected = self._was_reached = True
+        self._was_away = False
         return self._in_force_pa(held_pa, reading), reading
 
     @property
@@ -153,7 +164,7 @@ class Link:
 
     def exchange(self, command_pa: float) -> Sample:
         """Command a pressure and return the sample that comes back, or what is known without it."""
-        now_s = awake_s()
+        now_s = self._asked_s = awake_s()
         self._notice_a_stall(now_s, command_pa)
         try:
             held_pa = self._overwritten_pa() if self._connected else None
@@ -170,7 +181,7 @@ class Link:
                 if self._began_anew(reading):
                     self._say(logging.WARNING, "device began anew", device_time_s=reading.device_time_s)
                     self._driver.close()
-                    self._connected = False
+                    self._connected, self._was_away = False, True
                     self._sample = self._lost()
                 else:
                     self._sample = self._fresh(reading, command_pa, told_pa)
@@ -222,7 +233,7 @@ class Link:
         self._connected = False
         if 0.0 <= now_s - self._begun_s <= allowed_s:  # it was set up meanwhile
             return
-        self._unattended_s = now_s - since_s
+        self._unattended_s, self._was_away = now_s - since_s, True
         log_event(
             log,
             logging.ERROR,
@@ -255,7 +266,7 @@ class Link:
         if driver.settings_kept():
             return
         self._say(logging.ERROR, "the device has lost its time-out or action: it was restarted")
-        self._connected, self._restarted = False, True
+        self._connected, self._restarted, self._was_away = False, True, True
 
     def _found_again(self) -> Sample:
         """Connect anew, and look at what the device holds and says without commanding it."""
@@ -273,9 +284,17 @@ class Link:
         )
         self._connected, self._refusals, self._unattended_s, self._restarted = True, 0, 0.0, False
         self._commanded_s = awake_s()
-        self._say(logging.WARNING, "device is back", held_pa=held_pa, status=reading.status)
+        self._say_found(held_pa, reading.status)
         repeated = before is not None and _same_sample(before, reading)
         return replace(sample, quality=Quality.REPEATED) if repeated else sample
+
+    def _say_found(self, held_pa: float, status: int) -> None:
+        """Say that the device is there: it is back, or was never reached before, or was but set up for long."""
+        level, event = logging.INFO, "device is looked at after the set-up"
+        if self._was_away:
+            level, event = logging.WARNING, "device is back" if self._was_reached else "device is there"
+        self._say(level, event, held_pa=held_pa, status=status)
+        self._was_reached, self._was_away = True, False
 
     def _in_force_pa(self, set_point_pa: float, reading: Reading) -> float:
         """Return the command that holds the device where it is: its set point, or what it does in its place.
@@ -298,6 +317,7 @@ class Link:
         self.counts.lost_replies += 1
         kind = error.kind or type(error).__name__
         self._say(logging.WARNING, "no good reply", kind, reason=str(error))
+        self._was_away = True
         self._sample = self._lost()
         if isinstance(error, NoNumber):
             self._sample = replace(self._sample, quality=Quality.NO_NUMBER)
@@ -307,7 +327,8 @@ class Link:
             return
         self._driver.close()
         self._connected = False
-        self._backoff.failed(awake_s())
+        now_s = awake_s()
+        self._backoff.failed(now_s, now_s - self._asked_s)
 
     def _lost(self) -> Sample:
         now_s = self._pace.now_s(None)
@@ -325,7 +346,8 @@ class Link:
         """Log an event, each kind once a minute; then with how many were passed over."""
         passed = self._sayings.unsaid((event, kind), awake_s())
         if passed is not None:
-            log_event(log, level, event, **fields, **({"times_unsaid": passed} if passed else {}))
+            what = {"kind": kind} if kind else {}
+            log_event(log, level, event, **what, **fields, **({"times_unsaid": passed} if passed else {}))
 
     def _fresh(self, reading: Reading, command_pa: float, before_pa: float | None = None) -> Sample:
         """Return a reading as a sample; it answers `command_pa`, and the command before it was `before_pa`."""

@@ -83,7 +83,7 @@ def cycle(picture: ValvePicture) -> list[Fact]:
     counts = [
         ("cycles", "cycles"),
         ("missed periods", "missed_periods"),
-        ("lost samples", "lost_samples"),
+        ("samples not looked at", "lost_samples"),
         ("lost replies", "lost_replies"),
         ("not recorded", "unrecorded"),
     ]
