@@ -82,6 +82,10 @@ class Fault(Code):
     SATURATED = 12, "the command is at its limit for too long"
     OVERRUN = 13, "cycles or replies take longer than their period"
     COMMAND_RATE = 14, "the command changes faster than it may"
+    COMMAND_NOT_FINITE = (
+        15,
+        "the daemon itself: its command was no finite number and was not given",
+    )
 
 
 class Quality(Code):

@@ -10,6 +10,7 @@ real time.
     supervision, states, reference              who commands, S0 to S3, the reference and its last change
     monitors                                    conditions of stem, command and cycle that must not last
     laws                                        the laws, a folder each: what commands in S1 and S2
+    pressure_clamp                              the one clamp: what is not finite is not commanded
     pressure_path                               lead against a slow pressure of an extended valve, and its arrival
     cutoffs                                     beside a stop: the stem is pressed onto it
     valve_knowledge, restoration                what is known of a valve, as data; is it still true after a restart

@@ -5,9 +5,24 @@ the running integrals of the identification. It reads no clock.
 """
 
 from dataclasses import replace
+from math import isfinite
 from typing import NamedTuple
 
-from config.codes import AUTOMATIC, MANUAL, S0, S1, S2, S3, InhibitReason, Mode, Quality, Refusal, Restored, State
+from config.codes import (
+    AUTOMATIC,
+    MANUAL,
+    S0,
+    S1,
+    S2,
+    S3,
+    Fault,
+    InhibitReason,
+    Mode,
+    Quality,
+    Refusal,
+    Restored,
+    State,
+)
 from config.quantities import DeviceStatus
 from positioner.control import pressure_path
 from positioner.control.controller_memory import ConsumedRequests, ControllerMemory, Decision
@@ -17,6 +32,7 @@ from positioner.control.identifying import estimates_tested, identify
 from positioner.control.laws.boundary import Law, Seen
 from positioner.control.monitors import MonitorMemory, after_cycle
 from positioner.control.played_experiment import PlayedExperiment, Surroundings, experiment_after
+from positioner.control.pressure_clamp import clamped
 from positioner.control.pressure_path import PathMemory, long_held
 from positioner.control.reference import Reference
 from positioner.control.requests import Requests
@@ -166,17 +182,20 @@ def step(now: Now) -> tuple[ControllerMemory, Decision]:
     if asked_pa is None:
         exciting = experiment if experiment.commands else excitation
         asked_pa = _pressure_pa(now, state, held_pa, exciting, law, cut_off)
-    limited_pa = min(max(asked_pa, settings.minimum_pa), settings.maximum_pa)
-    wanted_pa = settings.delivered_pa(limited_pa)
-    path = _path(now, wanted_pa, lead=not supervision.fault and follows)
-    command_pa = wanted_pa if path is None else path.command_pa
+    commanded = _commanded(now, asked_pa, lead=not supervision.fault and follows)
+    if commanded is None:
+        supervision, state, held_pa = supervision.failed(settings.limits), S0, memory.wanted_pa
+        situation, law = situation._replace(automatic=False), settings.law.begin(held_pa)
+        consumed = _consumed(now, supervision)
+        commanded = _held_instead(now)
+    wanted_pa, command_pa, path = commanded
 
     by_law = InhibitReason.CUT_OFF if cut_off != WITHIN else law.inhibit_reason
     inhibit_reason = (
         excitation_inhibit
         or (NOTHING if experiment.commands or excitation is None else excitation.waits_for(now.statics))
         or (InhibitReason.RESTORED_WAITS if waits else law_inhibit_reason(situation))
-        or (by_law if limited_pa == asked_pa else InhibitReason.LAW_BEYOND_LIMITS)
+        or (by_law if settings.minimum_pa <= asked_pa <= settings.maximum_pa else InhibitReason.LAW_BEYOND_LIMITS)
     )
     decision = Decision(
         command_pa=command_pa,
@@ -365,6 +384,34 @@ def _obeyed(now: Now) -> bool:
     return held_pa is None or abs(held_pa - now.memory.command_pa) <= now.settings.limits.restart_tolerance_pa
 
 
+class Commanded(NamedTuple):
+    """What is commanded, Pa: the pressure wanted, the command that brings it about, and the pressure on its way."""
+
+    wanted_pa: float
+    command_pa: float
+    path: PathMemory | None
+
+
+def _commanded(now: Now, asked_pa: float, *, lead: bool) -> Commanded | None:
+    """Return the command for a pressure that is asked for, Pa; None where it would not be a finite number."""
+    settings = now.settings
+    limited_pa = clamped(asked_pa, settings.minimum_pa, settings.maximum_pa)
+    if not isfinite(limited_pa):
+        return None
+    wanted_pa = settings.delivered_pa(limited_pa)
+    path = _path(now, wanted_pa, lead=lead)
+    command_pa = wanted_pa if path is None else path.command_pa
+    return Commanded(wanted_pa, command_pa, path) if isfinite(command_pa) else None
+
+
+def _held_instead(now: Now) -> Commanded:
+    """Return the safe action in place of a command that is not finite; to hold is to hold the last one."""
+    settings, memory = now.settings, now.memory
+    action = settings.limits.action_on(Fault.COMMAND_NOT_FINITE)
+    safe_pa = settings.delivered_pa(settings.safe_pa(action, memory.wanted_pa))
+    return Commanded(safe_pa, safe_pa, None if memory.path is None else long_held(safe_pa, now.sample.now_s))
+
+
 def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
     """Return what is remembered of the pressure on its way, and with it the command."""
     memory, settings = now.memory.path, now.settings
@@ -373,6 +420,8 @@ def _path(now: Now, wanted_pa: float, *, lead: bool) -> PathMemory | None:
     limits_pa = (settings.minimum_pa, settings.maximum_pa)
     inverse = settings.valve.inverse
     path = pressure_path.after_step(memory, now.sample.now_s, wanted_pa, inverse, limits_pa, lead=lead)
+    if not isfinite(path.command_pa):
+        return path
     return path._replace(command_pa=settings.delivered_pa(path.command_pa))
 
 

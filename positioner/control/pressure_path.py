@@ -16,6 +16,7 @@ from math import exp, inf
 from typing import NamedTuple
 
 from config.extended_valve import Inverse
+from positioner.control.pressure_clamp import clamped
 
 LEFT = 0.02
 """Of the change: not led to."""
@@ -43,9 +44,9 @@ class PathMemory(NamedTuple):
         return now_s - self.arrived_s >= inverse.dead_time_s
 
 
-def long_held(pressure_pa: float) -> PathMemory:
-    """Return the memory of a command long held."""
-    return PathMemory(pressure_pa, pressure_pa, 0.0, pressure_pa, 0.0, -inf)
+def long_held(pressure_pa: float, now_s: float = 0.0) -> PathMemory:
+    """Return the memory, at a time, of a command long held."""
+    return PathMemory(pressure_pa, pressure_pa, 0.0, pressure_pa, now_s, -inf)
 
 
 def after_step(
@@ -71,7 +72,7 @@ def after_step(
     command_pa = wanted_pa
     if lead and inverse.lag_s > 0.0 and h > 0.0 and abs(to_go_pa) > 2.0 * LEFT * abs(change_pa):
         led_pa = pressure_pa + (to_go_pa - LEFT * change_pa) / (1.0 - exp(-h / inverse.lag_s))
-        command_pa = min(max(led_pa, limits_pa[0]), limits_pa[1])
+        command_pa = clamped(led_pa, *limits_pa)
     arrived_s = inf
     if arrived:
         arrived_s = min(memory.arrived_s, now_s) if wanted_pa == memory.wanted_pa else now_s

@@ -31,6 +31,7 @@ position is wired the other way round: each further step would take it farther o
 from dataclasses import dataclass, replace
 from math import inf, nan, sqrt
 
+from positioner.control.pressure_clamp import clamped
 from positioner.estimation.landings.landing_detector import SlideOutcome
 
 FIRST_STEP, LARGEST_STEP = 0.02, 0.05
@@ -283,7 +284,7 @@ class Staircase:
             step_pa = FIRST_STEP * span_pa
         else:
             step_pa = min(GROWTH * self.step_pa, LARGEST_STEP * span_pa) if self.step_pa else FIRST_STEP * span_pa
-        level_pa = min(max(self.level_pa + self.direction * step_pa, limits.minimum_pa), limits.maximum_pa)
+        level_pa = clamped(self.level_pa + self.direction * step_pa, limits.minimum_pa, limits.maximum_pa)
         return replace(
             self,
             level_pa=level_pa,

@@ -64,6 +64,12 @@ class SupervisionMemory(NamedTuple):
     unanswered_pa: tuple[float, ...] = ()
     """Commands given since the last good measurement, which the device may hold or not."""
 
+    def failed(self, limits: Limits) -> "SupervisionMemory":
+        """Return what is known where the daemon itself has failed: what was to be commanded is not finite."""
+        fault = Fault.COMMAND_NOT_FINITE
+        by_hand = self.mode is not HOLD and limits.action_on(fault) == "manual"
+        return self._replace(mode=MANUAL if by_hand else HOLD, fault=fault)
+
 
 UNFIT_STATUS = sum(DeviceStatus)
 """Every bit of it: none is set of a device that measures and obeys."""

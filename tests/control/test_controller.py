@@ -1,7 +1,9 @@
 """The control core on a scripted stem: modes, states, what is held, what is given back."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
+from typing import Self
 
 import pytest
 
@@ -10,9 +12,11 @@ from config.daemon_file import DaemonFile
 from config.quantities import DeviceStatus
 from positioner.control.controller import Controller
 from positioner.control.controller_memory import Decision
+from positioner.control.laws.boundary import Seen, Unlearning
 from positioner.control.requests import QUIET, Requests
 from positioner.control.sample import Sample
 from positioner.control.settings import Settings
+from positioner.control.sine_excitation import SineExcitation
 
 HELD_PA = 40e3
 STROKE_M = 0.1
@@ -258,7 +262,31 @@ def stall(bench: Bench) -> Decision:
     return bench.step(unattended_s=2.0)
 
 
+@dataclass(frozen=True)
+class BrokenLaw(Unlearning):
+    """A law that has divided by zero: nothing that it says from then on is a finite number."""
+
+    command_pa: float
+    inhibit_reason: InhibitReason = InhibitReason.NOTHING
+
+    def observe(self, _seen: Seen) -> Self:
+        return self
+
+    def interrupted_pa(self, _command_pa: float) -> float:
+        return self.command_pa
+
+
+def broken_by(command_pa: float) -> Fail:
+    def divide(bench: Bench) -> Decision:
+        bench.controller._memory = bench.controller._memory._replace(law=BrokenLaw(command_pa))
+        return bench.step()
+
+    return divide
+
+
 FAILURES = [
+    (broken_by(nan), Fault.COMMAND_NOT_FINITE),
+    (broken_by(inf), Fault.COMMAND_NOT_FINITE),
     (lose, Fault.NO_REPLY),
     (jump, Fault.IMPLAUSIBLE),
     (break_down, Fault.DEVICE),
@@ -296,6 +324,35 @@ def test_recovery_moves_nothing_before_the_mode_is_chosen_again(fail: Fail, faul
     assert bench.step().command_pa == 0.0, "the reference of before the fault is void"
     bench.ask(reference_m=0.06)
     assert bench.step().state is State.S1_UP
+
+
+@pytest.mark.parametrize("mode", [Mode.AUTOMATIC, Mode.HOLD])
+@pytest.mark.parametrize("command_pa", [nan, inf, -inf])
+def test_a_command_that_is_not_finite_never_leaves_and_the_last_one_is_held(mode: Mode, command_pa: float) -> None:
+    """In hold it is what follows an interruption that is none."""
+    bench = automatic()
+    bench.ask(reference_m=0.05)
+    before_pa = bench.step().command_pa
+    bench.ask(mode=mode)
+    failed = broken_by(command_pa)(bench)
+    assert (failed.fault, failed.state, failed.mode) == (Fault.COMMAND_NOT_FINITE, State.S0_START, Mode.HOLD)
+    assert failed.command_pa == before_pa
+    assert {bench.step().command_pa for _ in range(5)} == {before_pa}
+    assert isfinite(bench.controller.left_pa)
+
+
+@pytest.mark.parametrize("excitation", ["staircase", "sine"])
+def test_nor_does_one_of_an_excitation(excitation: str) -> None:
+    bench = automatic(excitation={"kind": excitation})
+    bench.ask(eta=(0, 0, 0), alpha_pa=50e3)
+    before_pa = bench.step().command_pa
+    memory = bench.controller._memory
+    assert memory.excitation is not None
+    broken = replace(memory.excitation, signal=SineExcitation(nan, BETA_PA, 1.0))
+    bench.controller._memory = memory._replace(excitation=broken)
+    failed = bench.step()
+    assert (failed.fault, isfinite(failed.command_pa)) == (Fault.COMMAND_NOT_FINITE, True)
+    assert failed.command_pa == before_pa
 
 
 def test_a_restarted_device_keeps_the_pressure_it_came_back_with() -> None:

@@ -17,6 +17,7 @@ from typing import ClassVar, Self
 from config.codes import InhibitReason
 from config.daemon_file import DaemonFile
 from positioner.control.laws.boundary import Seen, Unlearning
+from positioner.control.pressure_clamp import clamped
 from positioner.estimation.acceptance import Ratios
 
 GAIN = 0.1
@@ -80,6 +81,6 @@ class ConventionalLaw(Unlearning):
             share = min(settings.integral_rate_per_s * (now_s - self.now_s), 1 - 2 * settings.gain)
             integral_pa += share * error_pa
         wanted_pa = proportional_pa + integral_pa
-        command_pa = min(max(wanted_pa, settings.minimum_pa), settings.maximum_pa)
+        command_pa = clamped(wanted_pa, settings.minimum_pa, settings.maximum_pa)
         kept_pa = integral_pa if command_pa == wanted_pa else self.integral_pa
         return ConventionalLaw(command_pa, settings, kept_pa, now_s)
