@@ -4,9 +4,10 @@
 
     valve_view                      what is known of one valve, and what has changed
     freshness                       whether what was read last is still so
+    waiting_reference               a reference that automatic will follow, and who wrote it
     trends                          the last minutes, with their gaps, and the states as bands
     friction_file                   friction against its baseline, kept over restarts
-    happened                        events, from the daemon's history or as served
+    happened                        what has happened, from the daemon's history or as seen, each thing once
     words                           codes, causes and estimates in words
     poller                          reads a daemon in a thread of its own
     watched_valves                  the valves that somebody looks at, their pollers and connections
@@ -14,6 +15,7 @@
     permissives, valve_commands     what must hold, and what an operator may do, confirmed by what is read back
 """
 
-from positioner.observer.valve_view import SeenEvent, ValvePicture, ValveView
+from positioner.observer.happened import SeenEvent
+from positioner.observer.valve_view import ValvePicture, ValveView
 
 __all__ = ["SeenEvent", "ValvePicture", "ValveView"]

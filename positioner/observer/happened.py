@@ -1,10 +1,12 @@
-"""What has happened to a valve: from its daemon's history where that can be read, else the newest events as served.
+"""What has happened to a valve, each thing once: from its daemon's history where that can be read, else as seen.
 
 Over the bus a daemon says its newest event alone; those that came between two readings are counted, and not known.
+Its codes are read far more often, so without a history it is they that tell what they can. Of the connection no history
+knows: that is always told as seen.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,12 +18,34 @@ from positioner.history.entries import Event
 from positioner.observer.words import code_text
 
 FROM_HISTORY = "from the daemon's history"
-AS_SERVED = "as served since this page looks; the daemon's history is off, or not on this machine"
+AS_SERVED = "as seen since this page looks; the daemon's history is off, or not on this machine"
+IN_CODES = frozenset(
+    (
+        EventKind.MODE,
+        EventKind.FAULT,
+        EventKind.FAULT_GONE,
+        EventKind.HEALTH,
+        EventKind.IDENTIFIED,
+        EventKind.NOT_IDENTIFIED,
+        EventKind.RESTORED,
+        EventKind.EXPERIMENT,
+    )
+)
+"""Kinds of event that registers of codes and counts tell of, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeenEvent:
+    """A change that was seen: when, s, and what, in words; whether it is one of the connection."""
+
+    time_s: float
+    text: str
+    of_connection: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Happened:
-    """A line: when, s since 1970, NaN where that is not known; what, in words; its NE 107 class."""
+    """A line: when, s since 1970; what, in words; its NE 107 class, empty where that is good or said already."""
 
     time_s: float
     text: str
@@ -36,23 +60,30 @@ class WhatHappened:
     source: str
 
 
-def what_happened(folder: Path | None, valve: str, served: Iterable[Event], most: int) -> WhatHappened:
+def what_happened(
+    folder: Path | None, valve: str, served: Iterable[Event], seen: Iterable[SeenEvent], off_s: float, most: int
+) -> WhatHappened:
     """Return the newest events of a valve.
 
     Args:
         folder: of the daemon's history; None where it keeps none, or nobody said where.
         valve: its name in the history.
         served: events that were read over the bus, oldest first.
+        seen: changes of registers and of the connection.
+        off_s: what makes a time of `seen` one since 1970.
         most: that are returned.
     """
-    source = AS_SERVED
+    source, in_codes, told = AS_SERVED, IN_CODES, list(served)
     if folder is not None:
         try:
             with HistoryReader(folder) as history:
-                return WhatHappened(tuple(_lines(history.events(valve, limit=most)))[::-1], FROM_HISTORY)
+                source, in_codes, told = FROM_HISTORY, frozenset(), history.events(valve, limit=most)
         except InputError as error:
             source = f"{AS_SERVED} ({error.problem})"
-    return WhatHappened(tuple(_lines(served))[::-1][:most], source)
+    lines = list(_lines(told, in_codes))
+    lines += [Happened(each.time_s + off_s, each.text) for each in seen if each.of_connection or in_codes]
+    newest_first = sorted(lines, key=lambda each: each.time_s, reverse=True)
+    return WhatHappened(tuple(newest_first[:most]), source)
 
 
 def served_event(valve: str, values: Mapping[str, float]) -> Event | None:
@@ -67,12 +98,19 @@ def served_event(valve: str, values: Mapping[str, float]) -> Event | None:
     return Event(valve, int(number), values["event_time"], kind, name, ne107, cause, text)
 
 
-def _lines(events: Iterable[Event]) -> Iterator[Happened]:
-    """Yield a line an event, oldest first, and one where numbers are missing."""
-    events = list(events)
+def _lines(events: Iterable[Event], without: Container[int]) -> Iterator[Happened]:
+    """Yield a line an event, oldest first, and one where numbers are missing; none of the kinds left out."""
     for before, after in pairwise([None, *events]):
         assert after is not None
         if before is not None and after.number > before.number + 1:
-            yield Happened(math.nan, f"{after.number - before.number - 1} events more, which were not read")
-        ne107 = code_text("event_class", after.ne107) if after.ne107 != Ne107Status.GOOD else ""
-        yield Happened(after.time_s, after.words, ne107)
+            yield Happened(after.time_s, f"{after.number - before.number - 1} events before this, which were not read")
+        if after.kind not in without:
+            yield _said(after)
+
+
+def _said(event: Event) -> Happened:
+    if event.kind == EventKind.HEALTH:
+        ne107 = code_text("event_class", event.ne107)
+        return Happened(event.time_s, f"NE 107: {ne107}" + (f", {event.text}" if event.text else ""))
+    ne107 = code_text("event_class", event.ne107) if event.ne107 != Ne107Status.GOOD else ""
+    return Happened(event.time_s, event.words, ne107)

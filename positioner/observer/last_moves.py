@@ -9,6 +9,7 @@ import numpy as np
 
 from config.recording import Column, Recording
 from positioner.daemon.recorder import COLUMNS, files_of
+from positioner.observer.trends import WAITING
 from positioner.observer.valve_view import ValveView
 from positioner.response import ResponseFigures, respond
 
@@ -50,7 +51,7 @@ def polled(trend: dict[str, Column]) -> Recording | None:
     whole = np.isfinite(trend["position_m"]) & np.isfinite(trend["command_pa"])
     if not whole.any():
         return None
-    return Recording({name: column[whole] for name, column in trend.items()})
+    return Recording({name: column[whole] for name, column in trend.items() if name != WAITING})
 
 
 def recorded_tail(folder: Path, valve: str, seconds: float, wall_s: float) -> Recording | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from config.codes import State
 from config.recording import Column
+from positioner.observer.waiting_reference import waiting_reference
 
 SHOWN = {
     "reference_m": "reference_in_force",
@@ -20,6 +21,9 @@ SHOWN = {
     "state": "state",
 }
 """Columns, by the register that each comes from; a reference is served in p.u."""
+WAITING = "waiting_m"
+"""The column of a reference that waits."""
+COLUMNS = (*SHOWN, WAITING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,29 +36,30 @@ class Band:
 
 
 class Trend:
-    """The last `capacity` readings: times, s, and the columns of `SHOWN`, SI units."""
+    """The last `capacity` readings: times, s, and the columns of `COLUMNS`, SI units."""
 
     def __init__(self, capacity: int) -> None:
-        self._rows = np.full((capacity, 1 + len(SHOWN)), np.nan)
+        self._rows = np.full((capacity, 1 + len(COLUMNS)), np.nan)
         self._count = 0
 
     def append(self, time_s: float, values: Mapping[str, float], stroke_m: float) -> None:
         """Take a reading; what it does not have, and a measurement that is none, is NaN."""
         row = {name: values.get(register, np.nan) for name, register in SHOWN.items()}
         row["reference_m"] *= stroke_m
-        self._enter(time_s, list(row.values()))
+        waiting_pu = waiting_reference(values)
+        self._enter(time_s, [*row.values(), np.nan if waiting_pu is None else waiting_pu * stroke_m])
 
     def gap(self, time_s: float) -> None:
         """Break the lines: nothing is known of this moment."""
-        self._enter(time_s, [np.nan] * len(SHOWN))
+        self._enter(time_s, [np.nan] * len(COLUMNS))
 
     def since(self, begin_s: float) -> dict[str, Column]:
-        """Return the columns after a time, `time_s` and those of `SHOWN`, (n,) each, oldest first."""
+        """Return the columns after a time, `time_s` and those of `COLUMNS`, (n,) each, oldest first."""
         capacity = len(self._rows)
         order = np.arange(max(0, self._count - capacity), self._count) % capacity
         rows = self._rows[order]
         rows = rows[rows[:, 0] > begin_s]
-        return {name: rows[:, index].copy() for index, name in enumerate(("time_s", *SHOWN))}
+        return {name: rows[:, index].copy() for index, name in enumerate(("time_s", *COLUMNS))}
 
     def _enter(self, time_s: float, row: list[float]) -> None:
         self._rows[self._count % len(self._rows)] = (time_s, *row)

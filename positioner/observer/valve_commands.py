@@ -15,6 +15,7 @@ from config.roles import Role
 from positioner.dcs import Dcs
 from positioner.observer.permissives import identify_permissives
 from positioner.observer.valve_view import ValvePicture
+from positioner.observer.waiting_reference import SAME_PU
 from positioner.observer.words import CODES, code_text
 
 SAME = 1e-6
@@ -58,6 +59,14 @@ def _as_read(name: str, value: float) -> str:
     return f"{100 * value:.6g} %" if name == "reference" else f"{value:.6g}"
 
 
+def _confirmed(name: str, value: float, read: float) -> Confirmation:
+    """Return what became of a write, by what reads back."""
+    said = _as_read(name, read)
+    if abs(read - value) <= SAME * max(1.0, abs(value)):
+        return Confirmation(True, f"{name} is {said}, as read back")
+    return Confirmation(False, f"{name} was written, but reads back {said}")
+
+
 class ValveCommands:
     """Commands to one valve.
 
@@ -76,17 +85,46 @@ class ValveCommands:
         """Write a register; confirmed when it reads back so."""
 
         def written(dcs: Dcs) -> Confirmation:
-            read = dcs.set_and_read_back(name, value)
-            said = _as_read(name, read)
-            if abs(read - value) <= SAME * max(1.0, abs(value)):
-                return Confirmation(True, f"{name} is {said}, as read back")
-            return Confirmation(False, f"{name} was written, but reads back {said}")
+            return _confirmed(name, value, dcs.set_and_read_back(name, value))
 
         return self._within_rights(role, (name,), written)
 
     def set_mode(self, role: Role, mode: Mode) -> Confirmation:
         """Change who commands the pressure."""
         return self.set(role, "mode", mode)
+
+    def automatic(self, role: Role, seen_pu: float, *, goes: bool) -> Confirmation:
+        """Let the law follow the reference that was seen, or, where it is not to go there, the stem's own place.
+
+        Nothing is written where the register says another by now: the stem would go where nobody has agreed to.
+
+        Args:
+            role: of who asks.
+            seen_pu: what register `reference` said when it was agreed to.
+            goes: whether the stem goes there; else its own place is written first.
+        """
+
+        def written(dcs: Dcs) -> Confirmation:
+            asked_pu = dcs.get("reference")
+            if not abs(asked_pu - seen_pu) <= SAME_PU:
+                now, then = (_as_read("reference", each) for each in (asked_pu, seen_pu))
+                return Confirmation(False, f"nothing was written: the reference is {now} by now, and was {then}")
+            to_pu = seen_pu if goes else min(max(dcs.get("position"), 0.0), 1.0)
+            dcs.set_and_read_back("reference", to_pu)
+            return _confirmed("mode", Mode.AUTOMATIC, dcs.set_and_read_back("mode", Mode.AUTOMATIC))
+
+        return self._within_rights(role, ("reference", "mode"), written)
+
+    def manual(self, role: Role, pressure_pa: float) -> Confirmation:
+        """Command a pressure by hand."""
+
+        def written(dcs: Dcs) -> Confirmation:
+            dcs.set_and_read_back("manual_pressure", pressure_pa)
+            return _confirmed("mode", Mode.MANUAL, dcs.set_and_read_back("mode", Mode.MANUAL))
+
+        if problem := register_named("manual_pressure").problem_with(pressure_pa):
+            return Confirmation(False, problem)
+        return self._within_rights(role, ("manual_pressure", "mode"), written)
 
     def set_reference(self, role: Role, reference_pu: float) -> Confirmation:
         """Ask for a position; what is allowed is said in %, as it is typed."""

@@ -14,7 +14,7 @@ from config.recording import Column
 from positioner.history.entries import Event
 from positioner.observer.freshness import Freshness, FreshnessMemory, after_failure, after_reading, freshness
 from positioner.observer.friction_file import FrictionRow
-from positioner.observer.happened import served_event
+from positioner.observer.happened import SeenEvent, served_event
 from positioner.observer.trends import Trend
 from positioner.observer.words import code_text
 
@@ -27,23 +27,14 @@ MOST_EVENTS = 200
 WATCHED = {
     "mode": "mode",
     "fault": "fault",
-    "ne107": "NE 107",
-    "ne107_cause": "cause of NE 107",
     "experiment_state": "experiment",
     "restored": "knowledge from before",
-    "service": "service",
 }
 """Codes whose change is an event, and what they are called."""
+HEALTH = frozenset(("ne107", "ne107_cause"))
+"""Said together."""
 COUNTED = {"identifications": "an identification was applied", "refusals": "an identification was refused"}
 """Counts whose change is one."""
-
-
-@dataclass(frozen=True, slots=True)
-class SeenEvent:
-    """A change that was seen: when, s, and what, in words."""
-
-    time_s: float
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +115,7 @@ class ValveView:
         """Take it that a request was not answered, and why."""
         with self._lock:
             if not self._memory.is_away:
-                self._events.appendleft(SeenEvent(time_s, f"connection lost: {why}"))
+                self._events.appendleft(SeenEvent(time_s, f"connection lost: {why}", True))
             self._memory = after_failure(self._memory, time_s, why)
             self._trend.gap(time_s)
 
@@ -175,9 +166,9 @@ class ValveView:
 
     def _note_connection(self, time_s: float, memory: FreshnessMemory) -> None:
         if memory.restarts > self._memory.restarts:
-            self._events.appendleft(SeenEvent(time_s, "the daemon was started anew"))
+            self._events.appendleft(SeenEvent(time_s, "the daemon was started anew", True))
         elif self._memory.is_away:
-            self._events.appendleft(SeenEvent(time_s, "connected"))
+            self._events.appendleft(SeenEvent(time_s, "connected", True))
 
 
 def _changes(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
@@ -185,4 +176,8 @@ def _changes(before: Mapping[str, float], after: Mapping[str, float]) -> list[st
     both = before.keys() & after.keys()
     codes = [name for name in WATCHED if name in both and before[name] != after[name]]
     said = [f"{WATCHED[name]}: {code_text(name, before[name])} -> {code_text(name, after[name])}" for name in codes]
+    if both >= HEALTH and any(before[name] != after[name] for name in HEALTH):
+        cause = code_text("ne107_cause", after["ne107_cause"])
+        why = f", {cause}" if after["ne107_cause"] else ""
+        said.append(f"NE 107: {code_text('ne107', after['ne107'])}{why}")
     return said + [text for name, text in COUNTED.items() if name in both and before[name] != after[name]]

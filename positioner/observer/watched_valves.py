@@ -6,6 +6,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from config.daemon_file import DaemonFile
 from config.roles import Role
 from config.tls_table import Tls
 from positioner.dcs import Dcs, DcsError
@@ -36,6 +37,8 @@ class Place:
     """Of the commands."""
     keep: Path | None = None
     """The folder that keeps what the page has seen of friction."""
+    settings: DaemonFile | None = None
+    """The daemon's file."""
 
     def connection(self, role: Role) -> Dcs:
         """Return a closed connection for a role.

@@ -1,5 +1,6 @@
 """What an operator may do, and that it is confirmed by what the daemon reads back; the daemon is a scripted one."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from threading import Event, Thread
@@ -75,6 +76,31 @@ def test_a_position_that_is_not_allowed_is_refused_in_what_it_was_typed_in(daemo
     said = Confirmation(False, "reference: allowed is 0 to 100 %, got 150 %")
     assert daemon.commands.set_reference(Role.OPERATOR, 1.5) == said
     assert daemon.writes == []
+
+
+def test_automatic_goes_where_was_agreed_to_or_stays_where_the_stem_is(daemon: Daemon) -> None:
+    daemon.values |= {"mode": Mode.HOLD, "reference": 0.7, "position": 0.2}
+    for goes, there in ((True, 0.7), (False, 0.2)):
+        daemon.values["reference"] = 0.7
+        daemon.writes.clear()
+        assert daemon.commands.automatic(Role.ENGINEER, 0.7, goes=goes).done
+        assert daemon.writes == [(Role.ENGINEER, "reference", there), (Role.ENGINEER, "mode", Mode.AUTOMATIC)]
+
+
+def test_a_reference_that_has_changed_since_the_question_moves_nothing(daemon: Daemon) -> None:
+    daemon.values |= {"mode": Mode.HOLD, "reference": 0.9, "position": 0.2}
+    seen = daemon.commands.automatic(Role.ENGINEER, 0.7, goes=True)
+    assert seen == Confirmation(False, "nothing was written: the reference is 90 % by now, and was 70 %")
+    assert daemon.writes == []
+    assert not daemon.commands.automatic(Role.OPERATOR, 0.9, goes=True).done, "mode needs an engineer"
+
+
+def test_manual_commands_the_pressure_that_was_agreed_to(daemon: Daemon) -> None:
+    assert daemon.commands.manual(Role.ENGINEER, 40e3).done
+    assert daemon.writes == [(Role.ENGINEER, "manual_pressure", 40e3), (Role.ENGINEER, "mode", Mode.MANUAL)]
+    assert not daemon.commands.manual(Role.ENGINEER, -1.0).done
+    assert not daemon.commands.manual(Role.ENGINEER, math.nan).done
+    assert len(daemon.writes) == 2
 
 
 def test_a_write_that_reads_back_otherwise_is_not_confirmed(daemon: Daemon) -> None:

@@ -5,11 +5,13 @@ import math
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from config.codes import Fault, Mode, Ne107Cause, Ne107Status, State
+from config.daemon_file import ControlTable, DaemonFile
 from config.errors import InputError
 from config.passwords import MOST_WRONG, SignIn
 from config.registers import BY_NAME
@@ -19,7 +21,9 @@ from positioner.observer.freshness import Freshness
 from positioner.observer.happened import Happened
 from positioner.observer.trends import thinned
 from positioner.observer.valve_view import ValvePicture
+from positioner.observer.waiting_reference import Writer
 from positioner.pages.operator_page import facts
+from positioner.pages.operator_page.moves_ahead import BY_LAW, Ahead
 from positioner.pages.parts.units import LENGTHS, Units
 
 STROKE_M = 0.1
@@ -65,7 +69,7 @@ def test_when_something_has_happened_is_told_with_its_zone(monkeypatch: pytest.M
     finally:
         monkeypatch.undo()
         time.tzset()
-    assert line == "1970-01-01 03:00:00 XYZ, the daemon started"
+    assert line == "1970-01-01 03:00:00 XYZ the daemon started"
 
 
 def test_of_a_valve_whose_stroke_nobody_said_positions_are_lengths() -> None:
@@ -105,11 +109,79 @@ def test_nothing_is_left_out_where_nothing_is_known() -> None:
     assert "–" in facts.wear(unknown, Units())[0].text
 
 
-def test_refused_estimates_say_why_and_the_others_have_an_interval() -> None:
-    seen = with_values(b_over_c_e=-814542.6, b_over_c_std=1000.0, b_over_c_valid=1.0, a_reason=11.0)
-    told = {name: text for name, text, _ in facts.estimates(seen)}
-    assert told["b_over_c"] == "-8.1454e+05 ± 2e+03 Pa/m"
-    assert told["a"] == "refused: a came out positive: viscous friction would drive the stem"
+def test_estimates_begin_with_pressures_and_end_with_what_is_refused_each_reason_once() -> None:
+    seen = with_values(
+        a_e=-100.0, a_std=1.0, a_valid=1.0,
+        b_over_c_e=-814542.6, b_over_c_std=1000.0, b_over_c_valid=1.0,
+        b_reason=11.0, c_reason=11.0, k_reason=3.0,
+    )  # fmt: skip
+    told = facts.estimates(seen, STROKE_M, Units())
+    assert [(each.label, each.text) for each in told[:2]] == [
+        ("b_over_c", "-0.8145 ± 0.002 bar over the stroke"),
+        ("a", "-100 ± 2 1/s"),
+    ]
+    refused = {each.label: each.text for each in told[2:]}
+    assert refused["refused: b, c"] == "a came out positive: viscous friction would drive the stem"
+    assert len(set(refused.values())) == len(refused)
+
+
+def ahead(*, law: str = "seed", file: bool = True, **values: float) -> Ahead:
+    """What is known of a valve at 20 %, 0.1 m of stroke, for whom a reference of 70 % waits."""
+    tables = {"valve": {"stroke_m": STROKE_M}, "control": {"law": law}}
+    settings = DaemonFile.model_validate(tables) if file else None
+    asked = {"mode": Mode.HOLD, "position": 0.2, "reference": 0.7, "reference_in_force": 0.2, "omega": 1.0}
+    asked |= {"beta": 13238.0, "b_over_c_applied": math.nan, "command": 24000.0}
+    writer = Writer("10.0.0.7:4001", "", "", 0.0)
+    return Ahead(with_values(**(asked | values)), STROKE_M, Units(), settings, writer)
+
+
+def test_before_automatic_it_is_said_how_far_by_what_and_who_wrote_the_reference() -> None:
+    stands, way, how, _ = ahead().automatic()
+    assert stands.startswith(
+        "The stem stands at 20.00 %. The reference is 70.00 %: written by 10.0.0.7:4001, 1970-01-01"
+    )
+    assert way == "Going there moves the stem by +50.0% of its stroke (50.00 mm)."
+    assert how == "How long: in one step of the pressure, as fast as the valve goes; no move has been seen lately."
+    unknown = replace(ahead(file=False), writer=None)
+    assert "who wrote it is not known" in unknown.automatic()[0]
+    assert "the page was not given the daemon's file" in unknown.automatic()[2]
+    (nothing,) = ahead(reference=0.2).automatic()
+    assert nothing.startswith("The stem stands at 20.00 %. No other reference waits")
+
+
+def test_every_law_says_how_it_moves() -> None:
+    assert set(BY_LAW) == set(get_args(ControlTable.model_fields["law"].annotation))
+
+
+def test_before_an_identification_it_is_said_how_far_and_how_long() -> None:
+    swings, far, long, after = ahead().identification()
+    assert swings == "The pressure swings by ±0.132 bar about what keeps the stem where it is, 6.28 s a period."
+    assert far == "How far the stem goes is not known before the valve is identified."
+    assert long == "How long: until friction and spring are identified, at most 10 s."
+    assert after.startswith("Then the law has the command again.")
+    assert (
+        ahead(b_over_c_applied=-8e5, offset_applied=0.0).identification()[1]
+        == "The stem goes at most ±16.5% of its stroke (16.55 mm) about 20.00 %."
+    )
+    about = ahead(b_over_c_applied=-8e5, offset_applied=0.0, alpha=44e3).identification()[1]
+    assert about == "The stem stands at 20.00 %, and goes into the range from 38.45 % to 71.55 %."
+    stairs = ahead(law="slides").identification()
+    assert stairs[0] == "From 20.00 % a staircase of pressures takes the stem up and down between 10.00 % and 90.00 %."
+    assert stairs[2] == "How long: until slides of both directions agree, at most 600 s."
+
+
+def test_before_manual_it_is_said_where_the_pressure_takes_the_stem() -> None:
+    commanded, far = ahead(b_over_c_applied=-8e5, offset_applied=0.0).manual(40e3)
+    assert commanded == "The command goes from 0.240 bar to 0.400 bar at once, and stays there."
+    assert far == "By what is identified the stem comes to about 50.00 %, give or take friction."
+    assert "not known" in ahead().manual(40e3)[1]
+
+
+def test_a_reference_that_waits_is_shown_and_one_that_is_followed_is_not() -> None:
+    waiting = ahead().picture
+    assert facts.waiting(waiting, STROKE_M, Units()) == "waits: 70.00 %, followed in automatic"
+    followed = replace(waiting, values={**waiting.values, "mode": Mode.AUTOMATIC})
+    assert facts.waiting(followed, STROKE_M, Units()) == ""
 
 
 def test_a_window_keeps_its_extremes_and_its_gaps() -> None:

@@ -85,6 +85,7 @@ def places_in(
                 tls_of=tls_of or {},
                 history=None if file.history is None else path.parent / file.history.folder,
                 range_pa=(file.pressure.minimum_pa, file.pressure.maximum_pa),
+                settings=file,
             )
 
 

@@ -11,6 +11,7 @@ Its files:
     trend_plot              reference, position and pressure as they come, the states as bands
     recorded_plot           the last minutes as recorded, to zoom into
     friction_plot           friction against its baseline, a row a minute
-    controls                signing in; mode, reference, identification, acknowledgement
+    controls                signing in; mode, reference, pressure, identification, acknowledgement
+    moves_ahead, question   what a command is going to do, and the question before it is given
     facts                   what is said of a valve, a line each
 """

@@ -9,6 +9,7 @@ from config.codes import Fault, Ne107Status
 from config.registers import BY_NAME
 from positioner.observer.happened import Happened
 from positioner.observer.valve_view import ValvePicture
+from positioner.observer.waiting_reference import waiting_reference
 from positioner.observer.words import EstimateInWords, device_status, estimates_in_words, ne107_causes
 from positioner.pages.parts.units import NO_NUMBER, Unit, Units
 
@@ -41,6 +42,14 @@ def figures(picture: ValvePicture, stroke_m: float, units: Units) -> dict[str, s
         "pressure": pressure.text(measured("pressure")),
         "command": pressure.text(picture.value("command")),
     }
+
+
+def waiting(picture: ValvePicture, stroke_m: float, units: Units) -> str:
+    """Say which reference waits; empty where none does."""
+    reference_pu = waiting_reference(picture.values)
+    if reference_pu is None:
+        return ""
+    return f"waits: {units.position_unit(stroke_m).text(reference_pu * stroke_m)}, followed in automatic"
 
 
 def status(picture: ValvePicture) -> list[Fact]:
@@ -109,24 +118,34 @@ def wear(picture: ValvePicture, units: Units) -> list[Fact]:
     ]
 
 
-def estimates(picture: ValvePicture) -> Iterator[tuple[str, str, str]]:
-    """Yield name, value with its 95 % interval or why it is refused, and what it is, of each estimate."""
-    for each in estimates_in_words(picture.values):
-        yield each.name, _interval(each), each.text
+def estimates(picture: ValvePicture, stroke_m: float, units: Units) -> list[Fact]:
+    """Return estimates with 95 % intervals, pressures first, then the rest; what is refused last, a reason once."""
+    read = list(estimates_in_words(picture.values))
+    valid = sorted((each for each in read if each.valid), key=lambda each: not each.unit.startswith("Pa"))
+    refused: dict[str, list[str]] = {}
+    for each in read:
+        if not each.valid:
+            refused.setdefault(each.refusal, []).append(each.name)
+    return [
+        *(Fact(each.name, _interval(each, stroke_m, units), each.text) for each in valid),
+        *(Fact(f"refused: {', '.join(names)}", why) for why, names in refused.items()),
+    ]
 
 
 def happened(lines: Iterable[Happened]) -> Iterator[str]:
-    """Yield a line an event: when, by this machine's clock and zone, its NE 107 class unless that is good, and what."""
+    """Yield a line an event: when, by this machine's clock and zone, what, and its NE 107 class unless that is good."""
     for line in lines:
-        known = math.isfinite(line.time_s)
-        said = [time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(line.time_s))] if known else []
-        yield ", ".join([*said, *([line.ne107] if line.ne107 else []), line.text])
+        when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(line.time_s))
+        yield f"{when} {line.text}" + (f" ({line.ne107})" if line.ne107 else "")
 
 
-def _interval(each: EstimateInWords) -> str:
-    if not each.valid:
-        return f"refused: {each.refusal}"
-    return f"{each.value:.5g} ± {each.half_width:.2g} {'' if each.unit == '1' else each.unit}".rstrip()
+def _interval(each: EstimateInWords, stroke_m: float, units: Units) -> str:
+    factor, unit = 1.0, "" if each.unit == "1" else each.unit
+    if unit == "Pa":
+        factor, unit = units.pressure.per_si, units.pressure.name
+    elif unit == "Pa/m" and math.isfinite(stroke_m):
+        factor, unit = units.pressure.per_si * stroke_m, f"{units.pressure.name} over the stroke"
+    return f"{factor * each.value:.4g} ± {factor * each.half_width:.2g} {unit}".rstrip()
 
 
 def _emergency(code: float) -> str:

@@ -47,12 +47,13 @@ LAYOUT = """
 .alarm { background: #b3261e; color: #fff; padding: 8px 12px; border-radius: 6px; width: 100%; font-weight: 600; }
 .stale { opacity: 0.45; filter: grayscale(1); }
 .faulty { color: #b3261e; } .body--dark .faulty { color: #ff8a80; }
-.facts { display: grid; grid-template-columns: max-content 1fr; gap: 2px 16px; margin: 0; width: 100%; }
+.facts { display: grid; grid-template-columns: fit-content(50%) 1fr; gap: 2px 16px; margin: 0; width: 100%; }
 .facts dt { opacity: 0.75; } .facts dd { margin: 0; text-align: right; overflow-wrap: anywhere; }
 .scrolling { overflow-x: auto; } .scrolling p { margin: 4px 0; }
 .scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
 .scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
 @media (max-width: 599px) {
+  .together > .side { order: -1; }
   .q-header { flex-wrap: nowrap; } .q-header .title { display: none; } .q-header .q-select { min-width: 0; }
 }
 """

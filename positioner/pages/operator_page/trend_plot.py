@@ -6,6 +6,7 @@ and the greatest position of each step of time, so that no extreme is lost. Draw
 
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from nicegui import ui
 
 from config.codes import State
 from config.recording import Column
-from positioner.observer.trends import bands, thinned
+from positioner.observer.trends import WAITING, bands, thinned
 from positioner.observer.valve_view import ValveView
 from positioner.pages.operator_page.marks import DASHES
 from positioner.pages.parts.theme import Theme
@@ -37,7 +38,30 @@ BANDS = {
 """Told apart by the colour-blind (Okabe and Ito), and by name."""
 SHORTEST_NAMED = 0.04
 """A band that takes less of the window has no room for its name."""
-LINES = ("reference", "position", "command", "pressure")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line: the column it draws, its panel (0 position, 1 pressure), its ink, and how it is drawn."""
+
+    column: str
+    panel: int
+    ink: str
+    dash: str = "solid"
+
+    @property
+    def measured(self) -> bool:
+        """Whether it is a measurement; what is asked for is held from reading to reading."""
+        return self.dash == "solid"
+
+
+LINES = {
+    "reference": Line("reference_m", 0, "model", "dashed"),
+    "position": Line("position_m", 0, "measured"),
+    "command": Line("command_pa", 1, "better", "dashed"),
+    "pressure": Line("pressure_pa", 1, "measured"),
+    "waiting reference": Line(WAITING, 0, "model", "dotted"),
+}
 
 
 class TrendPlot:
@@ -82,8 +106,8 @@ class TrendPlot:
         lines = self._lines(rows)
         spans = (LEAST_SPANS[0] * self._position(self._view.stroke_m), LEAST_SPANS[1] * self._units.pressure.per_si)
         ranges = [
-            _range(np.concatenate([lines[name] for name in pair]), least)
-            for pair, least in zip((LINES[:2], LINES[2:]), spans, strict=True)
+            _range(np.concatenate([lines[name] for name, each in LINES.items() if each.panel == panel]), least)
+            for panel, least in enumerate(spans)
         ]
         source = np.column_stack(
             [np.round(wall_ms + 1e3 * rows["time_s"]), *(np.round(each, 4) for each in lines.values())]
@@ -93,7 +117,9 @@ class TrendPlot:
             "dataset": {"source": source.tolist(), "sourceHeader": False},
             "xAxis": [{"min": round(begin_ms), "max": round(end_ms)}] * 2,
             "yAxis": [{"min": low, "max": high} for low, high in ranges],
-            "series": [{"name": name, "markArea": {"data": areas if name in LINES[1::2] else []}} for name in LINES],
+            "series": [
+                {"name": name, "markArea": {"data": areas if each.measured else []}} for name, each in LINES.items()
+            ],
         }
 
     def _areas(self, rows: Mapping[str, Column], wall_ms: float) -> list[list[Options]]:
@@ -107,13 +133,8 @@ class TrendPlot:
 
     def _lines(self, rows: Mapping[str, Column]) -> dict[str, Column]:
         """Return what is drawn, by name, in the units chosen."""
-        pressure = self._units.pressure.per_si
-        return {
-            "reference": self._position(rows["reference_m"]),
-            "position": self._position(rows["position_m"]),
-            "command": pressure * rows["command_pa"],
-            "pressure": pressure * rows["pressure_pa"],
-        }
+        per_si = (self._position(1.0), self._units.pressure.per_si)
+        return {name: per_si[each.panel] * rows[each.column] for name, each in LINES.items()}
 
     def _position(self, position_m: Any) -> Any:
         return self._units.position_unit(self._view.stroke_m).per_si * position_m
@@ -121,7 +142,6 @@ class TrendPlot:
     def _whole(self) -> Options:
         """Return all of it."""
         ink, changing = self._theme.ink, self._changing()
-        colours = {"reference": ink.model, "position": ink.measured, "command": ink.better, "pressure": ink.measured}
         quiet = {"axisLine": {"lineStyle": {"color": ink.grid}}, "axisLabel": {"color": ink.quiet, "hideOverlap": True}}
         inner = {"axisLabel": {"color": ink.quiet, "showMinLabel": False, "showMaxLabel": False}}
         hidden = quiet | {"axisLabel": {"show": False}}
@@ -131,21 +151,17 @@ class TrendPlot:
         series = [
             {
                 "type": "line",
-                "xAxisIndex": number // 2,
-                "yAxisIndex": number // 2,
-                "encode": {"x": 0, "y": number + 1},
+                "xAxisIndex": each.panel,
+                "yAxisIndex": each.panel,
+                "encode": {"x": 0, "y": number},
                 "showSymbol": False,
-                "z": 2 if name in LINES[1::2] else 3,
-                "step": False if name in LINES[1::2] else "end",
-                "lineStyle": {
-                    "width": 1.8,
-                    "color": colours[name],
-                    "type": "solid" if name in LINES[1::2] else "dashed",
-                },
-                "itemStyle": {"color": colours[name]},
-                **each,
+                "z": 2 if each.measured else 3,
+                "step": False if each.measured else "end",
+                "lineStyle": {"width": 1.8, "color": getattr(ink, each.ink), "type": each.dash},
+                "itemStyle": {"color": getattr(ink, each.ink)},
+                **change,
             }
-            for number, (name, each) in enumerate(zip(LINES, changing["series"], strict=True))
+            for number, (each, change) in enumerate(zip(LINES.values(), changing["series"], strict=True), start=1)
         ]
         for each in series:
             each["markArea"] |= {"silent": True, "label": {"color": ink.quiet, "position": "insideTop"}}

@@ -8,7 +8,7 @@ from nicegui import ui
 from config.results.block import as_html
 from positioner.observer.happened import WhatHappened, what_happened
 from positioner.observer.last_moves import LastMoves, last_moves
-from positioner.observer.valve_view import SeenEvent, ValvePicture
+from positioner.observer.valve_view import ValvePicture
 from positioner.observer.watched_valves import WatchedValve
 from positioner.pages.operator_page import facts
 from positioner.pages.operator_page.controls import Controls, SignedIn
@@ -35,12 +35,16 @@ class FactsCard:
         with ui.card().classes("full-width").props(f'data-testid="{name}"') as self.card:
             heading(title)
             self._list = ui.element("dl").classes("facts")
+        self._labels: list[str] = []
         self._texts: list[ui.label] = []
 
     def show(self, lines: Iterable[Fact]) -> None:
-        """Show these lines: as many as the first time."""
+        """Show these lines; where they are of the same as before, their texts alone change."""
         lines = list(lines)
-        if not self._texts:
+        labels = [line.label for line in lines]
+        if labels != self._labels:
+            self._labels, self._texts = labels, []
+            self._list.clear()
             with self._list:
                 for line in lines:
                     ui.html(line.label, tag="dt", sanitize=False).tooltip(line.help or line.label)
@@ -56,7 +60,6 @@ class ValvePanel:
     def __init__(self, theme: Theme, valve: WatchedValve, units: Units, signed: SignedIn) -> None:
         self.valve = valve
         self._units = units
-        self._events: tuple[SeenEvent, ...] = ()
         self._happened: WhatHappened | None = None
         self._stale = ui.label().classes("alarm").props('role="alert" data-testid="stale"')
         with ui.element("div").classes("full-width") as self._body:
@@ -67,7 +70,7 @@ class ValvePanel:
                     self._trend(theme)
                     self._moves(theme)
                 with ui.element("div").classes("side column"):
-                    self._controls = Controls(valve, signed)
+                    self._controls = Controls(valve, signed, units)
                     self._status = FactsCard("Status", "status")
             with ui.element("div").classes("cards"):
                 self._estimates = FactsCard("Estimates, with 95 % intervals", "estimates")
@@ -76,7 +79,6 @@ class ValvePanel:
                     self._friction = FrictionPlot(theme, valve.view, units)
                 self._cycle = FactsCard("The daemon's cycle", "cycle")
                 self._history_list()
-                self._event_list()
         ui.timer(HISTORY_EVERY_S, self._read_history)
 
     def tick(self, picture: ValvePicture) -> None:
@@ -84,6 +86,7 @@ class ValvePanel:
         self._stale.set_text(picture.freshness.daemon and f"Not live: {picture.freshness.daemon}")
         self._stale.set_visibility(not picture.freshness.live)
         grey(self._body, not picture.freshness.live)
+        self._waiting.set_text(facts.waiting(picture, self.valve.view.stroke_m, self._units))
         for name, text in facts.figures(picture, self.valve.view.stroke_m, self._units).items():
             self._figures[name].set_text(text)
         for name in ("position", "pressure"):
@@ -97,14 +100,12 @@ class ValvePanel:
         self._wear.show(facts.wear(picture, self._units))
         self._friction.refresh()
         self._cycle.show(facts.cycle(picture))
-        said = [Fact(name, text, what) for name, text, what in facts.estimates(picture)]
-        if said:
-            self._estimates.show(said)
+        self._estimates.show(facts.estimates(picture, self.valve.view.stroke_m, self._units))
         self._controls.show(picture)
-        self._show_events(picture.events)
 
     def redraw(self) -> None:
         """Draw it in other units."""
+        self._controls.redraw()
         self.trend.redraw()
         self._recorded.redraw()
 
@@ -115,6 +116,8 @@ class ValvePanel:
                 with ui.element("div").classes("tile"):
                     ui.label(name).classes("quiet")
                     self._figures[name] = ui.label().classes("figure number").props(f'data-testid="figure-{name}"')
+                    if name == "reference":
+                        self._waiting = ui.label().props('data-testid="waiting"')
             with ui.element("div").classes("tile"):
                 ui.label("mode, state").classes("quiet")
                 self._mode = ui.label().classes("figure").props('data-testid="mode"')
@@ -167,8 +170,10 @@ class ValvePanel:
 
     async def _read_history(self) -> None:
         """Show what has happened to the valve, where that is other than before."""
-        place = self.valve.place
-        happened = await aside(what_happened, place.history, place.name, self.valve.picture().served, SHOWN_EVENTS)
+        place, picture, off_s = self.valve.place, self.valve.picture(), time.time() - time.monotonic()
+        happened = await aside(
+            what_happened, place.history, place.name, picture.served, picture.events, round(off_s), SHOWN_EVENTS
+        )
         if happened == self._happened or self._history_rows.is_deleted:
             return
         self._happened = happened
@@ -178,22 +183,6 @@ class ValvePanel:
             for line in facts.happened(happened.lines):
                 with ui.element("li"):
                     ui.label(line)
-
-    def _event_list(self) -> None:
-        with ui.card().classes("full-width").props('data-testid="events"'):
-            heading(time.strftime("Seen since this page looks, times in %Z"))
-            self._event_rows = ui.element("ul").classes("said")
-
-    def _show_events(self, events: tuple[SeenEvent, ...]) -> None:
-        if events[:SHOWN_EVENTS] == self._events:
-            return
-        self._events = events[:SHOWN_EVENTS]
-        wall_s = time.time() - time.monotonic()
-        self._event_rows.clear()
-        with self._event_rows:
-            for event in self._events:
-                with ui.element("li"):
-                    ui.label(f"{time.strftime('%H:%M:%S', time.localtime(wall_s + event.time_s))} {event.text}")
 
 
 def _told(moves: LastMoves | None) -> str:

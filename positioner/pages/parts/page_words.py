@@ -20,6 +20,8 @@ WORDS: tuple[tuple[str, str], ...] = (
     (r"type --column \w+=(.+?):(\S+?)(?=, |$)", r"choose \2 as the unit of '\1'"),
     (r'--time-format (?=")', ""),
     (r"let the diagnosis run through, or name fewer effects, --effects", "give it more time, or choose fewer effects"),
+    (r": positioner set mode automatic", ": choose automatic"),
+    (r": positioner set acknowledge 1, once its cause is gone", ": acknowledge it, once its cause is gone"),
     (r": say which, --sheet NAME", ": leave one of them in the file, or read it by `positioner import`"),
 )
 """What the commands say, as a regular expression, and what a page says in its place."""
