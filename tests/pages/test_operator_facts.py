@@ -5,14 +5,14 @@ import math
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from config.codes import Fault, Mode, Ne107Cause, Ne107Status, State
-from config.daemon_file import ControlTable, DaemonFile
+from config.daemon_file import DaemonFile
 from config.errors import InputError
+from config.law_names import law_names
 from config.passwords import MOST_WRONG, SignIn
 from config.registers import BY_NAME
 from config.role_passwords import read_passwords, set_password
@@ -149,8 +149,8 @@ def test_before_automatic_it_is_said_how_far_by_what_and_who_wrote_the_reference
     assert nothing.startswith("The stem stands at 20.00 %. No other reference waits")
 
 
-def test_every_law_says_how_it_moves() -> None:
-    assert set(BY_LAW) == set(get_args(ControlTable.model_fields["law"].annotation))
+def test_every_law_of_ours_says_how_it_moves() -> None:
+    assert set(BY_LAW) == set(law_names())
 
 
 def test_before_an_identification_it_is_said_how_far_and_how_long() -> None:

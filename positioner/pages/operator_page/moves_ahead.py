@@ -16,12 +16,10 @@ from positioner.response import ResponseFigures
 
 BY_LAW = {
     "seed": "in one step of the pressure, as fast as the valve goes",
-    "moves": "in one step of the pressure, or in slides where the move is small",
-    "breakaway": "in one step of the pressure, then in pulses until it is there",
     "slides": "in slides, each after the stem has come to rest",
     "conventional": "gradually, as a PI controller does",
 }
-"""How each `[control] law` takes the stem to a reference."""
+"""How a `[control] law` takes the stem to a reference; of another its name is said."""
 UNKNOWN_FILE = "the page was not given the daemon's file, which says it"
 NOBODY_KNOWS = "who wrote it is not known: the daemon keeps no history, or not where this page can read it"
 
@@ -124,7 +122,8 @@ class Ahead:
         return abs(self.picture.value("b_over_c_applied")), 0.0 if math.isnan(offset_pa) else offset_pa
 
     def _how_long(self) -> str:
-        how = UNKNOWN_FILE if self.settings is None else BY_LAW[self.settings.control.law]
+        law = "" if self.settings is None else self.settings.control.law
+        how = BY_LAW.get(law, f"as its law does, {law}") if law else UNKNOWN_FILE
         return f"{how}; {self._last_move()}"
 
     def _last_move(self) -> str:
