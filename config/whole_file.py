@@ -83,11 +83,13 @@ def filling(folder: Path) -> Iterator[Path]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Force the names that a folder holds to the disk.
+    """Force the names that a folder holds to the disk, where a folder can be opened: not on Windows.
 
     Raises:
         OSError: it cannot be.
     """
+    if os.name == "nt":
+        return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -13,7 +13,6 @@ Of several processes that need a part at once, one compiles and the others wait:
 """
 
 import atexit
-import fcntl
 import hashlib
 import os
 import re
@@ -26,6 +25,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from config.lock_file import lock_descriptor
 from sim import karnopp, kernel_linker, machine_code, misfit, quasi_static
 from sim.effect import Effect
 from sim.karnopp import MEMORY, Vector
@@ -232,6 +232,8 @@ def _make_private(folder: Path) -> None:
         PermissionError: it is somebody else's.
     """
     found = folder.stat()
+    if not hasattr(os, "getuid"):  # Windows: a person's own folder is theirs alone
+        return
     if found.st_uid != os.getuid():
         raise PermissionError
     if found.st_mode & WRITABLE_BY_OTHERS:
@@ -247,7 +249,7 @@ def _locked(path: Path) -> Iterator[None]:
     """
     with path.with_suffix(".lock").open("a") as file:
         with suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_EX)
+            lock_descriptor(file.fileno(), waits=True)
         yield
 
 

@@ -6,7 +6,7 @@ Its files:
     admission, request_counts               who gets a place, and how often each host may ask; how often who asked
     client, client_errors                   asks on TCP; why there is no reply
     framing, host_address                   how frames lie in its stream; where its server is
-    serial_line, rtu                        the serial line, and the frames on it
+    serial_line, terminal, rtu              the serial line, what it is on POSIX, and the frames on it
     pdu, exception_codes, layout            what frames carry; how a refusal is said; values in registers
     tls                                     Modbus/TCP Security: mutual TLS, roles from certificates
 """

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
             for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder))
         ),
         *((name, check, files[0]) for name, check in (("supervisory", _supervisory), ("timing", _timing))),
-        ("priority", _priority, files[0]),
+        *((name, check, files[0]) for name, check in (("system", _system), ("priority", _priority))),
         *(("certificates", _certificates, file) for file in files),
     ]
     for name, check, file in checks:
@@ -206,8 +206,23 @@ def _timing(file: "DaemonFile", _config: Path) -> str:
     return f"{missed} of {PERIODS} periods of {1e3 * file.cycle.period_s:g} ms missed"
 
 
+def _system(_file: "DaemonFile", _config: Path) -> str:
+    from config.errors import InputError
+    from positioner.daemon.platform_needs import goes_without, require_platform
+
+    try:
+        require_platform()
+    except InputError as error:
+        raise FailedCheck(str(error)) from None
+    lacks = goes_without()
+    return f"cycles are less punctual without {', '.join(lacks)}" if lacks else "has what the daemon needs"
+
+
 def _priority(_file: "DaemonFile", _config: Path) -> str:
     import os
+
+    if not hasattr(os, "sched_setscheduler"):
+        return "this system has no SCHED_FIFO"
     import resource
 
     if os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] != 0:

@@ -15,7 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run until SIGTERM or Ctrl-C, which leave each valve in its configured safe state."""
     from config.daemon_file import load_valves
+    from positioner.daemon.platform_needs import require_platform
 
+    require_platform()
     # Before the daemon is loaded, which takes longer: most mistakes are in a file.
     files = load_valves(arguments.config)
     from positioner.cli.parts.extended_valves import extended_valve_of

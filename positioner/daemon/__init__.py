@@ -11,6 +11,7 @@ own. They meet only in immutable snapshots that are replaced whole: the cycle wa
     experiment_registers          the same of a played experiment
     site_registers, local_switch  the same of events, requests and the switch that locks out; that switch
     service_manager               what systemd is told
+    platform_needs                what it needs of a system, and what it goes without
     service_state                 what the service does for a valve: states and transitions
     refinement_process            fits in a process of its own
     recorder, logs                recordings and log lines, written beside the cycle

@@ -37,6 +37,8 @@ MOST_REFUSALS = 2
 """Exceptions in a row on a connection that stays; after more the device is looked at anew."""
 SETTINGS_EVERY = 5
 """Of the times that the device is asked what it holds, the one in which its settings are asked for in its place."""
+AWAKE = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+"""The clock that also runs while the gateway sleeps: on macOS, which has no CLOCK_BOOTTIME, the monotonic one does."""
 TRIES_AT_START = 3
 """Replies lost in a row at the start, that end it."""
 
@@ -408,4 +410,4 @@ def _same_sample(before: Reading, reading: Reading) -> bool:
 
 def awake_s() -> float:
     """Return the time on a clock that also runs while the gateway sleeps."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.clock_gettime(AWAKE)

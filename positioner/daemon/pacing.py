@@ -151,14 +151,17 @@ def raise_priority() -> bool:
     # Another thread may keep the interpreter for this long before it is asked to let the cycle run.
     sys.setswitchinterval(100e-6)
     libc = ctypes.CDLL(None, use_errno=True)
-    libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    locked = libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0
+    if hasattr(libc, "prctl"):  # Linux
+        libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    locked = hasattr(libc, "mlockall") and libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0
     fifo = _take_fifo()
     log_event(log, logging.INFO, "cycle thread", fifo=fifo, memory_locked=locked)
     return fifo
 
 
 def _take_fifo() -> bool:
+    if not hasattr(os, "sched_setscheduler"):  # macOS
+        return False
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
     except OSError:

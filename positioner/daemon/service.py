@@ -42,6 +42,7 @@ from positioner.daemon.logs import log_event, logging_valve, start_logging
 from positioner.daemon.memory import MemoryKeeper, StoredMemory
 from positioner.daemon.memory.conditions import conditions_of, pressure_scales
 from positioner.daemon.pacing import DevicePace, Pace, RealTimePace
+from positioner.daemon.platform_needs import goes_without
 from positioner.daemon.recorder import Recorder
 from positioner.daemon.refinement_process import RefinementProcess
 from positioner.daemon.service_manager import ServiceManager
@@ -117,6 +118,8 @@ def serve(files: Sequence[DaemonFile], source: Path, extended: Sequence[Extended
     endings, manager = Endings(), ServiceManager()
     with ExitStack() as on_exit:
         on_exit.callback(start_logging(files[0].log.level).stop)
+        if lacks := goes_without():
+            log_event(log, logging.WARNING, "cycles are less punctual on this system", without=lacks)
         refinement = RefinementProcess()
         on_exit.callback(refinement.stop)
         history = HistoryKeeper(files[0].history, source.parent)

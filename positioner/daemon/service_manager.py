@@ -64,7 +64,7 @@ class ServiceManager:
             return
         where = "\0" + self._address[1:] if self._address.startswith("@") else self._address
         try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as to:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to:
                 to.setblocking(False)
                 to.sendto("\n".join(" ".join(each.split("\n")) for each in lines).encode(), where)
         except OSError:

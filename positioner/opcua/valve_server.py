@@ -6,6 +6,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -84,7 +85,8 @@ async def _serve(
     ready: Callable[[int], None],
 ) -> None:
     stop = asyncio.Event()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.set)
+    with suppress(NotImplementedError):  # on Windows a process is ended without being asked
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.set)
     logger = logging.getLogger("asyncua")
     logger.propagate = False
     logger.setLevel(logging.CRITICAL)  # it complains of the nodesets

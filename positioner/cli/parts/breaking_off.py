@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
 
-ENDS = signal.SIGTERM, signal.SIGHUP
-"""What ends a command at once: `kill`, a supervisor's time limit, a terminal that is closed."""
+ENDS = tuple(getattr(signal, each) for each in ("SIGTERM", "SIGHUP") if hasattr(signal, each))
+"""What ends a command at once: `kill`, a supervisor's time limit, a terminal that is closed (not on Windows)."""
 Handler = Callable[[int, FrameType | None], None]
 
 
