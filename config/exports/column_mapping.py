@@ -9,7 +9,7 @@ from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of
 from config.recording import BEHIND_POSITIONER, OF_DRIVES, REQUIRED
 
 RANGE_PA = (0.2e5, 1.0e5)
-"""The pressures of 0 % and 100 %: the field's usual 0.2 to 1 bar, unless another range is given."""
+"""The pressures of 0 % and 100 % that are assumed, and told, where nobody says others: the field's 0.2 to 1 bar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +38,18 @@ class ExportOptions:
         time_format: of `datetime.strptime`; None: seconds or ISO 8601.
         status: rows of other words hold no values.
         sheet: of a workbook, or group of a measurement file; None: the one that has the columns.
+        period_s: between the rows of a file without a time.
     """
 
     decimal: str | None = None
     time_format: str | None = None
     status: tuple[Status, ...] = ()
     sheet: str | None = None
+    period_s: float | None = None
 
 
-def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
-    """Read `OURS=THEIRS` or `OURS=THEIRS:UNIT`, one a column.
+def read_mapping(words: Sequence[str], period_s: float | None = None) -> tuple[Source, ...]:
+    """Read `OURS=THEIRS` or `OURS=THEIRS:UNIT`, one a column; no time of a file whose rows are a period apart.
 
     Raises:
         InputError: no such form, an unknown unit (names those there are), or a column that stands twice.
@@ -56,9 +58,12 @@ def read_mapping(words: Sequence[str]) -> tuple[Source, ...]:
     names = [each.name for each in sources]
     possible = (REQUIRED, BEHIND_POSITIONER, *OF_DRIVES)
     required = next((each for each in possible if set(each) <= set(names)), None) or _nearest(names)
+    if period_s is not None and "time_s" in names:
+        raise InputError("--period-s", "goes with a file without a time: leave out it or --column time_s")
     for name in (*required, *names):
-        if name not in names:
-            raise InputError("--column", f"{name} is not given: add --column {name}=THEIRS:UNIT")
+        if name not in names and not (name == "time_s" and period_s is not None):
+            without = ", or --period-s S if no column is a time" if name == "time_s" else ""
+            raise InputError("--column", f"{name} is not given: add --column {name}=THEIRS:UNIT{without}")
         if names.count(name) > 1:
             raise InputError("--column", f"{name} is given {names.count(name)} times: give it once")
     return sources
@@ -72,7 +77,7 @@ def _nearest(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _source(word: str) -> Source:
-    match = re.fullmatch(rf"(\w+?({'|'.join(UNITS)}))=(.+?)(?::([^:]*))?", word)
+    match = re.fullmatch(rf"(\w+?({'|'.join(UNITS)}))=(.+?)(?::([^:)]*))?", word)
     if match is None:
         endings = ", ".join(UNITS)
         raise InputError("--column", f"{word!r}: must be OURS=THEIRS:UNIT, OURS ending in {endings} (position_m=PV:%)")
@@ -90,8 +95,8 @@ def _source(word: str) -> Source:
 def offered_units(ours: str) -> list[str]:
     """Return the units that a column of ours may be in, those from the other end too.
 
-    >>> offered_units("position_m")[-3:]
-    ['-%', '-p.u.', '-mA']
+    >>> offered_units("position_m")[:3], offered_units("position_m")[-1]
+    (['m', 'cm', 'mm'], '-2-10V')
     """
     ending = ending_of(ours)
     allowed = allowed_units(ending)

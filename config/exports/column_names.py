@@ -33,7 +33,7 @@ COMMON = {
     ),
 }
 """By ours, from what is said of nothing else to what may be said of a loop's flow or level."""
-STATUS = re.compile(r"status|quality|qualität|güte|\bqual\b", re.IGNORECASE)
+STATUS = re.compile(r"status|quality|qualität|güte|\bqual\b|validit|calidad|qualit[ée]|jako[śs]", re.IGNORECASE)
 """What columns are called that say which rows are good."""
 COUNTER = re.compile(r"\b(index|idx|seq|sample|row|nr|no|number|count|counter|id|zeile)\b|^#$", re.IGNORECASE)
 """What columns are called that number the rows."""

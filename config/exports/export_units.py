@@ -2,9 +2,10 @@
 
     SI = factor raw + offset
 
-A unit may stand in the mapping, in the header (`PV [%]`), in a row under it, or behind each number. `%`, `p.u.` and
-`mA` (4 to 20) are shares: of the stroke for a position, of a range for a pressure. A unit with a minus before it
-counts from the other end, as of a valve that air closes: `-%`, `-mm`.
+A unit may stand in the mapping, in the header (`PV [%]`), in a row under it, or behind each number. `%`, `p.u.`, `mA`
+(4 to 20) and volts of a range (`0-10V`) are shares: of the stroke for a position, of a range for a pressure. A unit
+with a minus before it counts from the other end, as of a valve that air closes: `-%`, `-mm`. `100ns` are ticks of .NET
+and FILETIME, `ud` millionths of a day.
 """
 
 import re
@@ -12,7 +13,18 @@ from collections.abc import Mapping
 from math import pi
 
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0, "iso": 1.0},
+    "_s": {
+        "s": 1.0,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "100ns": 1e-7,
+        "ns": 1e-9,
+        "min": 60.0,
+        "h": 3600.0,
+        "d": 86400.0,
+        "ud": 0.0864,
+        "iso": 1.0,
+    },
     "_pa": {
         "Pa": 1.0,
         "hPa": 100.0,
@@ -38,13 +50,25 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 ATMOSPHERE_PA = 101_325.0
 ABSOLUTE = frozenset({"bara", "kPaa", "psia"})
 """Pressures from a vacuum up; ours are from the atmosphere up."""
-SHARES: Mapping[str, tuple[float, float]] = {"%": (0.01, 0.0), "p.u.": (1.0, 0.0), "mA": (1 / 16, -0.25)}
+SHARES: Mapping[str, tuple[float, float]] = {
+    "%": (0.01, 0.0),
+    "p.u.": (1.0, 0.0),
+    "mA": (1 / 16, -0.25),
+    "0-20mA": (1 / 20, 0.0),
+    "0-10V": (0.1, 0.0),
+    "0-5V": (0.2, 0.0),
+    "1-5V": (0.25, -0.25),
+    "2-10V": (0.125, -0.25),
+}
 """Share = factor raw + offset."""
 SI = {ending: next(unit for unit, factor in units.items() if factor == 1.0) for ending, units in UNITS.items()}
 _ALIASES = {
     "sec secs second seconds sek sekunde sekunden": "s",
     "msec millisec milliseconds millisekunden": "ms",
     "µs μs usec": "us",
+    "nsec nanoseconds nanosekunden": "ns",
+    "ticks filetime": "100ns",
+    "datenum": "d",
     "minute minutes minuten": "min",
     "hr hrs hour hours std": "h",
     "day days tage": "d",
@@ -71,6 +95,11 @@ _ALIASES = {
     "0-100% 0..100%": "%",
     "pu p.u": "p.u.",
     "milliampere ma(dc) 4-20ma 4..20ma 4to20ma": "mA",
+    "0..20ma 0to20ma": "0-20mA",
+    "0..10v 0to10v 0-10vdc": "0-10V",
+    "0..5v 0to5v": "0-5V",
+    "1..5v 1to5v 1-5vdc": "1-5V",
+    "2..10v 2to10v": "2-10V",
 }
 _BY_ALIAS = {alias: unit for aliases, unit in _ALIASES.items() for alias in aliases.split()} | {
     unit.casefold(): unit for units in (*UNITS.values(), SHARES) for unit in units if unit != "iso"

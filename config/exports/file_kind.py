@@ -1,5 +1,6 @@
 """Which kind of file it is, by its first bytes, and the tables that it may be."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from config.errors import InputError
@@ -45,7 +46,18 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
         raise InputError(str(path), "begins with zeros alone: it is damaged, or no text")
     if begin.startswith(b"PK\x03\x04"):
         return typed_tables.workbook(path, sheet)
-    for magic, read in (
+    if reads := _of_measurements(begin):
+        return _of_group(path, reads(path), sheet)
+    if sheet is not None:
+        raise _without_sheets(path)
+    if line_protocol.is_line_protocol(begin):
+        return line_protocol.line_protocol(path)
+    return text_table.text_tables(path)
+
+
+def _of_measurements(begin: bytes) -> Callable[[Path], list[RawTable]] | None:
+    """Return what reads a file of typed vectors, by how it begins; None of another."""
+    for magic, reads in (
         (b"PAR1", typed_tables.parquet),
         (b"MATLAB 5.0 MAT-file", measurement_files.matlab),
         (b"MATLAB 7.3 MAT-file", measurement_files.hdf5),
@@ -54,12 +66,8 @@ def raw_tables(path: Path, sheet: str | None = None) -> list[RawTable]:
         (b"MDF     ", measurement_files.mdf4),
     ):
         if begin.startswith(magic):
-            return _of_group(path, read(path), sheet)
-    if sheet is not None:
-        raise _without_sheets(path)
-    if line_protocol.is_line_protocol(begin):
-        return line_protocol.line_protocol(path)
-    return text_table.text_tables(path)
+            return reads
+    return measurement_files.matlab if measurement_files.is_matlab_4(begin) else None
 
 
 def _of_group(path: Path, tables: list[RawTable], group: str | None) -> list[RawTable]:

@@ -1,18 +1,19 @@
 """What an export leaves open, asked one thing at a time: columns, units, the stroke, which rows are good."""
 
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import isfinite, nan
 
 from config.errors import InputError
-from config.exports.column_mapping import Source, read_mapping
+from config.exports.column_mapping import RANGE_PA, Source, read_mapping
 from config.exports.column_names import COMMON
-from config.exports.export_preview import GOOD, ColumnPreview, ExportPreview
+from config.exports.column_preview import GOOD, ColumnPreview
+from config.exports.export_preview import ExportPreview
 from config.exports.export_units import SHARES
 from config.exports.mapping_file import MappingTable
 
 Ask = Callable[[str, str], str]
 """Given a question and what is taken where nothing is answered; returns the answer."""
-NEEDED = ("time_s", "position_m")
+NEEDED = ("position_m",)
 
 
 def answered(found: ExportPreview, ask: Ask) -> MappingTable:
@@ -24,14 +25,18 @@ def answered(found: ExportPreview, ask: Ask) -> MappingTable:
     words = _proposed(found)
     asked = [ours if ours != "command_pa" or "reference_m" not in words else "reference_m" for ours in COMMON]
     columns = [word for ours in asked if (word := _column(ours, words.get(ours), found, ask))]
-    sources = read_mapping(columns)
+    timed = any(each.startswith("time_s=") for each in columns)
+    period_s = None if timed else _number("the time between two rows, in s?", "0.01", ask)
+    sources = read_mapping(columns, period_s)
     status = [word for each in found.columns if (word := _status(each, ask))]
     (position,) = (each for each in sources if each.name == "position_m")
     return MappingTable(
         column=tuple(columns),
         stroke_m=_stroke_m(position, ask),
+        range_pa=_range_pa(sources, ask),
         time_format=_after(found, "--time-format"),
         status=tuple(status),
+        period_s=period_s,
     )
 
 
@@ -51,7 +56,7 @@ def _column(ours: str, proposed: str | None, found: ExportPreview, ask: Ask) -> 
         left_out = "" if ours in NEEDED else "; nothing if none"
         answer = ask(f"which column is {ours}, NAME or NAME:UNIT{left_out}? There are {names}", "")
         if not answer and ours in NEEDED:
-            raise InputError(ours, "is needed: a recording has a time and a position")
+            raise InputError(ours, "is needed: a recording has a position")
         return f"{ours}={answer}" if answer else ""
     if not any(proposed.rpartition(":")[0] in each and "is open" in each for each in found.open if "unit of" in each):
         return f"{ours}={proposed}"
@@ -71,7 +76,28 @@ def _stroke_m(position: Source, ask: Ask) -> float | None:
     unit = position.unit or ""
     if unit.removeprefix("-") not in SHARES and not unit.startswith("-"):
         return None
-    answer = ask("the stroke, 100 % of the position, in m?", "")
-    if not re.fullmatch(r"\d*\.?\d+(e-?\d+)?", answer) or float(answer) <= 0.0:
-        raise InputError("stroke", f"must be a length in m, as 0.04; got {answer[:40]!r}")
-    return float(answer)
+    return _number("the stroke, 100 % of the position, in m?", "0.04", ask)
+
+
+def _range_pa(sources: Sequence[Source], ask: Ask) -> tuple[float, float] | None:
+    """Return the pressures of 0 % and 100 % where a pressure is a share; the usual ones where nothing is answered."""
+    shares = [each for each in sources if each.name.endswith("_pa") and (each.unit or "").removeprefix("-") in SHARES]
+    if not shares:
+        return None
+    low, high = (
+        _number(f"the pressure at {end} of {shares[0].name} ({shares[0].theirs}), in Pa?", "20e3", ask, f"{usual:g}")
+        for end, usual in zip(("0 %", "100 %"), RANGE_PA, strict=True)
+    )
+    return low, high
+
+
+def _number(question: str, such: str, ask: Ask, otherwise: str = "") -> float:
+    """Return a positive number; zero is one where another is taken for an empty answer."""
+    answer = ask(question, otherwise)
+    try:
+        value = float(answer)
+    except ValueError:
+        value = nan
+    if not isfinite(value) or value < 0.0 or (value == 0.0 and not otherwise):
+        raise InputError(question.partition(",")[0], f"must be a number, as {such}; got {answer[:40]!r}")
+    return value

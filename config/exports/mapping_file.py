@@ -27,6 +27,7 @@ class MappingTable(Schema):
     time_format: str | None = None
     status: Many[str] = ()
     sheet: str | None = None
+    period_s: Positive | None = None
 
 
 class MappingFile(Schema):
@@ -43,7 +44,7 @@ def read_mapping_file(path: Path) -> MappingTable:
     """
     table = load(MappingFile, path).export
     try:
-        read_mapping(table.column)
+        read_mapping(table.column, table.period_s)
         read_status(table.status)
     except InputError as error:
         raise InputError(str(path), f"export.{error.source.removeprefix('--')}: {error.problem}") from None

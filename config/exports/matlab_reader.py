@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from config.exports.reader_process import Groups, damaged, read_apart, write_read
-from config.exports.typed_tables import NUMBERS, Columns, first_line
+from config.exports.typed_tables import NUMBERS, Columns, first_line, vectors_of
 from config.extras import needed
 
 KIND = "MATLAB"
@@ -51,12 +51,15 @@ def _vectors(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _vectors(value, f"{prefix}{name}.")
+        elif isinstance(value, list | np.ndarray) and all(isinstance(each, Mapping) for each in np.ravel(value)):
+            # An array of structures, as Simulink's signals of a scope: each is called by its label.
+            for index, each in enumerate(np.ravel(value), start=1):
+                label = str(each.get("label", "")) or f"{name}({index})"
+                kept = {key: entry for key, entry in each.items() if key != "dimensions"}
+                only = kept.get("values")
+                yield from _vectors({label: only} if isinstance(only, np.ndarray) else {label: kept}, prefix)
         elif isinstance(value, np.ndarray) and value.dtype.kind in NUMBERS and value.size > 1:
-            if value.ndim == 1:
-                yield prefix + name, value.astype(np.float64)
-            elif value.ndim == 2:
-                for index in range(value.shape[1]):
-                    yield f"{prefix}{name}(:,{index + 1})", value[:, index].astype(np.float64)
+            yield from vectors_of(prefix + name, value.astype(np.float64))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ it in brackets where the file says it; a time that is not stored as numbers (TDM
 """
 
 import logging
+import re
+import struct
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,16 +19,46 @@ from typing import Any
 import numpy as np
 
 from config.errors import InputError
+from config.exports import pandas_store
 from config.exports.matlab_reader import matlab_columns
 from config.exports.mdf4_reader import mdf4_groups
 from config.exports.raw_table import RawTable
-from config.exports.typed_tables import NUMBERS, Columns, by_length, column_rows, first_line, no_vectors, with_unit
+from config.exports.typed_tables import (
+    NUMBERS,
+    Columns,
+    by_length,
+    column_rows,
+    first_line,
+    no_vectors,
+    vectors_of,
+    with_unit,
+)
 from config.extras import needed
 from config.plain_file import require_moderate
 
 PACKING = ("_FillValue", "missing_value", "scale_factor", "add_offset")
-WAVEFORM = ("wf_start_time", "wf_start_offset", "wf_increment")
+MATLAB_4_BYTES = 20
+BEGIN = "wf_start_time"
+WAVEFORM = (BEGIN, "wf_start_offset", "wf_increment")
 """By what TDMS says of when the samples of a channel are."""
+
+
+def is_matlab_4(begin: bytes) -> bool:
+    """Return whether a file begins as one of MATLAB's level 4: a type, two sizes and the length of a name that follows.
+
+    The type is M 1000 + O 100 + P 10 + T: M of the machine, P of the numbers, T of the matrix.
+    """
+    for order in "<>":
+        if len(begin) < MATLAB_4_BYTES:
+            return False
+        kind, rows, columns, imaginary, length = struct.unpack(f"{order}5i", begin[:MATLAB_4_BYTES])
+        name = begin[MATLAB_4_BYTES : MATLAB_4_BYTES + length]
+        machine, numbers, matrix = kind // 1000, kind // 10 % 10, kind % 10
+        if machine == "<>".index(order) and kind % 1000 < 60 and numbers < 6 and matrix < 3 and 0 < length < 64:
+            named = name.endswith(b"\0") and re.fullmatch(rb"[A-Za-z]\w*\0", name)
+            if named and rows > 0 and columns > 0 and imaginary in (0, 1):
+                return True
+    return False
 
 
 def matlab(path: Path) -> list[RawTable]:
@@ -62,7 +94,9 @@ def _datasets(path: Path, h5py: Any, group: Any, prefix: str = "") -> Iterator[t
         if name.startswith("#"):  # MATLAB's own
             continue
         each = group.get(name)
-        if isinstance(each, h5py.Group):
+        if isinstance(each, h5py.Group) and pandas_store.is_frame(each):
+            yield from pandas_store.columns_of(path, each)
+        elif isinstance(each, h5py.Group):
             yield from _datasets(path, h5py, each, f"{prefix}{name}.")
         elif isinstance(each, h5py.Dataset) and 0 < len(each.shape) <= 2:
             require_moderate(path, max(each.shape), min(each.shape) if len(each.shape) == 2 else 1)
@@ -81,11 +115,9 @@ def _channels(name: str, dataset: Any) -> Iterator[tuple[str, Any]]:
         return
     values = _unpacked(dataset)
     unit = next((_text(dataset.attrs[key]) for key in ("units", "unit", "Units", "Unit") if key in dataset.attrs), "")
-    if values.ndim == 1 or 1 in values.shape:
-        yield with_unit(name, unit), values.ravel()
-        return
-    for index, column in enumerate(values if kind is not None else values.T, start=1):
-        yield with_unit(f"{name}(:,{index})", unit), column
+    yield from (
+        (with_unit(each, unit), vector) for each, vector in vectors_of(name, values if kind is None else values.T)
+    )
 
 
 def _unpacked(dataset: Any) -> Any:
@@ -114,7 +146,9 @@ def tdms(path: Path) -> list[RawTable]:
         with warnings.catch_warnings(action="ignore"), path.open("rb") as data, nptdms.TdmsFile.open(data) as file:
             for group in file.groups():
                 require_moderate(path, max((len(each) for each in group.channels()), default=0), len(group.channels()))
-            groups = [(group.name, columns) for group in file.groups() for columns in _tdms_group(group)]
+            begins = [each.properties[BEGIN] for group in file.groups() for each in group.channels() if _begins(each)]
+            first = min(begins, default=None)
+            groups = [(group.name, columns) for group in file.groups() for columns in _tdms_group(group, first)]
     except InputError:
         raise
     except Exception as error:  # a damaged file fails anywhere in its reader
@@ -133,8 +167,15 @@ class _Told(logging.Handler):
         self.first = self.first or " ".join(record.getMessage().split())
 
 
-def _tdms_group(group: Any) -> list[Columns]:
-    """Return the channels of a group that are of one time each: waveforms may begin and go on differently."""
+def _begins(channel: Any) -> bool:
+    return isinstance(channel.properties.get(BEGIN), np.datetime64)
+
+
+def _tdms_group(group: Any, first: Any) -> list[Columns]:
+    """Return the channels of a group that are of one time each, from the first begin of all waveforms on.
+
+    Waveforms may begin and go on differently.
+    """
     of_times: dict[tuple[str, ...], Columns] = {}
     for channel in group.channels():
         values = channel[:]
@@ -146,7 +187,8 @@ def _tdms_group(group: Any) -> list[Columns]:
             columns[channel.name] = [str(np.datetime_as_string(each, unit="us")) for each in values]
         elif values.dtype.kind in NUMBERS:
             if waveform:
-                columns.setdefault("time [s]", channel.time_track())
+                late_s = (kept[BEGIN] - first) / np.timedelta64(1, "us") * 1e-6 if _begins(channel) else 0.0
+                columns.setdefault("time [s]", channel.time_track() + late_s)
             unit = kept.get("unit_string") or kept.get("NI_UnitDescription") or ""
             columns[with_unit(channel.name, str(unit))] = values.astype(np.float64)
     if len(of_times) == 2 and () in of_times:  # what says no time of its own goes with the one that is said

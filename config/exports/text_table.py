@@ -14,6 +14,7 @@ from itertools import islice
 from pathlib import Path
 
 from config.errors import InputError
+from config.exports.labview_file import is_labview, labview_table
 from config.exports.raw_table import Cell, RawTable
 from config.plain_file import MOST_COLUMNS
 
@@ -29,8 +30,6 @@ NO_TABLES = {
 """How a text begins that is no table, and what to do."""
 ANNOTATIONS = ("#group", "#datatype", "#default")
 """Lines in which InfluxDB says what the columns of a CSV file are, before the one that names them."""
-LONG = frozenset({"_time", "_value", "_field"})
-TURNED = '|> pivot(rowKey: ["_time"], columnKey: ["_field"], valueColumn: "_value")'
 MARKS = {
     b"\xef\xbb\xbf": "utf-8-sig",
     b"\xff\xfe\x00\x00": "utf-32",
@@ -53,11 +52,13 @@ def text_tables(path: Path) -> list[RawTable]:
     for begin, problem in NO_TABLES.items():
         if re.match(begin, text, re.IGNORECASE):
             raise InputError(str(path), problem)
-    text = _without_annotations(path, text)
+    ended = text.endswith(("\n", "\r"))
+    if is_labview(text):
+        return [labview_table(text, ended=ended)]
+    text = _without_annotations(text)
     first = [line.strip() for line in islice(io.StringIO(text), 4 * LOOKED_AT) if line.strip()][:LOOKED_AT]
     _require_fields(path, first)
     notes = () if encoding.startswith("utf-8") else (("encoding", encoding),)
-    ended = text.endswith(("\n", "\r"))
     length = text.count("\n") or text.count("\r")
     found = [each for each in SEPARATORS if each in text] or [","]
     if 2 * sum(_has_spaces_alone(line) for line in first) > len(first):
@@ -101,18 +102,11 @@ def _spaced(text: str) -> Iterator[tuple[int, list[Cell]]]:
         yield number, [cell.strip('"') for cell in line.split()]
 
 
-def _without_annotations(path: Path, text: str) -> str:
-    """Return an annotated CSV file of InfluxDB with its annotations empty; the numbers of lines stay.
-
-    Raises:
-        InputError: it has a row for each value of each field, in place of a column for each field.
-    """
+def _without_annotations(text: str) -> str:
+    """Return an annotated CSV file of InfluxDB with its annotations empty; the numbers of lines stay."""
     if not text.startswith(ANNOTATIONS):
         return text
     lines = text.splitlines(keepends=True)
-    named = next((each for each in lines if not each.startswith(ANNOTATIONS)), "")
-    if set(named.strip().split(",")) >= LONG:
-        raise InputError(str(path), f"is InfluxDB's, with a row a value: let the query end in {TURNED}")
     return "".join("\n" if each.startswith(ANNOTATIONS) else each for each in lines)
 
 

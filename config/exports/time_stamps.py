@@ -45,10 +45,6 @@ PROPOSED = (
     "%Y%m%d %H%M%S",
     "%Y%m%dT%H%M%S.%f",
 )
-CLOCKS = (("ms", 1e11, 1e13, "milliseconds since 1970"), ("us", 1e14, 1e16, "microseconds since 1970"))
-"""Units of clocks, between which numbers they are told: from 1973 to 2286."""
-WORKBOOK_DAYS, LONGEST_STEP_D = (30_000.0, 80_000.0), 9e-4
-"""Numbers of days, from 1982 to 2119, that a workbook's dates are without their format, and a step between two."""
 _LONG_FRACTION = re.compile(r"([.,]\d{6})\d+")
 
 
@@ -57,29 +53,10 @@ def has_date(time_format: str | None) -> bool:
     return time_format is None or re.search("%[djyYcxGs]", time_format) is not None
 
 
-def clock_unit(times: Array) -> tuple[str, str] | None:
-    """Return the unit of a clock whose numbers are no seconds, and what it counts; None if they may be seconds.
-
-    >>> clock_unit(np.array([1.7726121e12, 1.7726121001e12])), clock_unit(np.array([46085.25, 46085.250001]))
-    (('ms', 'milliseconds since 1970'), ('d', 'days of a workbook'))
-    """
-    finite = times[np.isfinite(times)]
-    if finite.size < 2:
-        return None
-    first, steps = float(finite[0]), np.abs(np.diff(finite))
-    for unit, low, high, words in CLOCKS:
-        if low < first < high:
-            return unit, words
-    low_d, high_d = WORKBOOK_DAYS
-    if low_d < first < high_d and 0.0 < float(np.median(steps)) < LONGEST_STEP_D:
-        return "d", "days of a workbook"
-    return None
-
-
 def seconds_of(
     path: Path, texts: Sequence[str], lines: Sequence[int], time_format: str | None
-) -> tuple[Array, float | None]:
-    """Return the seconds, (n,), from the first of n stamps, and where these are local times, the first from 1970, s.
+) -> tuple[Array, float, bool]:
+    """Return the seconds, (n,), from the first of n stamps, the first from 1970, s, and whether these are local times.
 
     Raises:
         InputError: a stamp that cannot be read; names it and its line and what would read it.
@@ -92,7 +69,7 @@ def seconds_of(
             raise _unreadable(path, texts, row, lines[row], time_format)
         naive = naive or stamp.tzinfo is None
         stamps[row] = (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
-    return stamps - stamps[0], float(stamps[0]) if naive else None
+    return stamps - stamps[0], float(stamps[0]), naive
 
 
 def _stamp(text: str, time_format: str | None) -> datetime | None:

@@ -120,6 +120,16 @@ def column_rows(columns: Mapping[str, Any]) -> Iterator[tuple[int, list[Cell]]]:
         yield number, list(row)
 
 
+def vectors_of(name: str, values: Any) -> Iterator[tuple[str, Any]]:
+    """Yield a vector by its name, or the signals of a matrix, which lie along its longer side, by MATLAB's words."""
+    if values.ndim == 1 or 1 in values.shape:
+        yield name, values.ravel()
+    elif values.ndim == 2:
+        rows = values.shape[0] < values.shape[1]
+        for index, signal in enumerate(values if rows else values.T, start=1):
+            yield f"{name}({index},:)" if rows else f"{name}(:,{index})", signal
+
+
 def with_unit(name: str, unit: str) -> str:
     """Return a column's name with the unit that its file says, in brackets."""
     return f"{name} [{unit}]" if unit else name

@@ -64,7 +64,13 @@ def matlab(path: Path, recording: Recording) -> None:
         (
             matlab,
             "a.mat",
-            {"position_m=stem:%": "position_m=stem:m", "command_pa=cmd:%": "command_pa=cmd:kPa", "M": "0.04"},
+            {
+                "position_m=stem:p.u.": "position_m=stem:m",
+                "command_pa=cmd:%": "command_pa=cmd:kPa",
+                "M": "0.04",
+                "AT0": "20e3",
+                "AT100": "100e3",
+            },
         ),
     ],
 )
@@ -193,7 +199,7 @@ def test_units_at_the_end_of_names_and_a_clock_of_another_name_are_proposed(tmp_
     path.write_text("t_ms,x_pct,drive_in\n" + "".join(f"{i}0,{i}.5,0.{i}\n" for i in range(8)))
     assert main(["import", str(path)]) == 0
     said = capsys.readouterr().out
-    assert "command_pa=drive_in:%" in said  # an input, and no inch
+    assert "command_pa=drive_in:bar" in said  # an input, and no inch
 
 
 SCADA = "Zeit;Hub;Stell;Status\n" + "".join(
@@ -230,7 +236,7 @@ def test_what_a_file_leaves_open_is_asked_and_written_down_for_next_time(
     ("answers", "said"),
     [
         ("s\n%\n", "--inspect: the answers ended before the questions; nothing was written"),
-        ("s\n%\nbar\n\nforty\n", "stroke: must be a length in m"),
+        ("s\n%\nbar\n\nforty\n", "the stroke: must be a number, as 0.04; got 'forty'"),
         ("s\nfathom\nbar\n\n", "unknown unit 'fathom'"),
     ],
 )

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from config import historian_export
 from config.errors import InputError
+from config.exports import sample_rows
 from config.exports.column_mapping import read_mapping
 from config.historian_export import read_export
 from config.recording import Recording
@@ -84,13 +84,13 @@ def test_a_long_export_is_told_while_it_is_read_and_one_too_long_is_refused_at_o
 ) -> None:
     path = tmp_path / "export.csv"
     path.write_text("Zeit,PV,OUT\n" + "".join(f"{i},{i % 7}.5,1.5\n" for i in range(200)))
-    monkeypatch.setattr(historian_export, "TOLD_EVERY", 50)
+    monkeypatch.setattr(sample_rows, "TOLD_EVERY", 50)
     told: list[tuple[str, float]] = []
     read_export(path, read_mapping(MAPPING), 0.1, progress=lambda what, done: told.append((what, done)))
     assert told[1][0] == "reading export.csv: 100 rows"
     assert told[1][1] == pytest.approx(0.5, abs=0.01)
     assert told[-1][0] == "understanding 200 rows"
-    monkeypatch.setattr(historian_export, "MOST_ROWS", 150)
+    monkeypatch.setattr(sample_rows, "MOST_ROWS", 150)
     told.clear()
     with pytest.raises(InputError, match=r"million rows, and an export is read up to .* split the file"):
         read_export(path, read_mapping(MAPPING), 0.1, progress=lambda what, done: told.append((what, done)))

@@ -198,22 +198,26 @@ def test_an_angle_by_which_mdf_goes_is_no_time(tmp_path: Path) -> None:
     ],
     ids=lambda other: next(iter(other)),
 )
-def test_waveforms_of_tdms_of_other_times_are_no_columns_of_one_table(other: dict[str, object], tmp_path: Path) -> None:
+def test_waveforms_of_tdms_of_other_times_are_joined_each_by_its_own(other: dict[str, object], tmp_path: Path) -> None:
     """As many samples of twice the spacing stood beside one another as if they were of the same time."""
     from nptdms import ChannelObject, TdmsWriter
 
     told = {"wf_start_time": np.datetime64("2026-01-01T00:00:00"), "wf_start_offset": 0.0, "wf_increment": 0.01}
+    of_command = told | other
     with TdmsWriter(tmp_path / "run.tdms") as writer:
         writer.write_segment(
             [
                 ChannelObject("rig", "PV", POSITION_MM, properties={"unit_string": "mm", **told}),
-                ChannelObject("rig", "OUT", COMMAND_BAR, properties={"unit_string": "bar", **told, **other}),
+                ChannelObject("rig", "OUT", COMMAND_BAR, properties={"unit_string": "bar", **of_command}),
             ]
         )
-    said = said_of(tmp_path / "run.tdms", FILES["run.tdms"][1])
-    assert (
-        "tables of other times: 'time', 'PV' in rig, 200 rows; 'OUT' in rig, 200 rows; export them on one time" in said
-    )
+    recording = read_export(tmp_path / "run.tdms", read_mapping(FILES["run.tdms"][1]), None)
+    late_s = float((of_command["wf_start_time"] - told["wf_start_time"]) / np.timedelta64(1, "s"))  # type: ignore[operator]
+    own_s = late_s + of_command["wf_start_offset"] + of_command["wf_increment"] * np.arange(200)  # type: ignore[operator]
+    np.testing.assert_allclose(recording.position_m, 1e-3 * np.interp(recording.time_s, TIME_S, POSITION_MM))
+    held = COMMAND_BAR[np.searchsorted(own_s, recording.time_s + 1e-9, side="right") - 1]
+    np.testing.assert_allclose(recording.command_pa, 1e5 * held)
+    assert recording.time_s[0] == pytest.approx(max(0.0, own_s[0]))
 
 
 def test_what_netcdf_packs_is_unpacked_and_what_it_marks_as_missing_is(tmp_path: Path) -> None:
@@ -258,10 +262,12 @@ def test_of_several_groups_that_have_the_columns_a_person_says_which(tmp_path: P
         read_export(tmp_path / "run.tdms", mapping, None, options=ExportOptions(sheet="run 3"))
 
 
-def test_columns_of_other_times_are_said_to_be_so(tmp_path: Path) -> None:
+def test_columns_of_several_groups_are_joined_each_by_its_own_time(tmp_path: Path) -> None:
     write_runs(tmp_path / "run.tdms", "Cmd", "OUT")
-    said = said_of(tmp_path / "run.tdms", ["time_s=t", "position_m=PV", "command_pa=Cmd", "pressure_pa=OUT"])
-    assert "tables of other times: 't', 'PV', 'Cmd' in run 1, 200 rows; 'OUT' in run 2, 200 rows" in said
+    words = ["time_s=t", "position_m=PV", "command_pa=Cmd", "pressure_pa=OUT"]
+    recording = read_export(tmp_path / "run.tdms", read_mapping(words), None)
+    np.testing.assert_allclose(recording.columns["pressure_pa"], 1e5 * COMMAND_BAR)
+    assert "pressure_pa from 200 samples" in recording.metadata["clocks"]
     assert (
         "of other times, not shown: run 2, 200 rows: t [s], PV [mm], OUT [bar]" in preview(tmp_path / "run.tdms").open
     )

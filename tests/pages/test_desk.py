@@ -1,5 +1,6 @@
 """What lies on a desk: a step back brings it again, and what is shown goes home as words of a command line."""
 
+import argparse
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -8,17 +9,20 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 
 from config.errors import CommandFailed, InputError
+from config.exports.export_preview import preview
 from config.recording import Recording, write_recording
 from config.valve_file import load_valve, shipped_valve
 from config.writing import write_valve
+from positioner.cli.parts.export_arguments import add_export_arguments, read_mapped
 from positioner.pages.workbench_page.background import Limits, News, Raced, Work, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve, named_valve
 from positioner.pages.workbench_page.notebook import notebook
-from positioner.pages.workbench_page.opening import ColumnChoice, Opened, opened_like
+from positioner.pages.workbench_page.opening import ColumnChoice, Export, Opened, mapped, opened_like, wrong_with
 from positioner.pages.workbench_page.search import Search
 from positioner.pages.workbench_page.search_panel import SearchPanel
 from tests.pages.laid_out import hidden
@@ -136,13 +140,43 @@ def test_the_notebook_run_from_top_to_bottom_comes_to_the_same(
 
 
 def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
-    choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:%", "command_pa": "OUT:Pa"}, 0.04, "", ",")
+    choice = ColumnChoice({"time_s": "t:s", "position_m": "PV:%", "command_pa": "OUT:%"}, 0.04, "", ",", (1e4, 9e4))
     assert desk.opened is not None
     desk.opened = replace(first(), choice=choice)
     text = notebook(desk)
     assert "from config.historian_export import read_export" in text
-    assert "'position_m=PV:%', 'command_pa=OUT:Pa']), 0.04, (20000.0, 100000.0), Exp" in text
+    assert "'position_m=PV:%', 'command_pa=OUT:%']), 0.04, (10000.0, 90000.0), Exp" in text
     assert "ExportOptions(',', None)" in text
+
+
+@pytest.mark.parametrize(
+    ("choice", "reads"),
+    [
+        (ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:%"}), (2e4, 1e5)),
+        (
+            ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:mA"}, range_pa=(0.0, 1.2e5)),
+            (0.0, 1.2e5),
+        ),
+        (ColumnChoice({"time_s": "t:s", "position_m": "PV:mm", "command_pa": "OUT:bar"}, range_pa=(0.0, 1.2e5)), None),
+        (ColumnChoice({"position_m": "PV:mm", "command_pa": "OUT:%"}, period_s=0.5, status=("Q=Good",)), (2e4, 1e5)),
+    ],
+)
+def test_the_words_of_a_choice_read_the_file_as_the_page_does(
+    choice: ColumnChoice, reads: tuple[float, float] | None, tmp_path: Path
+) -> None:
+    """What 0 and 100 % are stands in the words wherever a pressure is a share, assumed or said."""
+    shown = {"OUT:bar": 0.5, "OUT:mA": 12.0}.get(choice.columns["command_pa"], 50.0)
+    rows = [f"{0.5 * i},{i % 7},{shown + i % 3},Good" for i in range(60)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,PV,OUT,Q", *rows]))
+    read = mapped(Export("a.csv", tmp_path / "a.csv", preview(tmp_path / "a.csv"), choice), choice)
+    parser = argparse.ArgumentParser()
+    add_export_arguments(parser)
+    again = read_mapped(tmp_path / "a.csv", parser.parse_args(list(choice.words)), None)
+    np.testing.assert_array_equal(again.command_pa, read.recording.command_pa)
+    np.testing.assert_array_equal(again.time_s, read.recording.time_s)
+    assert choice.ends_pa == reads
+    assumed = any(each.startswith("assumed: command_pa") for each in wrong_with(read, None))
+    assert assumed is (reads is not None and choice.range_pa is None)
 
 
 def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
     from config.exports.column_mapping import ExportOptions
     from config.recording import Recording
 
-BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet")
+BESIDES = ("stroke_m", "range_pa", "decimal", "time_format", "status", "sheet", "period_s")
 """Options that say how mapped columns are read."""
 LARGE = 50_000_000
 """Bytes of a file whose reading takes seconds."""
@@ -37,7 +38,14 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     )
     export.add_argument("--stroke-m", type=_stroke, metavar="M", help="100 %% of a position (the valve file's stroke)")
     export.add_argument(
-        "--range-pa", type=float, nargs=2, metavar=("AT0", "AT100"), help="0 %% and 100 %% of a pressure (20e3 100e3)"
+        "--range-pa",
+        type=_pressure,
+        nargs=2,
+        metavar=("AT0", "AT100"),
+        help="0 %% and 100 %% of a pressure (else 20e3 100e3 is assumed, and told)",
+    )
+    export.add_argument(
+        "--period-s", type=_period, metavar="S", help="between the rows of a file without a time; no time_s then"
     )
     export.add_argument("--decimal", choices=(".", ","), help="the decimal sign (else as the numbers show)")
     export.add_argument(
@@ -59,11 +67,28 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _stroke(word: str) -> float:
     """Read a stroke; `M`, as `import` proposes it, is a word for one that only a person knows."""
+    return _told(word, "the stroke in metres, a number: 0.04 is 40 mm")
+
+
+def _pressure(word: str) -> float:
+    """Read an end of a range; `AT0` and `AT100` are such words as well."""
+    return _told(word, "a pressure in pascals, a number: 20e3 is 0.2 bar")
+
+
+def _period(word: str) -> float:
+    """Read a period; `S` is such a word as well."""
+    return _told(word, "the time between two rows in seconds, a positive number: 0.01", positive=True)
+
+
+def _told(word: str, what: str, *, positive: bool = False) -> float:
+    """Read a number that only a person knows."""
     try:
-        return float(word)
+        value = float(word)
     except ValueError:
-        problem = f"{word!r} must be the stroke in metres, a number: 0.04 is 40 mm"
-        raise argparse.ArgumentTypeError(problem) from None
+        value = nan
+    if not isfinite(value) or (positive and value <= 0.0):
+        raise argparse.ArgumentTypeError(f"{word!r} must be {what}")
+    return value
 
 
 def export_words(arguments: argparse.Namespace) -> list[str]:
@@ -156,13 +181,13 @@ def read_mapped(
         InputError: as `read_export`; a stroke that is not positive.
     """
     from config.errors import InputError
-    from config.exports.column_mapping import RANGE_PA, read_mapping
+    from config.exports.column_mapping import read_mapping
     from config.historian_export import read_export
 
     if arguments.stroke_m is not None and not arguments.stroke_m > 0.0:
         raise InputError("--stroke-m", f"must be positive, it is {arguments.stroke_m:g}")
-    sources = read_mapping(arguments.column)
-    range_pa = RANGE_PA if arguments.range_pa is None else (arguments.range_pa[0], arguments.range_pa[1])
+    sources = read_mapping(arguments.column, arguments.period_s)
+    range_pa = None if arguments.range_pa is None else (arguments.range_pa[0], arguments.range_pa[1])
     return read_export(path, sources, arguments.stroke_m or stroke_m, range_pa, export_options(arguments), progress)
 
 
@@ -174,7 +199,9 @@ def export_options(arguments: argparse.Namespace) -> "ExportOptions":
     """
     from config.exports.column_mapping import ExportOptions, read_status
 
-    return ExportOptions(arguments.decimal, arguments.time_format, read_status(arguments.status), arguments.sheet)
+    return ExportOptions(
+        arguments.decimal, arguments.time_format, read_status(arguments.status), arguments.sheet, arguments.period_s
+    )
 
 
 def tell(who: str, recording: "Recording", stroke_m: float | None) -> None:

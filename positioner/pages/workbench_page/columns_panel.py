@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 from nicegui import ui
 
 from config.errors import InputError
-from config.exports.column_mapping import offered_units
+from config.exports.column_mapping import RANGE_PA, offered_units
 from positioner.pages.parts.figure_view import Figure, FigureView
 from positioner.pages.parts.number_field import NumberField
 from positioner.pages.parts.telling import aside, heading, sentences
@@ -24,7 +25,12 @@ WORDS = {
     "pressure_pa": "actuator pressure",
     "load_n": "load",
 }
-ASKED = {"--stroke-m": "stroke", "--column": "column", "--time-format": "how dates are written"}
+ASKED = {
+    "--stroke-m": "stroke",
+    "--column": "column",
+    "--time-format": "how dates are written",
+    "--period-s": "time between rows",
+}
 """What options of a command line are called here."""
 PREVIEW_PX = 320
 
@@ -50,7 +56,10 @@ class ColumnsPanel:
                 value = None if stroke_m is None else round(unit.per_si * stroke_m, 6)
                 self._stroke = NumberField(f"stroke, {unit.name}, if position is in %", value, name="--stroke-m")
                 self._time_format = ui.input("how dates are written", value=export.proposed.time_format)
-                for each in (self._stroke, self._time_format):
+                self._ends = [self._end(end, usual) for end, usual in zip(("0", "100"), RANGE_PA, strict=True)]
+                self._period = NumberField("time between rows, s, if no column is a time", name="--period-s")
+                self._period.props('data-testid="period"')
+                for each in (self._stroke, self._time_format, *self._ends, self._period):
                     each.props("dense").classes("w-full").on("blur", self._show)
             with ui.column().classes("wide"):
                 self._preview = ui.column().classes("w-full").props('data-testid="preview" aria-live="polite"')
@@ -72,6 +81,22 @@ class ColumnsPanel:
             shown.props(f'dense data-testid="unit-{ours}"').style("flex: 2 1 0; min-width: 0")
         return column, shown
 
+    def _end(self, end: str, usual_pa: float) -> NumberField:
+        unit = self._desk.units.pressure
+        value = round(unit.per_si * usual_pa, 6)
+        field = NumberField(f"pressure at {end} %, {unit.name}, if a command is in % or mA", value)
+        field.props(f'data-testid="pressure-{end}"')
+        return field
+
+    def _range_pa(self) -> tuple[float, float] | None:
+        """Return the ends of a pressure's range; None where they are as they stood there: assumed, and told."""
+        per_si = self._desk.units.pressure.per_si
+        ends = [each.number() for each in self._ends]
+        if None in ends or ends == [round(per_si * each, 6) for each in RANGE_PA]:
+            return None
+        low, high = (end / per_si for end in ends if end is not None)
+        return low, high
+
     def _stroke_m(self) -> float | None:
         return self._desk.valve.file.valve.stroke_m if self._desk.valve else None
 
@@ -82,7 +107,14 @@ class ColumnsPanel:
         }
         stroke = self._stroke.number()
         stroke_m = stroke / self._desk.units.length_unit().per_si if stroke else None
-        return ColumnChoice(said, stroke_m, self._time_format.value or "")
+        return replace(
+            self._export.proposed,
+            columns=said,
+            stroke_m=stroke_m,
+            time_format=self._time_format.value or "",
+            range_pa=self._range_pa(),
+            period_s=self._period.number(),
+        )
 
     async def _show(self) -> None:
         """Read it as chosen and show what it would be, or why it cannot be read so."""

@@ -6,7 +6,6 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from config.exports.column_mapping import RANGE_PA
 from config.writing import valve_toml
 from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.opening import Opened
@@ -16,7 +15,7 @@ from workbench.report.comparison_report import headline
 KERNEL = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
 IMPORTS = "from pathlib import Path\n\nimport positioner as pos"
 EXPORTS = """
-from config.exports.column_mapping import ExportOptions, read_mapping
+from config.exports.column_mapping import ExportOptions, read_mapping, read_status
 from config.historian_export import read_export"""
 Cell = Mapping[str, Any]
 
@@ -72,9 +71,13 @@ def _read(opened: Opened) -> str:
     path = f"Path({opened.name!r})"
     if opened.choice is None:
         return f"pos.Recording.read({path})"
-    columns = [f"{ours}={theirs}" for ours, theirs in opened.choice.columns.items() if theirs]
-    options = f"{opened.choice.decimal or None!r}, {opened.choice.time_format or None!r}"
+    choice = opened.choice
+    period = "" if choice.period_s is None else f", {choice.period_s!r}"
+    options = [f"{choice.decimal or None!r}", f"{choice.time_format or None!r}"]
+    options += [f"status=read_status({list(choice.status)!r})"] if choice.status else []
+    options += [f"period_s={choice.period_s!r}"] if choice.period_s is not None else []
     return (
         "read_export(\n"
-        f"    {path}, read_mapping({columns!r}), {opened.choice.stroke_m!r}, {RANGE_PA!r}, ExportOptions({options})\n)"
+        f"    {path}, read_mapping({choice.named!r}{period}), {choice.stroke_m!r}, {choice.ends_pa!r}, "
+        f"ExportOptions({', '.join(options)})\n)"
     )

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Self
 
 from config.errors import InputError
-from config.exports.column_mapping import RANGE_PA, ExportOptions, offered_units, read_mapping
+from config.exports.column_mapping import RANGE_PA, ExportOptions, offered_units, read_mapping, read_status
 from config.exports.export_preview import ExportPreview, preview
+from config.exports.export_units import SHARES
 from config.exports.own_format import own_recording
 from config.exports.plausibility import oddities
 from config.historian_export import read_export
@@ -28,15 +29,42 @@ class ColumnChoice:
     stroke_m: float | None = None
     time_format: str = ""
     decimal: str = ""
+    range_pa: tuple[float, float] | None = None
+    """The pressures of 0 % and 100 %; None: the usual ones are assumed."""
+    period_s: float | None = None
+    """Between the rows of a file without a time."""
+    status: tuple[str, ...] = ()
+    """Columns that say which rows are good, `NAME=GOOD`."""
+
+    @property
+    def named(self) -> list[str]:
+        """The columns as `OURS=THEIRS:UNIT`."""
+        return [f"{ours}={theirs}" for ours, theirs in self.columns.items() if theirs]
+
+    @property
+    def pressures(self) -> list[str]:
+        """The pressures, of ours, that are given as a share of a range."""
+        units = {ours: parted(ours, theirs)[1].removeprefix("-") for ours, theirs in self.columns.items()}
+        return [ours for ours, unit in units.items() if ours.endswith("_pa") and unit in SHARES]
+
+    @property
+    def ends_pa(self) -> tuple[float, float] | None:
+        """The pressures of 0 % and 100 % as they are read; None where none is a share."""
+        return (self.range_pa or RANGE_PA) if self.pressures else None
 
     @property
     def words(self) -> tuple[str, ...]:
         """The same as words of a command line."""
-        words = [word for ours, theirs in self.columns.items() if theirs for word in ("--column", f"{ours}={theirs}")]
+        words = [word for each in self.named for word in ("--column", each)]
         if self.stroke_m is not None:
             words += ["--stroke-m", f"{self.stroke_m:g}"]
         if self.time_format:
             words += ["--time-format", self.time_format]
+        if self.ends_pa is not None:
+            words += ["--range-pa", *(f"{each:g}" for each in self.ends_pa)]
+        if self.period_s is not None:
+            words += ["--period-s", f"{self.period_s:g}"]
+        words += [word for each in self.status for word in ("--status", each)]
         return (*words, *(["--decimal", self.decimal] if self.decimal else []))
 
 
@@ -101,14 +129,16 @@ def opened(path: Path, name: str) -> Opened | Export:
 
 
 def _proposed(found: ExportPreview) -> ColumnChoice:
-    columns, time_format, words = dict.fromkeys(OURS, ""), "", iter(found.words)
-    for flag, word in zip(words, words, strict=False):
+    columns, time_format, status = dict.fromkeys(OURS, ""), "", []
+    for flag, word in zip(found.words, found.words[1:], strict=False):
         if flag == "--column":
             ours, _, theirs = word.partition("=")
             columns[ours] = theirs
         elif flag == "--time-format":
             time_format = word
-    return ColumnChoice(columns, None, time_format)
+        elif flag == "--status":
+            status.append(word)
+    return ColumnChoice(columns, None, time_format, status=tuple(status))
 
 
 def opened_like(path: Path, name: str, first: Opened) -> Opened:
@@ -131,12 +161,13 @@ def mapped(export: Export, by: ColumnChoice) -> Opened:
     Raises:
         InputError: a column is missing, in an unknown unit, or not to be read.
     """
-    chosen = [f"{ours}={theirs}" for ours, theirs in by.columns.items() if theirs]
-    options = ExportOptions(by.decimal or None, by.time_format or None)
-    recording = read_export(export.path, read_mapping(chosen), by.stroke_m, RANGE_PA, options)
+    options = ExportOptions(by.decimal or None, by.time_format or None, read_status(by.status), None, by.period_s)
+    sources = read_mapping(by.named, by.period_s)
+    recording = read_export(export.path, sources, by.stroke_m, by.range_pa, options)
     return Opened.of(export.name, export.path, recording, by)
 
 
 def wrong_with(opened: Opened, stroke_m: float | None) -> tuple[str, ...]:
-    """Say what is wrong with a recording, a line each: what is odd, and what had to be left out or cut."""
-    return (*oddities(opened.recording, stroke_m), *shortened(opened.record.notes))
+    """Say what is wrong with a recording, a line each: what was assumed, what is odd, and what was left out or cut."""
+    assumed = [f"assumed: {each}" for key, each in opened.recording.metadata.items() if key == "assumed"]
+    return (*assumed, *oddities(opened.recording, stroke_m), *shortened(opened.record.notes))

@@ -1,0 +1,148 @@
+"""Columns of different clocks: pairs in a table, a sheet a tag, stores of pandas: each value at its own time."""
+
+import datetime
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from config.errors import InputError
+from config.exports.column_mapping import read_mapping
+from config.exports.export_preview import preview
+from config.historian_export import read_export
+
+BEGIN = datetime.datetime(2026, 3, 5, 8, 15)
+STEM_S = np.arange(0.0, 30.0, 0.5)
+STEM_MM = np.round(20.0 + 10.0 * np.sin(STEM_S / 3.0), 3)
+ASKED_S = np.arange(-4.0, 30.0, 4.0)
+ASKED_BAR = np.round(0.6 + 0.05 * np.cos(ASKED_S), 4)
+HELD_BAR = ASKED_BAR[np.searchsorted(ASKED_S, STEM_S, side="right") - 1]
+
+
+def stamps(times_s: np.ndarray) -> list[str]:
+    return [(BEGIN + datetime.timedelta(seconds=float(t))).isoformat(timespec="milliseconds") for t in times_s]
+
+
+def pairs(path: Path, *header: str, counted: bool = False) -> None:
+    """Write a table in which each signal has its own clock before it, and the longer one goes on alone."""
+    asked, stem = (ASKED_S, STEM_S) if counted else (stamps(ASKED_S), stamps(STEM_S))
+    lines = list(header)
+    for i in range(len(STEM_S)):
+        first = f"{asked[i]},{ASKED_BAR[i]}" if i < len(ASKED_S) else ","
+        lines.append(f"{first},{stem[i]},{STEM_MM[i]}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def sheets(path: Path) -> None:
+    """Write a sheet a tag, each with the same names."""
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    for page, name, times_s, values in (
+        (book.active, "FV1.OUT", ASKED_S, ASKED_BAR),
+        (book.create_sheet(), "FV1.ZT", STEM_S, STEM_MM),
+    ):
+        page.title = name
+        page.append(["Time", "Value", "Status"])
+        for stamp, value in zip(stamps(times_s), values.tolist(), strict=True):
+            page.append([datetime.datetime.fromisoformat(stamp), value, "Good"])
+    book.save(path)
+
+
+def archive(path: Path) -> None:
+    """Write a row a value, both signals in the order of time."""
+    rows = [(t, "FV1.OUT", u) for t, u in zip(ASKED_S, ASKED_BAR, strict=True)]
+    rows += [(t, "FV1.ZT", x) for t, x in zip(STEM_S, STEM_MM, strict=True)]
+    lines = [f"{tag};{stamps(np.array([t]))[0]};{value}" for t, tag, value in sorted(rows)]
+    path.write_text("\n".join(["Tag;Time;Value", *lines]) + "\n")
+
+
+WRITTEN: dict[str, tuple[str, Callable[[Path], None], tuple[str, str, str]]] = {
+    "pairs of one name": (
+        "pairs.csv",
+        lambda path: pairs(path, "Name,uCmd,Name,xStem", counted=True),
+        ("time_s=Name", "command_pa=uCmd:bar", "position_m=xStem:mm"),
+    ),
+    "pairs under the tags": (
+        "pairs.csv",
+        lambda path: pairs(path, "FV1.OUT,,FV1.ZT,", "Timestamp,Value,Timestamp,Value"),
+        ("time_s=Timestamp", "command_pa=FV1.OUT Value:bar", "position_m=FV1.ZT Value:mm"),
+    ),
+    "pairs by their places": (
+        "pairs.csv",
+        lambda path: pairs(path, "Timestamp,Value,Timestamp,Value"),
+        ("time_s=#3", "command_pa=#2:bar", "position_m=#4:mm"),
+    ),
+    "clocks of different names, the wrong one said": (
+        "pairs.csv",
+        lambda path: pairs(path, "T_OUT,OUT,T_ZT,ZT"),
+        ("time_s=T_OUT", "command_pa=OUT:bar", "position_m=ZT:mm"),
+    ),
+    "a sheet a tag": (
+        "tags.xlsx",
+        sheets,
+        ("time_s=Time", "command_pa=FV1.OUT:bar", "position_m=FV1.ZT:mm"),
+    ),
+    "a row a value": (
+        "archive.csv",
+        archive,
+        ("time_s=Time", "command_pa=FV1.OUT:bar", "position_m=FV1.ZT:mm"),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_each_value_is_taken_at_its_own_time(kind: str, tmp_path: Path) -> None:
+    name, write, words = WRITTEN[kind]
+    write(tmp_path / name)
+    recording = read_export(tmp_path / name, read_mapping(words), None)
+    np.testing.assert_allclose(recording.time_s - recording.time_s[0], STEM_S, atol=1e-6)
+    np.testing.assert_allclose(recording.position_m, 1e-3 * STEM_MM)
+    np.testing.assert_allclose(recording.command_pa, 1e5 * HELD_BAR)
+    assert "command_pa from 9 samples" in recording.metadata["clocks"]
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_the_proposal_reads_the_same(kind: str, tmp_path: Path) -> None:
+    name, write, _ = WRITTEN[kind]
+    write(tmp_path / name)
+    proposed = {
+        word.partition("=")[0]: word.rpartition(":")[0] for word in preview(tmp_path / name).words if "=" in word
+    }
+    if kind == "pairs by their places":  # nothing tells which is which
+        return
+    clock = next(word for word in preview(tmp_path / name).words if word.startswith("time_s"))
+    words = [clock, f"{proposed['command_pa']}:bar", f"{proposed['position_m']}:mm"]
+    np.testing.assert_allclose(read_export(tmp_path / name, read_mapping(words), None).command_pa, 1e5 * HELD_BAR)
+
+
+def test_a_second_clock_beside_the_rows_is_no_other_time(tmp_path: Path) -> None:
+    rows = zip(stamps(STEM_S), range(len(STEM_S)), 1e3 * STEM_S, STEM_MM, STEM_MM / 50, strict=True)
+    lines = ["Time,Index,uptime_ms,ZT,OUT", *(",".join(map(str, row)) for row in rows)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    read = read_export(
+        tmp_path / "a.csv", read_mapping(["time_s=Time", "position_m=ZT:mm", "command_pa=OUT:bar"]), None
+    )
+    np.testing.assert_allclose(read.time_s, STEM_S)
+    assert "clocks" not in read.metadata
+
+
+def test_what_is_asked_is_not_made_up_where_nobody_has_recorded_it(tmp_path: Path) -> None:
+    """The stem's rows go on four times as long as the command's."""
+    rows = zip(STEM_S, STEM_MM / 50, 4.0 * STEM_S, STEM_MM, strict=True)
+    (tmp_path / "a.csv").write_text("\n".join(["Name,u,Name,x", *(",".join(map(str, row)) for row in rows)]))
+    read = read_export(tmp_path / "a.csv", read_mapping(["time_s=Name", "position_m=x:mm", "command_pa=u:bar"]), None)
+    assert read.time_s[-1] <= STEM_S[-1] + 0.5
+    assert read.metadata["rows at times of which the other columns say nothing, left out"] == "45"
+
+
+def test_clocks_that_cannot_be_laid_side_by_side_are_refused(tmp_path: Path) -> None:
+    rows = zip(stamps(STEM_S), STEM_MM / 50, STEM_S, STEM_MM, strict=True)
+    (tmp_path / "a.csv").write_text("\n".join(["Time,u,Time,x", *(",".join(map(str, row)) for row in rows)]))
+    with pytest.raises(InputError, match=r"tells the day and .* does not"):
+        read_export(tmp_path / "a.csv", read_mapping(["time_s=Time", "position_m=x:mm", "command_pa=u:bar"]), None)
+    lines = ["Name,u,Name,x", *(f"{t},0.5,{t + 100},20" for t in STEM_S)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match="no time is common"):
+        read_export(tmp_path / "a.csv", read_mapping(["time_s=Name", "position_m=x:mm", "command_pa=u:bar"]), None)
