@@ -21,8 +21,11 @@ all that the pressure went over since the stem last answered, is bounded by what
 
     going on           W <= 1.5 of the most in this direction, or of the most of a turn, and a first step
     after a turn       W <= 1.5 of the most of a turn, for friction differs over the travel, and a first step
-    after the first    W <= what spring balances over the whole stroke: friction that is more leaves no valve
+    after the first    W <= what spring balances over the whole stroke, or 2 h + R if that is more
     before that        W < all that the pressure limits allow: nothing is known, and what breaks it loose is sought once
+
+h = u - k x of a landing upward: friction and preload, F_c + F_0, k the slope of slides that went on. The first turn
+needs F_c + F_s, and that is no more than 2 h + R, for R >= F_s - F_c and a preload closes the valve.
 
 A stem that goes down while the pressure rises, or up while it falls, twice in a row, is an air-to-close valve's, or its
 position is wired the other way round: each further step would take it farther out of the window.
@@ -53,7 +56,8 @@ LEAP = 3.0
 """Rises of the slide before: a rise beyond it is not asked for, for the slope may be that of a packing."""
 NOT_COMPLETE = 0.99
 NEARLY_TURNED = 0.8
-"""Of the rise that turned friction round before: the first step of the last turn."""
+"""Of the rise that turned friction round before: the first step of the last turn, and of each while slides after a turn
+go so far that there is no room to go on. Small steps follow, for a short slide."""
 MOST_TURNS = 6
 UNANSWERED = 1.5
 """Of the most that a slide has needed: a stem that has not answered by then is not where it is said to be, or stuck."""
@@ -110,6 +114,7 @@ class Staircase:
         lowest_pa, highest_pa: levels since it last moved visibly at all, or since the staircase began; NaN at a stop.
         against: slides in a row that went against the pressure.
         most_up_pa, most_down_pa, most_turn_pa: longest way of the level from slide to slide, going on and turning.
+        turn_pa: 2 h + R, the most that the first turn needs; 0: not known.
     """
 
     level_pa: float
@@ -137,6 +142,7 @@ class Staircase:
     most_up_pa: float = 0.0
     most_down_pa: float = 0.0
     most_turn_pa: float = 0.0
+    turn_pa: float = 0.0
 
     @property
     def progress(self) -> float:
@@ -210,7 +216,7 @@ class Staircase:
         needed_pa = (going_on_pa if self.slide_m else 0.0) or self.most_turn_pa
         if needed_pa:
             return UNANSWERED * needed_pa + FIRST_STEP * limits.span_pa
-        return self.slope_pa_per_m * limits.stroke_m or limits.span_pa
+        return max(self.slope_pa_per_m * limits.stroke_m, self.turn_pa) or limits.span_pa
 
     def _answered(self, outcome: SlideOutcome, limits: StaircaseLimits) -> "Staircase":
         """Return it with the way of the level begun anew, if the stem moved visibly, or its packing gave way."""
@@ -245,7 +251,10 @@ class Staircase:
         if first:
             return replace(counted, reversal_pa=self.rise_pa) if self.turns else counted
         high_pa = self.rise_pa if self.high_pa < self.low_pa else min(self.high_pa or self.rise_pa, self.rise_pa)
-        return replace(counted, high_pa=high_pa, slope_pa_per_m=self.rise_pa / went_m)
+        slope_pa_per_m = self.rise_pa / went_m
+        over_pa = self.level_pa - slope_pa_per_m * outcome.position_m
+        turn_pa = 2.0 * over_pa + self.rise_pa if outcome.direction > 0 else self.turn_pa
+        return replace(counted, high_pa=high_pa, slope_pa_per_m=slope_pa_per_m, turn_pa=turn_pa)
 
     def _having_needed(self, outcome: SlideOutcome, *, first: bool) -> "Staircase":
         """Return it with how far the level went from slide to slide; the first slide of all tells nothing of that."""
@@ -278,13 +287,13 @@ class Staircase:
         span_pa = limits.span_pa
         if self.slide_m > 0.0 and self.slope_pa_per_m > 0.0:
             step_pa = self._wanted_rise_pa(limits) - self.rise_pa
-        elif self.closing and not self.step_pa:
-            step_pa = NEARLY_TURNED * self.reversal_pa or FIRST_STEP * span_pa
-        elif self.closing:
-            step_pa = FIRST_STEP * span_pa
+        elif self.closing or (not self.slide_m and self.reversal_pa and not self.slope_pa_per_m):
+            step_pa = FIRST_STEP * span_pa if self.step_pa else NEARLY_TURNED * self.reversal_pa or FIRST_STEP * span_pa
         else:
             step_pa = min(GROWTH * self.step_pa, LARGEST_STEP * span_pa) if self.step_pa else FIRST_STEP * span_pa
-        level_pa = clamped(self.level_pa + self.direction * step_pa, limits.minimum_pa, limits.maximum_pa)
+        asked_pa = self.level_pa + self.direction * step_pa
+        level_pa = clamped(asked_pa, limits.minimum_pa, limits.maximum_pa)
+        step_pa = step_pa if level_pa == asked_pa else abs(level_pa - self.level_pa)
         return replace(
             self,
             level_pa=level_pa,
