@@ -89,6 +89,8 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
 
 NearFile = Annotated[Path, Strict(False), AfterValidator(_beside)]
 """A path that counts from the folder of the file it is written in."""
+NearFileName = Annotated[str, AfterValidator(lambda path, info: str(_beside(Path(_named(path)), info)))]
+"""The same as text."""
 
 ARRAYS = ("tuple_type", "list_type")
 """What is wrong where an array is wanted, as pydantic calls it."""

@@ -5,8 +5,8 @@
 
 import math
 from collections.abc import Iterable
-from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from itertools import pairwise, product
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -16,6 +16,9 @@ from config.register_format import Format, Order, WireType
 
 MOST_REGISTERS = 125
 """A Modbus reply carries at most this many registers."""
+
+
+ORDERS: tuple[Order, ...] = get_args(Order)
 
 
 class Place(Schema):
@@ -71,6 +74,25 @@ class Place(Schema):
             raise ValueError(f"{value} is not a finite number")
         raw = value if self.is_plain else (value - self.offset) / self.scale
         return raw if self.is_float else round(raw)
+
+    def in_other_orders(self, value: float) -> dict[str, float]:
+        """Return what the registers that say a value would say in other orders, by the keys that choose them.
+
+        Raises:
+            ValueError: no register says it.
+        """
+        words = self.format.encode(self.raw(value))
+        other: dict[str, float] = {}
+        for word_order, byte_order in product(ORDERS, ORDERS):
+            turned = {"word_order": word_order, "byte_order": byte_order}
+            if turned == {"word_order": self.word_order, "byte_order": self.byte_order} or (
+                len(words) == 1 and word_order != self.word_order
+            ):
+                continue
+            said = ", ".join(f'{key} = "{order}"' for key, order in turned.items() if order != getattr(self, key))
+            place = self.model_copy(update=turned)
+            other[said] = place.value(place.format.decode(words))
+        return other
 
 
 Mask = Annotated[int, Field(ge=0, lt=1 << 32)]

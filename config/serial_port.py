@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from config.loading import Schema
+from config.loading import NearFileName, Schema
 
 FASTEST_SCALED_BAUD = 19200
 FIXED_SILENCE_S = 1.75e-3
@@ -21,7 +21,7 @@ RtuUnit = Annotated[int, Field(ge=1, le=247)]
 class SerialPort(Schema):
     """A serial line and how its characters look; the defaults are the specification's."""
 
-    path: Annotated[str, Field(min_length=1)]
+    path: NearFileName
     """Of the serial device, such as /dev/ttyUSB0."""
     baud: Baud = 19200
     parity: Literal["none", "even", "odd"] = "even"

@@ -51,7 +51,10 @@ def run(arguments: argparse.Namespace) -> int:
             for file in files
             for name, check in (("law", _law), ("bus", _bus), *nudged, ("recorder", _recorder))
         ),
-        *((name, check, files[0]) for name, check in (("supervisory", _supervisory), ("timing", _timing))),
+        *(
+            (name, check, files[0])
+            for name, check in (("supervisory", _supervisory), ("history", _history), ("timing", _timing))
+        ),
         *((name, check, files[0]) for name, check in (("system", _system), ("priority", _priority))),
         *(("certificates", _certificates, file) for file in files),
     ]
@@ -97,8 +100,9 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
     import time
 
     from drivers.boundary import DriverError, ForeseesRefusal
-    from positioner.cli.probe import not_plausible, watching_driver
+    from positioner.cli.probe import unfit, watching_driver
     from positioner.control.settings import Settings
+    from positioner.daemon.first_look import doubts, impossible, travel_in_registers
 
     driver = watching_driver(file)
     try:
@@ -114,15 +118,17 @@ def _bus(file: "DaemonFile", _config: Path) -> str:
         driver.close()
     if refused is not None:
         raise FailedCheck(f"run would be refused: {refused}")
-    if not Settings.of(file).limits.plausible(reading.position_m):
-        raise FailedCheck(f"position {reading.position_m:g} m is not plausible: check device.map")
+    if wrong := impossible(file, held_pa, reading, Settings.of(file).limits) or doubts(file, held_pa, reading):
+        raise FailedCheck(wrong)
     # A reading piece by piece, as a watcher of CANopen has it, says nothing of the cycle.
     if took_s > file.cycle.period_s and driver.capabilities.one_transaction:
         raise FailedCheck(f"a reading takes {1e3 * took_s:.2f} ms, longer than cycle.period_s")
     # No failure: one that nobody has commanded may well say so, or wait for its master to be made ready.
-    said = not_plausible(reading, Settings.of(file).limits)
-    seen = f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"
-    return f"{seen}; but {said}" if said else seen
+    said = unfit(reading)
+    seen = [f"position {reading.position_m:.5f} m, holds {held_pa:.0f} Pa, {1e3 * took_s:.2f} ms a reading"]
+    if in_registers := travel_in_registers(file):
+        seen.append(in_registers)
+    return f"{', '.join(seen)}; but {said}" if said else ", ".join(seen)
 
 
 def _sampling(nudge_pa: float, file: "DaemonFile", _config: Path) -> str:
@@ -194,6 +200,12 @@ def _recorder(file: "DaemonFile", config: Path) -> str:
     if not os.access(nearest, os.W_OK):
         raise FailedCheck(f"{folder}: cannot be written")
     return f"{folder}, at most {file.recorder.keep_files * file.recorder.file_bytes / 1e6:.0f} MB"
+
+
+def _history(file: "DaemonFile", config: Path) -> str:
+    if file.history is None:
+        return "none configured: nobody can say later who wrote a set point ([history] folder)"
+    return f"{config.parent / file.history.folder}: writes with peer and role, for {file.history.keep_days:g} days"
 
 
 def _timing(file: "DaemonFile", _config: Path) -> str:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
     from drivers.boundary import Driver, Reading
-    from positioner.control.supervision import Limits
 
 HELP = "read the valve once a second: bus rate, age, plausibility; moves nothing"
 EXAMPLE = "positioner probe daemon.toml --count 5"
@@ -31,17 +30,19 @@ def run(arguments: argparse.Namespace) -> int:
     from config.daemon_file import load_daemon
     from drivers.boundary import DriverError
     from positioner.control.settings import Settings
+    from positioner.daemon.first_look import doubts, impossible
 
     file = load_daemon(arguments.config, arguments.valve)
     limits = Settings.of(file).limits
     driver = watching_driver(file)
     wrong = ""
     try:
-        print(f"{file.valve.name} holds {driver.open():.1f} Pa")
+        held_pa = driver.open()
+        print(f"{file.valve.name} holds {held_pa:.1f} Pa")
         for count in itertools.count(1):
             readings, took_s = _burst(driver)
             last = readings[-1]
-            wrong = not_plausible(last, limits)
+            wrong = impossible(file, held_pa, last, limits) or unfit(last) or doubts(file, held_pa, last)
             print(_line(readings, took_s, last.position_m / limits.stroke_m, wrong), flush=True)
             if count == arguments.count:
                 break
@@ -54,13 +55,11 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
-def not_plausible(reading: "Reading", limits: "Limits") -> str:
-    """Return why the daemon would take a reading for none, or latch a fault; empty where it would not."""
+def unfit(reading: "Reading") -> str:
+    """Return what the device says of itself that is a fault; empty where it is well."""
     from positioner.control.supervision import UNFIT_STATUS
     from positioner.observer.words import device_status
 
-    if not limits.plausible(reading.position_m):
-        return "the position is outside the travel: device.map?"
     if reading.status & UNFIT_STATUS:
         return (
             f"the device says {device_status(reading.status)}, which is a fault, by its status {reading.status}; "

@@ -20,7 +20,7 @@ from config.registers import WRITER_AT
 from config.roles import Role
 from config.tls_table import Tls
 from drivers import driver_for
-from drivers.boundary import DriverError, Reading
+from drivers.boundary import DriverError
 from fieldbus.modbus.admission import ServerLimits
 from fieldbus.modbus.request_counts import RequestCounts
 from fieldbus.modbus.server import RegisterServer
@@ -30,6 +30,7 @@ from positioner.control.requests import Requests
 from positioner.control.settings import Settings
 from positioner.daemon.cycle import Cycle, run_in_turn
 from positioner.daemon.ending import Endings
+from positioner.daemon.first_look import impossible
 from positioner.daemon.health import Health, HealthKeeper, HealthSettings, StoredHealth, ne107_condition
 from positioner.daemon.health.ne107 import Ne107Condition
 from positioner.daemon.history import HistoryKeeper, ValveHistory
@@ -179,7 +180,8 @@ def _assembled(
             raise InputError(where, f"device: {error}") from None
         held_pa, unreachable_reason = settings.minimum_pa, str(error)
     else:
-        _require_plausible(reading, held_pa, settings, where)
+        if said := impossible(file, held_pa, reading, settings.limits):
+            raise InputError(where, said)
     recorder = _recorder(file, source)
     memory = _memory(file, extended, source)
     controller = Controller(
@@ -352,23 +354,6 @@ def _first_requests(file: DaemonFile) -> Requests:
         beta_pa=file.excitation.beta_pa,
         omega_rad_per_s=file.excitation.omega_rad_per_s,
     )
-
-
-def _require_plausible(reading: Reading, held_pa: float, settings: Settings, where: str) -> None:
-    limits = settings.limits
-    if not limits.plausible(reading.position_m):
-        margin_m = limits.travel_margin * limits.stroke_m
-        raise InputError(
-            where,
-            f"device.map.position_m: the device says {reading.position_m:g} m, allowed is {-margin_m:g} to "
-            f"{limits.stroke_m + margin_m:g} m (valve.stroke_m and safety.travel_margin); check the map",
-        )
-    if not settings.minimum_pa <= held_pa <= settings.maximum_pa:
-        raise InputError(
-            where,
-            f"device.map.command_pa: the device holds {held_pa:g} Pa, allowed is {settings.minimum_pa:g} to "
-            f"{settings.maximum_pa:g} Pa ([pressure]); check the map",
-        )
 
 
 def _recorder(file: DaemonFile, source: Path) -> Recorder | None:
