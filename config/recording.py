@@ -513,10 +513,13 @@ def _is_number(cell: str) -> bool:
 
 
 def _require_increasing_time(path: Path, time_s: Column, header_line: int, tolerated: float) -> None:
-    steps = np.diff(time_s)
     if not np.isfinite(time_s).all():
         raise InputError(str(path), f"time_s: sample {int((~np.isfinite(time_s)).argmax()) + 1} is not a number")
-    wrong = steps <= 0
+    if (beyond := np.abs(time_s) > MOST_MEASURED).any():
+        row = int(beyond.argmax())
+        allowed = f"allowed are {MOST_MEASURED:g} s either way, 30 000 years"
+        raise InputError(str(path), f"time_s: sample {row + 1} is at {time_s[row]:g} s; {allowed}")
+    wrong = np.diff(time_s) <= 0
     if wrong.sum() > tolerated * len(time_s):
         index = int(wrong.argmax()) + 1
         raise InputError(

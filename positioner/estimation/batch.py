@@ -57,6 +57,8 @@ SETTLED = 5.0
 FEWEST_LATER = 12
 LEAST_JITTER, LARGEST_JITTER = 0.005, 0.4
 """Of time stamps about an even grid, shares of the period, between which they may be those of samples taken evenly."""
+TRAVELLED = 20.0
+"""Standard deviations of the noise: a stem that was in places farther apart has moved, however slowly."""
 DETECTED_WITHIN = 3
 """Samples after which a stem that left its rest has measurably done so."""
 LARGEST_RESIDUAL = 5e-3
@@ -147,7 +149,7 @@ def identify(
         )
         best = min((best, replace(again, evened=True)), key=_residual_m)
     if best.fit is None:
-        reason = Refusal.WAITING_FOR_MOTION if best.segmentation.moving_share == 0 else Refusal.WINDOW_TOO_SHORT
+        reason = _why_nothing(best, x, noise_std_m)
         nothing = no_estimates(reason)
         return BatchResult(nothing, None, best.interpolation, False, noise_std_m, 0, best.segmentation.too_short, nan)
     estimates = _estimates(best, noise_std_m, settings, float(t[-1]))
@@ -161,6 +163,14 @@ def identify(
         left_out=best.segmentation.too_short + len(best.segmentation.segments) - len(best.chosen),
         condition=condition(best.fit),
     )
+
+
+def _why_nothing(best: "_Hypothesis", position_m: Array, noise_std_m: float | None) -> Refusal:
+    """Return why nothing was fitted: the stem moves for too short a time, too slowly to be seen sliding, or not."""
+    if best.segmentation.moving_share > 0:
+        return Refusal.WINDOW_TOO_SHORT
+    travelled = position_m.size > 0 and float(np.ptp(position_m)) > TRAVELLED * (noise_std_m or 0.0)
+    return Refusal.TOO_SLOW if travelled else Refusal.WAITING_FOR_MOTION
 
 
 def even_instants(time_s: Array) -> Array | None:
@@ -368,6 +378,6 @@ def _breakaway(best: _Hypothesis, estimates: Estimates, largest: float) -> Estim
     least_pa = -estimates.k_over_c.value if estimates.k_over_c.valid else 0.0
     events = [(max(low, least_pa), high, std) for low, high, std in bounds if high > max(low, least_pa)]
     if not events:
-        return no_estimate(Refusal.WAITING_FOR_MOTION)
+        return no_estimate(Refusal.NO_BREAKAWAY)
     together = reduce(intersection, (from_interval(low, high, std) for low, high, std in events))
     return with_validity(together, largest)

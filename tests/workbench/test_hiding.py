@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,43 @@ def test_what_is_no_sealed_answer_is_said(tmp_path: Path, capsys: Capture) -> No
         (tmp_path / SEALED).write_text(text)
         assert main(["hide", "--reveal", str(tmp_path)]) == 2
         assert "is not a sealed answer" in one_line(capsys)
+
+
+CRAFTED: dict[str, Callable[[dict[str, Any]], object]] = {
+    "no effects": lambda answer: answer.pop("effects"),
+    "effects that are words": lambda answer: answer.update(effects=["backlash"]),
+    "an effect without a name": lambda answer: answer["effects"][0].pop("name"),
+    "an effect of which nothing is said": lambda answer: answer.update(visible={}),
+    "a word for a strength": lambda answer: answer["effects"][0].update(gap_m="much"),
+    "a list for a valve": lambda answer: answer.update(valve=[]),
+    "an empty valve": lambda answer: answer.update(valve={}),
+    "no floor": lambda answer: answer.update(floor_m=None),
+    "another file": lambda answer: answer["files"].update({"../secret": "0"}),
+    "no files": lambda answer: answer.update(files={}),
+    "an infinite floor": lambda answer: answer["floor_m"].update(fit=float("inf")),
+}
+
+
+@pytest.mark.parametrize("kind", CRAFTED)
+def test_a_crafted_answer_is_one_line(kind: str, folder: Path, tmp_path: Path, capsys: Capture) -> None:
+    """Anybody can seal anything: the digest of a crafted answer is right."""
+    answer = json.loads(base64.b64decode(json.loads((folder / SEALED).read_text())["answer_base64"]))
+    CRAFTED[kind](answer)
+    write_sealed(tmp_path, json.dumps(answer).encode())
+    assert main(["hide", "--reveal", str(tmp_path)]) == 2
+    assert "holds no answer that hide has sealed" in one_line(capsys)
+
+
+@pytest.mark.parametrize("text", [b"", b"[]", b"7", b"null", b"\xff", b"[" * 100_000, b'{"files": 1}'])
+def test_what_is_no_answer_at_all_is_one_line(text: bytes, tmp_path: Path, capsys: Capture) -> None:
+    write_sealed(tmp_path, text)
+    assert main(["hide", "--reveal", str(tmp_path)]) == 2
+    assert "holds no answer that hide has sealed" in one_line(capsys)
+
+
+def write_sealed(folder: Path, text: bytes) -> None:
+    sealed = {"sha256": hashlib.sha256(text).hexdigest(), "answer_base64": base64.b64encode(text).decode()}
+    (folder / SEALED).write_text(json.dumps(sealed))
 
 
 def test_the_recordings_keep_the_contract(folder: Path, hidden: Hidden) -> None:

@@ -13,7 +13,9 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError, model_validator
 
 from config.errors import CommandFailed, InputError
 from config.recording import write_recording
@@ -22,6 +24,42 @@ from workbench.blind.hiding import Hidden
 
 SEALED = "sealed.json"
 FILES = ("fit.csv", "test.csv", "valve.toml")
+
+
+class _Seen(BaseModel):
+    is_visible: bool
+    fit_m: FiniteFloat
+    test_m: FiniteFloat
+
+
+class _Floor(BaseModel):
+    fit: FiniteFloat
+    test: FiniteFloat
+
+
+class _Answer(BaseModel):
+    """What a sealed answer holds: anybody may have written it."""
+
+    model_config = ConfigDict(strict=True)
+
+    effects: list[dict[str, str | float]]
+    valve: dict[str, str | float]
+    floor_m: _Floor
+    visible: dict[str, _Seen]
+    files: dict[Literal["fit.csv", "test.csv", "valve.toml"], str]
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        for table in (*self.effects, self.valve):
+            if not isinstance(table.get("name"), str) or any(
+                isinstance(table[key], str) for key in {*table} - {"name"}
+            ):
+                raise ValueError("a table has a name and numbers")
+        if {str(each["name"]) for each in self.effects} - set(self.visible):
+            raise ValueError("of an effect it is not said whether it is visible")
+        if set(self.files) != set(FILES):
+            raise ValueError("the digest of a file is missing")
+        return self
 
 
 def seal(folder: Path, hidden: Hidden) -> str:
@@ -59,11 +97,16 @@ def reveal(folder: Path) -> tuple[str, Mapping[str, Any]]:
         digest = str(sealed["sha256"])
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, binascii.Error):
+    except (ValueError, KeyError, TypeError, RecursionError, binascii.Error):
         raise InputError(str(path), "is not a sealed answer: it must hold sha256 and answer_base64") from None
     if _sha256(text) != digest:
         raise CommandFailed(f"{path}: the answer is not the one that was sealed: its SHA-256 is another")
-    answer: dict[str, Any] = json.loads(text)
+    try:
+        answer: dict[str, Any] = _Answer.model_validate_json(text).model_dump()
+    except (ValidationError, RecursionError) as error:
+        first = error.errors()[0] if isinstance(error, ValidationError) else {"loc": (), "msg": "nested too deep"}
+        where = ".".join(map(str, first["loc"])) or "the answer"
+        raise InputError(str(path), f"holds no answer that hide has sealed: {where}: {first['msg']}") from None
     for name, expected in answer["files"].items():
         if not (folder / name).is_file() or _sha256((folder / name).read_bytes()) != expected:
             raise CommandFailed(f"{folder / name}: is not the file that was sealed")

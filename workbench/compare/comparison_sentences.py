@@ -20,6 +20,8 @@ from workbench.data.motion import Slip
 from workbench.data.noise_floor import UNKNOWN
 
 CERTAIN = 3.5
+MOVES = 20.0
+"""What counts as motion, so many times: a stem that goes so far one way has moved, without a slip too; noise goes 9."""
 FEWEST = 3
 MOST_LISTED = 8
 """Notes listed one by one."""
@@ -80,24 +82,39 @@ class Findings:
         return self.scale_m if self.floor_m is None else self.floor_m
 
     @property
+    def ways(self) -> tuple[int, ...]:
+        """The directions in which the stem moves, 1 opening, -1 closing: it slips so, or goes so far without a slip."""
+        x = self.position_m
+        slipped = {each.direction for each in self.measured_slips}
+        if not x.size:
+            return tuple(slipped)
+        far_m = MOVES * self.scale_m
+        gone = {1: float((x - np.minimum.accumulate(x)).max()), -1: float((np.maximum.accumulate(x) - x).max())}
+        return tuple(way for way, travel_m in gone.items() if way in slipped or travel_m > far_m)
+
+    @property
     def adequate(self) -> bool:
         """Close to the floor, without structure, and the recording has motion to judge by."""
         unmatched = self.events.missed_s or self.events.spurious_s
-        return bool(self.measured_slips) and self.close and not self.depends_on_input and not unmatched
+        return bool(self.ways) and self.close and not self.depends_on_input and not unmatched
 
 
 def judged(found: Findings) -> tuple[Sentence, ...]:
     """Return what is to be said."""
-    if not found.measured_slips:
+    if not found.ways:
         spurious = found.events.spurious_s
         tail = f", the model makes {_count(len(spurious), 'spurious ')}" if spurious else ""
         text = f"the stem does not move in this recording{tail}: it says nothing of spring or friction in motion"
         still = Sentence(text, _at(spurious))
         return (still,) if found.floor_m is not None else (still, Sentence(UNKNOWN))
     said = []
-    if len({each.direction for each in found.measured_slips}) == 1:
-        way = "opens" if found.measured_slips[0].direction > 0 else "closes"
+    if len(found.ways) == 1:
+        way = "opens" if found.ways[0] > 0 else "closes"
         said.append(Sentence(f"the stem only {way} in this recording: the other direction is not judged"))
+    if not found.measured_slips:
+        went = found.mm(float(np.ptp(found.position_m)))
+        text = f"the stem goes over {went} and never comes to rest: break-away and rests are not judged"
+        said.append(Sentence(text))
     if found.adequate:
         errors = f"error {found.mm(found.rms_m)}, floor {found.mm(found.matters_m)}"
         return (*said, Sentence(f"the model holds: {errors}, no structure left"))
