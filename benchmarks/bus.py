@@ -139,7 +139,7 @@ def slave() -> Iterator[int]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "slave.toml")
         file.write_text(SLAVE)
-        command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--port", "0"]
+        command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--listen-port", "0"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             try:
                 assert process.stdout is not None

@@ -167,7 +167,14 @@ def node(bus: CanBus | None = None) -> Iterator[CanBus]:
             f"node = {table.node}\n[bus.options]\n{options}"
             "[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n"
         )
-        command = [sys.executable, "-m", "positioner.cli", "sim", str(file), *(("--port", "0") if bus is None else ())]
+        command = [
+            sys.executable,
+            "-m",
+            "positioner.cli",
+            "sim",
+            str(file),
+            *(("--listen-port", "0") if bus is None else ()),
+        ]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             try:
                 assert process.stdout is not None

@@ -190,7 +190,7 @@ def in_real_time(minutes: float) -> list[str]:
         folder = Path(made)
         (folder / "slave.toml").write_text(SLAVE)
         (folder / "clock").write_bytes(bytes(8))
-        with running("sim", folder / "slave.toml", "--port", "0") as slave:
+        with running("sim", folder / "slave.toml", "--listen-port", "0") as slave:
             (folder / "daemon.toml").write_text(DAEMON.format(port=port_in(slave)))
             with _daemon(folder, folder / "clock") as (process, port), Dcs("127.0.0.1", port, timeout_s=20.0) as dcs:
                 looks = list(_looks(dcs, process.pid, 60.0 * minutes, Clock(folder / "clock"), folder / "daemon.log"))

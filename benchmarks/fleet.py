@@ -41,7 +41,7 @@ class Device:
 
     def start(self) -> None:
         """Start (anew)."""
-        command = [sys.executable, "-m", "positioner.cli", "sim", str(self._file), "--port", str(self.port)]
+        command = [sys.executable, "-m", "positioner.cli", "sim", str(self._file), "--listen-port", str(self.port)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
         self.port = port_in(self._process.stdout.readline().strip())

@@ -43,7 +43,7 @@ def rows(seconds: float, clients: int) -> Iterator[str]:
         os.sched_setaffinity(0, set(cores[:-1]) or set(cores))  # of slave and daemon, which inherit it
         folder = Path(made)
         (folder / "slave.toml").write_text("[sensor]\nnoise_std_m = 1e-5\n")
-        slave = stack.enter_context(running("sim", folder / "slave.toml", "--port", "0"))
+        slave = stack.enter_context(running("sim", folder / "slave.toml", "--listen-port", "0"))
         (folder / "daemon.toml").write_text(DAEMON.format(port=port_in(slave)))
         process, ready = stack.enter_context(child("run", folder / "daemon.toml"))
         port = port_in(ready)

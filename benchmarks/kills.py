@@ -90,7 +90,7 @@ class Site:
             f"[bus]\nport = 5020\n[initial]\nposition_m = {POSITION_M}\npressure_pa = {HELD_PA}\n"
             "[sensor]\nnoise_std_m = 1e-5\n"
         )
-        self.slave = Child("sim", self._slave_file, "--port", "0")
+        self.slave = Child("sim", self._slave_file, "--listen-port", "0")
         self.device_port = port_in(self.slave.line())
         self._daemon_file = folder / "daemon.toml"
         self._daemon_file.write_text(
@@ -117,7 +117,7 @@ class Site:
     def restart_slave(self) -> None:
         """Start the device anew, at the same port."""
         self.slave.close()
-        self.slave = Child("sim", self._slave_file, "--port", str(self.device_port))
+        self.slave = Child("sim", self._slave_file, "--listen-port", str(self.device_port))
         self.slave.line()
 
     def held_pa(self) -> float:

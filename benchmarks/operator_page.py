@@ -66,7 +66,7 @@ def looking(who: str, config: Path) -> Iterator[int | None]:
         if who == "nobody looks":
             yield None
             return
-        page = served("page", "--config", str(config), port="--listen-port")
+        page = served("page", "--config", str(config))
         address = until_the_end.enter_context(page)
         if who == "page, a tab open":
             browser = opened(address, executable=str(giving_way(config.parent)))
@@ -142,7 +142,7 @@ def _seen() -> Iterator[str]:
         taken_s = []
         for _ in range(DEATHS):
             with tempfile.TemporaryDirectory() as name, valve_site(Path(name)) as site:
-                page = served("page", "--config", str(site.config), port="--listen-port")
+                page = served("page", "--config", str(site.config))
                 with page as address, opened(address) as tab:
                     tab.get_by_test_id("figure-position").get_by_text("29.").wait_for()
                     tab.context.new_cdp_session(tab).send("Emulation.setCPUThrottlingRate", {"rate": slower})

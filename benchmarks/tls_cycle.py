@@ -92,7 +92,7 @@ def slave(file: Path) -> Iterator[int]:
     """Run a simulated slave in lockstep, its certificates beside its file; give its port."""
     table = "authority = 'authority.pem'\ncertificate = 'device.pem'\nkey = 'device.key'\n"
     file.write_text(f"[clock]\nmode = 'lockstep'\n[sensor]\nnoise_std_m = 1e-5\n[bus.tls]\n{table}")
-    command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--port", "0"]
+    command = [sys.executable, "-m", "positioner.cli", "sim", str(file), "--listen-port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None

@@ -153,7 +153,7 @@ def _repeated(recording: Recording, count: int) -> Recording:
 def served(*words: str) -> Iterator[tuple[str, "subprocess.Popen[str]", float]]:
     """Run the command, and give its address, its process, and how long the address took, s."""
     begin_s = time.monotonic()
-    command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--port", "0"]
+    command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--listen-port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         line = process.stdout.readline()

@@ -22,7 +22,7 @@ def main(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as case, sync_playwright() as playwright:
         seal(Path(case, "hidden"), hide(SEED, duration_s=DURATION_S))
         words = ["hidden/fit.csv", "--valve", "hidden/valve.toml"]
-        command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--port", "0"]
+        command = [sys.executable, "-m", "positioner.cli", "workbench", *words, "--no-open", "--listen-port", "0"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=case) as server:
             assert server.stdout is not None
             address = server.stdout.readline().partition(": ")[2].strip()

@@ -5,6 +5,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from positioner.cli.parts.config_argument import add_config, config_file
 from positioner.cli.parts.output_files import make_folder, write_json
 from positioner.cli.parts.pressure_argument import add_pressure_argument
 
@@ -24,7 +25,7 @@ WINDOW_MARGIN = 0.03
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the running daemon's file, with [recorder]")
+    add_config(parser, text="the running daemon's file, with [recorder]")
     parser.add_argument("--rec", type=Path, nargs="+", required=True, metavar="REC", help="recordings, CSV or Parquet")
     parser.add_argument("--valve", required=True, metavar="VALVE.toml", help="a valve file, or a shipped valve's name")
     parser.add_argument("--test", type=Path, metavar="REC", help="held out (the last third of the recordings)")
@@ -56,8 +57,9 @@ def run(arguments: argparse.Namespace) -> int:
     from workbench.diagnosis.diagnosis import diagnose
     from workbench.discriminate.discrimination import discriminate, rivals_of
 
-    file = load_daemon(arguments.config, arguments.name)
-    bounds = _bounds(file, arguments.config)
+    path = config_file(arguments)
+    file = load_daemon(path, arguments.name)
+    bounds = _bounds(file, path)
     require_ready(file, arguments)
     valve = read_valve(arguments.valve)
     require_effects(arguments.effects, "--effects")

@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from positioner.cli.parts.config_argument import add_config, config_file
+
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
 
@@ -26,7 +28,7 @@ class FailedCheck(Exception):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the daemon's file")
+    add_config(parser)
     parser.add_argument(
         "--nudge-pa",
         type=float,
@@ -39,10 +41,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Print a line a check; exit status 1 when one failed."""
     from config.daemon_file import load_valves
 
-    files = load_valves(arguments.config)
+    path = config_file(arguments)
+    files = load_valves(path)
     well = _passes("packages", "", _packages)
     for file in files:
-        print(f"{'config':12} ok    {arguments.config}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
+        print(f"{'config':12} ok    {path}: {file.valve.name}, stroke {file.valve.stroke_m:g} m")
     nudge_pa: float | None = arguments.nudge_pa
     nudged = () if nudge_pa is None else (("sampling", partial(_sampling, nudge_pa)),)
     checks: list[tuple[str, Check, DaemonFile]] = [
@@ -60,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     for name, check, file in checks:
         valve = f"{file.valve.name}: " if len(files) > 1 and name in ("law", "bus", "sampling", "recorder") else ""
-        well = _passes(name, valve, partial(check, file, arguments.config)) and well
+        well = _passes(name, valve, partial(check, file, path)) and well
     return 0 if well else 1
 
 

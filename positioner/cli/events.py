@@ -5,6 +5,8 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from positioner.cli.parts.config_argument import add_config, config_file
+
 if TYPE_CHECKING:
     from positioner.history import HistoryReader
 
@@ -18,9 +20,7 @@ DURATIONS_S = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument(
-        "source", type=Path, metavar="CONFIG.toml|FILE", help="the daemon's file, or its history.sqlite or its folder"
-    )
+    add_config(parser, metavar="CONFIG.toml|FILE", text="the daemon's file, or its history.sqlite or its folder")
     parser.add_argument("--valve", metavar="NAME", help="only of this valve")
     parser.add_argument(
         "--since", type=_since, metavar="TIME", help="only from then on: 30m, 2h, 7d ago, or 2026-03-01T06:00 (UTC)"
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.history import HistoryReader
 
     show = _as_json if arguments.json else _in_words
-    where, ours = _history_of(arguments.source)
+    where, ours = _history_of(config_file(arguments))
     with HistoryReader(where) as history:
         _require_known(arguments.valve, {*ours, *history.valves()})
         row = 0

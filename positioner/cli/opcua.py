@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from positioner.cli.parts.page_address import require_port
+from positioner.cli.parts.config_argument import add_config, config_files
+from positioner.cli.parts.listening_arguments import add_listening, require_port
 from positioner.cli.parts.served_valves import add_certificates, certificates, places_in, set_role_password
 
 HELP = "serve running valves to OPC UA clients: signed and encrypted, users by role, the history of the daemon"
@@ -12,7 +13,7 @@ EXAMPLE = "positioner opcua daemon.toml --users users.json --keys opcua-keys"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("config", type=Path, nargs="*", metavar="CONFIG.toml", help="a daemon's file: all its valves")
+    add_config(parser, many=True, text="a daemon's file: all its valves")
     add_certificates(parser)
     parser.add_argument("--users", type=Path, metavar="FILE", help="the passwords of observer, operator and engineer")
     parser.add_argument(
@@ -23,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keys", type=Path, metavar="FOLDER", help="this server's certificate, and those of the clients it trusts"
     )
-    parser.add_argument("--listen-host", default="127.0.0.1", help="where it listens (127.0.0.1)")
-    parser.add_argument("--listen-port", type=int, default=4840, metavar="N", help="at which port (4840)")
+    add_listening(parser, 4840)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,14 +40,14 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.set_password is not None:
         return set_role_password(arguments.users, arguments.set_password, "--users")
-    if not arguments.config:
+    if not (files := config_files(arguments)):
         raise InputError("CONFIG.toml", "is needed: the daemon's file that says where its valves are served")
     for option in ("users", "keys"):
         if getattr(arguments, option) is None:
             raise InputError(f"--{option}", "is needed: nobody comes in without a password and a trusted certificate")
     require_port("--listen-port", arguments.listen_port)
     sign_in = SignIn(read_passwords(arguments.users))
-    places = list(places_in(arguments.config, *certificates(arguments)))
+    places = list(places_in(files, *certificates(arguments)))
     needed("asyncua", "positioner opcua")
     from positioner.observer.watched_valves import watching
     from positioner.opcua.application_keys import ApplicationKeys

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from positioner.cli.parts.page_address import MOST_PORT
+from positioner.cli.parts.listening_arguments import add_listening, listening
 from positioner.cli.parts.served_valves import add_certificates, certificates, places_in, set_role_password
 
 if TYPE_CHECKING:
@@ -34,8 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--set-password", choices=("operator", "engineer"), help="ask for this role's password, keep it in --roles, end"
     )
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep what is seen of friction over restarts")
-    parser.add_argument("--listen-host", default="127.0.0.1", help="where the page listens (127.0.0.1)")
-    parser.add_argument("--listen-port", type=_port, metavar="N", help="at which port (8765, or another free one)")
+    add_listening(parser)
     parser.add_argument(
         "--password-file", type=Path, metavar="FILE", help="its first line is asked of everybody; other hosts need it"
     )
@@ -46,18 +45,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve until told to end; 0."""
     from config.passwords import SignIn
     from config.role_passwords import read_passwords
-    from positioner.cli.parts.page_address import listening
     from positioner.pages.operator_page.page import serve_valves
 
     if arguments.set_password is not None:
         return set_role_password(arguments.roles, arguments.set_password, "--roles")
     places = [replace(each, keep=arguments.keep) for each in _places(arguments)]
     sign_in = None if arguments.roles is None else SignIn(read_passwords(arguments.roles))
-    where = listening(
-        argparse.Namespace(
-            host=arguments.listen_host, port=arguments.listen_port, password_file=arguments.password_file
-        )
-    )
+    where = listening(arguments)
     serve_valves(places, where, sign_in, opens_browser=not arguments.no_open)
     return 0
 
@@ -82,9 +76,3 @@ def _places(arguments: argparse.Namespace) -> "Iterator[Place]":
     if said:
         raise InputError(f"--{said[0]}", "is given, so --config must not be: the file says where")
     yield from places_in(arguments.config, tls, tls_of)
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or int(text) > MOST_PORT:
-        raise argparse.ArgumentTypeError(f"must lie between 0 (any free one) and {MOST_PORT}, got {text}")
-    return int(text)

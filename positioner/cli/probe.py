@@ -1,8 +1,9 @@
 """`positioner probe`: looks at the valve without touching it."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from positioner.cli.parts.config_argument import add_config, config_file
 
 if TYPE_CHECKING:
     from config.daemon_file import DaemonFile
@@ -17,7 +18,7 @@ BURST = 50
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the daemon's file")
+    add_config(parser)
     parser.add_argument("--valve", help="which of the file's valves, by its name")
     parser.add_argument("--count", type=int, default=0, help="stop after this many lines (0: at Ctrl-C)")
 
@@ -32,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     from positioner.control.settings import Settings
     from positioner.daemon.first_look import doubts, impossible
 
-    file = load_daemon(arguments.config, arguments.valve)
+    file = load_daemon(config_file(arguments), arguments.valve)
     limits = Settings.of(file).limits
     driver = watching_driver(file)
     wrong = ""

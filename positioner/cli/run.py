@@ -1,7 +1,8 @@
 """`positioner run`: the daemon."""
 
 import argparse
-from pathlib import Path
+
+from positioner.cli.parts.config_argument import add_config, config_file
 
 HELP = "run the daemon: position the valves of CONFIG.toml and serve their supervisory registers"
 EXAMPLE = "positioner run daemon.toml"
@@ -9,7 +10,7 @@ EXAMPLE = "positioner run daemon.toml"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("config", type=Path, metavar="CONFIG.toml")
+    add_config(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -19,9 +20,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     require_platform()
     # Before the daemon is loaded, which takes longer: most mistakes are in a file.
-    files = load_valves(arguments.config)
+    path = config_file(arguments)
+    files = load_valves(path)
     from positioner.cli.parts.extended_valves import extended_valve_of
     from positioner.daemon.service import serve
 
-    source = str(arguments.config)
-    return serve(files, arguments.config, [extended_valve_of(file, source) for file in files])
+    return serve(files, path, [extended_valve_of(file, str(path)) for file in files])

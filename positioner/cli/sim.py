@@ -3,18 +3,22 @@
 import argparse
 import signal
 import time
-from pathlib import Path
+
+from positioner.cli.parts.config_argument import add_config, config_file
 
 HELP = "the simulated valve slave alone, until SIGTERM or Ctrl-C; says where (HOST:PORT) when it listens"
-EXAMPLE = "positioner sim config/profiles/slave.toml --port 0"
+EXAMPLE = "positioner sim config/profiles/slave.toml --listen-port 0"
 CATCH_UP_EVERY_S = 0.02
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
-    parser.add_argument("config", type=Path, metavar="CONFIG.toml", help="the slave file")
+    add_config(parser, text="the slave file")
     parser.add_argument(
-        "--port", type=_port, help="port or loopback CAN channel in place of the file's; 0: any free one"
+        "--listen-port",
+        type=_port,
+        metavar="N",
+        help="port or loopback CAN channel in place of the file's; 0: any free one",
     )
 
 
@@ -29,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     ended: list[int] = []  # not an Event: a handler that sets one may deadlock with the wait it interrupts
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda number, _frame: ended.append(number))
-    slave = slave_of(arguments.config, arguments.port)
+    slave = slave_of(config_file(arguments), arguments.listen_port)
     print(f"listening on {slave.address}", flush=True)
     while not ended:
         time.sleep(CATCH_UP_EVERY_S)

@@ -156,7 +156,7 @@ def slave_running(folder: Path, stroke_m: float, lockstep: bool) -> Iterator[Val
     """
     with ExitStack() as stack:
         file, log = str(folder / "slave.toml"), folder / "slave.log"
-        slave = stack.enter_context(started(COMMANDS, "sim", file, "--port", "0", log=log))
+        slave = stack.enter_context(started(COMMANDS, "sim", file, "--listen-port", "0", log=log))
         port = port_in(slave.ready)
         agent = Agent(AGENT, "device", str(port), log=folder / "slave_agent.log")
         stack.callback(agent.end)

@@ -54,7 +54,7 @@ def _server(
 ) -> RegisterServer | RtuServer:
     if isinstance(bus, ModbusRtuBus):
         if port is not None:
-            raise InputError("--port", "is of Modbus TCP; the slave is on a serial line")
+            raise InputError("--listen-port", "is of Modbus TCP; the slave is on a serial line")
         return RtuServer(registers, bus.serial, bus.unit)
     # As a device has it: what an observer may not, an operator may.
     guard = Guard(bus.tls, lambda _: Role.OPERATOR) if bus.tls else None

@@ -20,7 +20,7 @@ import yaml
 import config
 from config.recording import read_recording
 from config.registers import REGISTERS
-from positioner.cli.main import COMMANDS, main
+from positioner.cli.main import COMMANDS, command_parser, main
 
 Capture = pytest.CaptureFixture[str]
 DAEMON = "[valve]\nstroke_m = 0.1016\n[device]\nport = {port}\n[supervisory]\nport = 0\n"
@@ -360,3 +360,22 @@ def test_play_refuses_a_reference_outside_the_travel(tmp_path: Path, capsys: Cap
     reference.write_text("time_s,reference_m\n0,0.05\n1,0.2\n")
     assert main(["play", "seed", "--reference", str(reference), "-o", str(tmp_path / "run.csv")]) == 2
     assert "reference_m: 0.2 m is outside the travel, allowed is 0 to 0.1016 m" in one_line(capsys)
+
+
+@pytest.mark.parametrize("command", ["run", "probe", "doctor", "events", "metrics", "get", "identify", "page", "sim"])
+def test_every_command_is_told_its_file_in_the_same_words(command: str, capsys: Capture) -> None:
+    """`run` took it alone, `get` as --config, and neither the other's."""
+    assert main([command, "--config", "nowhere.toml"]) == 2
+    assert "nowhere.toml: cannot be read: No such file or directory" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["page", "workbench", "metrics", "opcua"])
+def test_every_command_that_listens_says_where_in_the_same_words(command: str) -> None:
+    said = command_parser().parse_args([command, "--listen-host", "::1", "--listen-port", "7"])
+    assert (said.listen_host, said.listen_port) == ("::1", 7)
+
+
+@pytest.mark.parametrize(("words", "given"), [(["probe"], 0), (["run", "a.toml", "--config", "b.toml"], 2)])
+def test_a_command_needs_its_file_once(words: list[str], given: int, capsys: Capture) -> None:
+    assert main(words) == 2
+    assert f"CONFIG.toml: is required, once; {given} were given" in capsys.readouterr().err

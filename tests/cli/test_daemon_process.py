@@ -61,7 +61,7 @@ def daemon_file(folder: Path, device_port: int, more: str = "", device: str = ""
 @pytest.fixture(scope="module")
 def lone_slave(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """Run a slave that nobody commands yet; give its port."""
-    with running("sim", slave_file(tmp_path_factory.mktemp("slave")), "--port", "0") as ready:
+    with running("sim", slave_file(tmp_path_factory.mktemp("slave")), "--listen-port", "0") as ready:
         yield port_in(ready)
 
 
@@ -99,7 +99,7 @@ def test_a_daemon_that_was_stopped_finds_what_the_device_did_and_does_not_undo_i
     """
     device = 'communication_timeout_s = 0.4\ncommunication_action = "vent"\n'
     with (
-        running("sim", slave_file(tmp_path), "--port", "0") as slave,
+        running("sim", slave_file(tmp_path), "--listen-port", "0") as slave,
         child("run", daemon_file(tmp_path, port_in(slave), device=PATIENT + device, period_s=0.05)) as (daemon, ready),
         Dcs("127.0.0.1", port_in(ready)) as dcs,
         watcher(port_in(slave)) as eye,
@@ -137,7 +137,7 @@ UNTOUCHED = {"communication_timeout_s": None, "communication_action": None}
 
 def test_a_device_that_dies_is_a_fault_and_is_taken_up_again_without_a_move(tmp_path: Path) -> None:
     with ExitStack() as daemon:
-        with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+        with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
             device_port = port_in(slave)
             port = port_in(daemon.enter_context(running("run", daemon_file(tmp_path, device_port))))
         dcs = daemon.enter_context(Dcs("127.0.0.1", port))
@@ -163,7 +163,7 @@ class Site:
 
 @contextmanager
 def site(folder: Path, more: str) -> Iterator[Site]:
-    with running("sim", slave_file(folder), "--port", "0") as slave:
+    with running("sim", slave_file(folder), "--listen-port", "0") as slave:
         device_port = port_in(slave)
         with running("run", daemon_file(folder, device_port, more, PATIENT)) as daemon:
             yield Site(device_port, port_in(daemon), folder)

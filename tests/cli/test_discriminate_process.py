@@ -42,7 +42,7 @@ class Site:
 
 @pytest.fixture
 def site(tmp_path: Path) -> Iterator[Site]:
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         path = daemon_file(tmp_path, port_in(slave), RECORDER, device="reply_timeout_s = 2.0\n")
         with running("run", path) as ready:
             port = port_in(ready)

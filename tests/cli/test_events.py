@@ -100,7 +100,7 @@ def test_without_a_history_it_is_one_line(tmp_path: Path, capsys: pytest.Capture
 def test_a_daemon_killed_while_it_is_written_to_keeps_what_was_there_and_numbers_go_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         path = daemon_file(tmp_path, port_in(slave), HISTORY, PATIENT)
         with child("run", path) as (daemon, ready), Dcs("127.0.0.1", port_in(ready)) as dcs:
             dcs.set("mode", Mode.MANUAL)
@@ -131,7 +131,7 @@ def writes(folder: Path) -> list[Write]:
 
 @pytest.mark.real_time
 def test_two_daemons_with_one_history_are_refused_before_a_device_is_touched(tmp_path: Path) -> None:
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         path = daemon_file(tmp_path, port_in(slave), HISTORY, PATIENT)
         with running("run", path):
             other = path.with_name("other.toml")

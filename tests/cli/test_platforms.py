@@ -124,7 +124,7 @@ def test_on_windows_a_serial_line_is_refused_in_one_line() -> None:
 @pytest.mark.parametrize("judge", [False, True], ids=["", "by a script of others"])
 def test_on_macos_the_daemon_runs_and_says_what_it_goes_without(tmp_path: Path, judge: bool) -> None:
     config = tmp_path / "daemon.toml"
-    with going([sys.executable, "-m", "positioner.cli", "sim", str(PROFILES / "slave.toml"), "--port", "0"]) as (
+    with going([sys.executable, "-m", "positioner.cli", "sim", str(PROFILES / "slave.toml"), "--listen-port", "0"]) as (
         where,
         _,
     ):

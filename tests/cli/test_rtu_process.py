@@ -78,7 +78,7 @@ def test_bad_input_is_one_line_and_status_2(line: Line, tmp_path: Path) -> None:
         "null.toml": "/dev/null: cannot listen there: is not a serial line",
         "busy.toml": f"{line.other_end}: cannot listen there: is used by another process",
         "baud.toml": "bus.serial.baud: Input should be 1200, 2400,",
-        "port.toml": "--port: is of Modbus TCP",
+        "port.toml": "--listen-port: is of Modbus TCP",
     }
     for name, text in files.items():
         (tmp_path / name).write_text(text)

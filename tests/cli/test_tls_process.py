@@ -65,7 +65,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "[initial]\nposition_m = 0.03\npressure_pa = 24000.0\n[sensor]\nnoise_std_m = 1e-5\n"
         f"[bus.tls]\n{table('device')}"
     )
-    with running("sim", folder / "slave.toml", "--port", "0") as slave:
+    with running("sim", folder / "slave.toml", "--listen-port", "0") as slave:
         (folder / "daemon.toml").write_text(
             f"[valve]\nname = 'FV-101'\nstroke_m = 0.1016\n[device]\nport = {port_in(slave)}\n"
             "reply_timeout_s = 0.5\n[device.tls]\n"

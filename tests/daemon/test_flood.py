@@ -101,7 +101,7 @@ def besieged(port: int, clients: int) -> Iterator[None]:
 @pytest.mark.long
 def test_the_dcs_is_served_and_memory_is_bounded_whoever_else_comes(tmp_path: Path) -> None:
     with ExitStack() as stack:
-        slave = stack.enter_context(running("sim", slave_file(tmp_path), "--port", "0"))
+        slave = stack.enter_context(running("sim", slave_file(tmp_path), "--listen-port", "0"))
         config = daemon_file(tmp_path, port_in(slave), SUPERVISORY, PATIENT)
         config.write_text(config.read_text().replace("[supervisory]\n", f"[supervisory]\n{SITE}"))
         process, ready = stack.enter_context(child("run", config))

@@ -37,7 +37,7 @@ def test_a_full_disk_stops_nothing_and_what_follows_is_kept_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)  # what finds no room then comes later
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         config = daemon_file(tmp_path, port_in(slave), TABLES, PATIENT)
         with child("run", config) as (process, ready), Dcs("127.0.0.1", port_in(ready), timeout_s=20.0) as dcs:
             dcs.set("mode", Mode.AUTOMATIC)
@@ -75,7 +75,7 @@ def test_a_read_only_disk_is_one_line_before_anything_is_commanded(tmp_path: Pat
     """On a file system of its own, mounted read-only, where the system lets us."""
     folder = tmp_path / "disk"
     folder.mkdir()
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         for kept in KEPT:
             config = daemon_file(tmp_path, port_in(slave), f"[{kept}]\nfolder = 'disk/kept'\n", PATIENT)
             words = f"{sys.executable} -m positioner.cli run {config}"

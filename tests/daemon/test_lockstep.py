@@ -44,7 +44,7 @@ def dcs(snapshot: Snapshot, requests: Requests) -> Requests:
 def recorded(folder: Path) -> list[str]:
     folder.mkdir()
     (folder / "slave.toml").write_text(SLAVE)
-    with running("sim", folder / "slave.toml", "--port", "0") as slave:
+    with running("sim", folder / "slave.toml", "--listen-port", "0") as slave:
         pace = DevicePace()
         link = Link(driver_for(ModbusTcpDevice(port=port_in(slave), reply_timeout_s=5.0)), pace)
         held_pa, _ = link.open()

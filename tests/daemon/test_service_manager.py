@@ -111,7 +111,7 @@ def test_a_running_daemon_says_when_it_serves_feeds_the_watchdog_and_says_that_i
     systemd = Systemd(str(tmp_path / "notify"))
     systemd.socket.settimeout(60.0)
     environment = {**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "1000000"}
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         words = [sys.executable, "-P", "-m", "positioner.cli", "run"]
         path = daemon_file(tmp_path, port_in(slave), device=PATIENT)
         with subprocess.Popen(

@@ -107,7 +107,7 @@ def test_a_slave_killed_in_s1_is_a_fault_within_3_cycles_and_is_taken_up_again(b
     tables = {"valve": {"stroke_m": STROKE_M}, "law": LAW, "safety": {"stale_after_s": PATIENT_S}}
     file = DaemonFile.model_validate(tables)
     with wire_of(bus) as wire:
-        with slave(tmp_path / "slave.toml", wire.slave(None), *(() if bus == "rtu" else ("--port", "0"))) as (
+        with slave(tmp_path / "slave.toml", wire.slave(None), *(() if bus == "rtu" else ("--listen-port", "0"))) as (
             process,
             ready,
         ):

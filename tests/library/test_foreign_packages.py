@@ -85,7 +85,7 @@ def test_the_library_says_what_is_in_the_way(foreign: Path) -> None:
 @pytest.mark.usefixtures("_foreigners")
 def test_a_child_does_not_see_it() -> None:
     Path("slave.toml").write_text('valve = "seed"\n')
-    with running("sim", Path("slave.toml"), "--port", "0") as ready:
+    with running("sim", Path("slave.toml"), "--listen-port", "0") as ready:
         assert "127.0.0.1:" in ready
 
 

@@ -200,7 +200,7 @@ def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 @pytest.mark.real_time
 def test_a_running_daemon_is_scraped_by_the_command(tmp_path: Path) -> None:
-    with running("sim", slave_file(tmp_path), "--port", "0") as slave:
+    with running("sim", slave_file(tmp_path), "--listen-port", "0") as slave:
         path = daemon_file(tmp_path, port_in(slave), "", PATIENT)
         with running("run", path) as ready:
             served = tmp_path / "served.toml"

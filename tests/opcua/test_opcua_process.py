@@ -94,7 +94,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         certificate(folder, name)
     (folder / "keys" / "trusted").mkdir(parents=True)
     (folder / "keys" / "trusted" / "client.pem").write_bytes((folder / "client.pem").read_bytes())
-    with running("sim", slave_file(folder), "--port", "0") as slave:
+    with running("sim", slave_file(folder), "--listen-port", "0") as slave:
         file = daemon_file(folder, port_in(slave), "[history]\nfolder = 'history'\n", PATIENT)
         file.write_text(file.read_text().replace("2e-3", "10e-3"))
         with running("run", file) as daemon:

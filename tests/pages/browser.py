@@ -19,11 +19,11 @@ expect.set_options(timeout=LONGEST_MS)
 
 
 @contextmanager
-def served(*words: str, port: str = "--port") -> Iterator[str]:
-    """Run a command that serves a page, at an option's port, and give the address that it prints; it ends as told."""
+def served(*words: str) -> Iterator[str]:
+    """Run a command that serves a page and give the address that it prints; it ends as told."""
     # NiceGUI behaves otherwise where it finds itself under pytest.
     environment = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
-    command = [sys.executable, "-m", "positioner.cli", *words, "--no-open", port, "0"]
+    command = [sys.executable, "-m", "positioner.cli", *words, "--no-open", "--listen-port", "0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
     with process:
         assert process.stdout is not None

@@ -34,7 +34,7 @@ def test_an_operator_watches_signs_in_moves_the_valve_and_is_told_what_dies(tmp_
         set_password(roles, role, password)
     with valve_site(tmp_path) as site:
         words = ("page", "--config", str(site.config), "--roles", str(roles))
-        with served(*words, port="--listen-port") as address, opened(address) as page:
+        with served(*words) as address, opened(address) as page:
             watched(page)
             unheard(page, site.config)
             busy(page)

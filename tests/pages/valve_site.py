@@ -43,7 +43,7 @@ class Site(NamedTuple):
 def valve_site(folder: Path) -> Iterator[Site]:
     """Run them; the daemon's file says at last at which port it serves."""
     (folder / "slave.toml").write_text(SLAVE)
-    with child("sim", folder / "slave.toml", "--port", "0") as (slave, listening):
+    with child("sim", folder / "slave.toml", "--listen-port", "0") as (slave, listening):
         config = folder / "daemon.toml"
         config.write_text(DAEMON.format(device_port=port_in(listening), port=0))
         with child("run", config) as (daemon, serving):

@@ -33,7 +33,7 @@ def start(config: Path, *options: str) -> subprocess.Popen[str]:
 def slave(path: Path, text: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """Run a slave on a free port until it listens; make sure that it ends."""
     path.write_text(text)
-    with start(path, "--port", "0") as process:
+    with start(path, "--listen-port", "0") as process:
         try:
             assert process.stdout is not None
             ready = process.stdout.readline().split()
@@ -80,7 +80,7 @@ def test_its_file_says_where_it_keeps_its_quantities(tmp_path: Path) -> None:
 def test_real_time_runs_on_by_itself_and_acts_on_silence(tmp_path: Path) -> None:
     text = "[communication]\ntimeout_s = 0.02\naction = 'fill'\n[supply]\nmaximum_pa = 90e3\n"
     (tmp_path / "slave.toml").write_text(text)
-    with child("sim", tmp_path / "slave.toml", "--port", "0") as (process, ready):
+    with child("sim", tmp_path / "slave.toml", "--listen-port", "0") as (process, ready):
         with independent_client(port_in(ready)) as client:
             first = last = sample(client)
             for _ in range(100_000):
@@ -100,10 +100,10 @@ def test_real_time_runs_on_by_itself_and_acts_on_silence(tmp_path: Path) -> None
 
 def test_a_port_in_use_and_bad_files_are_one_line_and_status_2(tmp_path: Path) -> None:
     (tmp_path / "slave.toml").write_text("")
-    with running("sim", tmp_path / "slave.toml", "--port", "0") as ready:
+    with running("sim", tmp_path / "slave.toml", "--listen-port", "0") as ready:
         port = str(port_in(ready))
         said = {
-            ("slave.toml", "--port", port): f"127.0.0.1:{port}: cannot listen there: Address already in use",
+            ("slave.toml", "--listen-port", port): f"127.0.0.1:{port}: cannot listen there: Address already in use",
             ("none.toml",): "cannot be read: No such file",
             ("bad.toml",): "clock.mode",
             ("ageing.toml",): "below coulomb_n",

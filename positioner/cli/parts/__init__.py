@@ -12,7 +12,7 @@ A command imports from here what it needs when it runs.
     model_arguments                             a valve file and effects, checked before the work begins
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out
-    page_address                                where a page listens
+    config_argument, listening_arguments        which file a command is about; where it listens
     served_valves                               the valves of daemons' files, and by which certificates they are read
     output_files                                what `--out` and `--json` ask for
     register_readers                            the register map as configurations of programs that read it:

@@ -40,7 +40,7 @@ def outcome_on_modbus(case: FlowCase) -> FlowOutcome:
     with ExitStack() as on_exit:
         folder = Path(on_exit.enter_context(TemporaryDirectory()))
         (folder / "slave.toml").write_text(_toml(slave))
-        ready = on_exit.enter_context(running("sim", folder / "slave.toml", "--port", "0"))
+        ready = on_exit.enter_context(running("sim", folder / "slave.toml", "--listen-port", "0"))
         device = ModbusTcpDevice(port=port_in(ready), reply_timeout_s=REPLY_TIMEOUT_S)
         cycle = lockstep_cycle(daemon, driver_for(device), Requests())
         on_exit.callback(cycle.link.release)

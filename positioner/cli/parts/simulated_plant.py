@@ -41,7 +41,7 @@ class BusSetup:
     slave: str
     device: Callable[[str], str]
     """Table `[device]` of the daemon, given the slave's ready line."""
-    options: tuple[str, ...] = ("--port", "0")
+    options: tuple[str, ...] = ("--listen-port", "0")
     period_s: float = PERIOD_S
     """Of the daemon's cycle."""
     window_s: float = WINDOW_S

@@ -36,7 +36,7 @@ folder = 'health'
 def slave_port(tmp_path: Path) -> Iterator[int]:
     slave = tmp_path / "slave.toml"
     slave.write_text("[initial]\nposition_m = 0.03\npressure_pa = 24000.0\n")
-    with running("sim", slave, "--port", "0") as ready:
+    with running("sim", slave, "--listen-port", "0") as ready:
         yield port_in(ready)
 
 

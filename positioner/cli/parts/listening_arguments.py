@@ -1,4 +1,4 @@
-"""Where a command listens, from its arguments."""
+"""Where a command listens: `--listen-host` and `--listen-port` in every command that does."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -7,6 +7,13 @@ if TYPE_CHECKING:
     from positioner.pages.parts.server import Listening
 
 MOST_PORT = 65535
+
+
+def add_listening(parser: argparse.ArgumentParser, port: int | None = None) -> None:
+    """Declare where it listens; without a port of its own, at one that is free."""
+    parser.add_argument("--listen-host", default="127.0.0.1", help="where it listens (127.0.0.1: this machine alone)")
+    said = "8765, or another free one" if port is None else str(port)
+    parser.add_argument("--listen-port", type=int, default=port, metavar="N", help=f"at which port ({said})")
 
 
 def listening(arguments: argparse.Namespace) -> "Listening":
@@ -18,8 +25,8 @@ def listening(arguments: argparse.Namespace) -> "Listening":
     from config.errors import InputError
     from positioner.pages.parts.server import Listening
 
-    if arguments.port is not None:
-        require_port("--port", arguments.port)
+    if arguments.listen_port is not None:
+        require_port("--listen-port", arguments.listen_port)
     password = ""
     if arguments.password_file is not None:
         try:
@@ -28,7 +35,7 @@ def listening(arguments: argparse.Namespace) -> "Listening":
             raise InputError(str(arguments.password_file), f"cannot be read: {error}") from None
         if not password:
             raise InputError(str(arguments.password_file), "its first line must be the password; it is empty")
-    return Listening(arguments.host, arguments.port, password)
+    return Listening(arguments.listen_host, arguments.listen_port, password)
 
 
 def require_port(option: str, port: int) -> None:
