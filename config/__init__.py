@@ -4,7 +4,7 @@ Its files:
 
     valve_file, slave_file, daemon_file           what a person writes: the valve, the simulated slave, the daemon
     drive                                         the names and units of what a force, torque or current moves
-    data_sheet                                    a valve file from what a data sheet says
+    data_sheet, valve_changes                     a valve file from a data sheet; another with values set by hand
     extended_valve                                a valve file worked out for the controller
     loading, writing, plain_file                  reads such a file; writes a valve's; what may be read at all
     file_kinds                                    which of these a file is, where another is asked for

@@ -12,7 +12,10 @@ from positioner.cli.parts.output_files import writable, write_json
 from positioner.cli.parts.pressure_argument import add_pressure_argument
 
 if TYPE_CHECKING:
+    from config.recording import Recording
+    from config.valve_file import ValveFile
     from workbench.diagnosis.diagnosis import Diagnosis
+    from workbench.diagnosis.extension import Extension
     from workbench.select.tangent_preview import TangentScore
 
 HELP = "find the effect that a model lacks to explain a recording; exit status 1 if anything is missing"
@@ -47,6 +50,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="BETTER.toml",
         help="write the valve with what is missing, or refitted where its parameters alone were off; if that is sure",
     )
+    parser.add_argument(
+        "--add",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="with -o: write the valve with these effects, whatever was found, refitted from where the searches ended",
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the searches (0)")
     parser.add_argument(
         "--budget-s", type=float, metavar="S", help="end after so many seconds, as Ctrl-C does, with what is known then"
@@ -72,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     for option in ("json", "report", "experiment", "out"):
         writable(getattr(arguments, option), f"--{option}")
+    _require_out(arguments)
     take_mapping(arguments)
     if not arguments.column and all(map(is_imposed, arguments.recordings)):
         from positioner.cli.parts.diagnose_forces import run_forces
@@ -82,6 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     began_s, budget_s = time.monotonic(), inf if arguments.budget_s is None else arguments.budget_s
     valve = read_valve(arguments.valve)
     require_effects(arguments.effects, "--effects")
+    require_effects(arguments.add, "--add")
     stroke_m = valve.valve.stroke_m
     recordings = [noise_said(read_any(path, arguments, stroke_m), arguments) for path in arguments.recordings]
     test = noise_said(read_any(arguments.test, arguments, stroke_m), arguments) if arguments.test else None
@@ -109,7 +121,8 @@ def run(arguments: argparse.Namespace) -> int:
     if diagnosis.verdict == "unexplained":
         print(f"to look for a form of what the library lacks: {discover_command(arguments)}")
     if arguments.out is not None:
-        _write_valve(diagnosis, arguments)
+        added = _added(diagnosis, valve, recordings, test, arguments) if arguments.add else None
+        _write_valve(diagnosis, added, arguments)
     if arguments.json is not None:
         written = str(arguments.experiment) if diagnosis.experiment and arguments.experiment else None
         whole = as_json(diagnosis) | {"experiment": written, "seconds": time.monotonic() - began_s}
@@ -147,17 +160,57 @@ def _tell_experiment(diagnosis: "Diagnosis", path: Path | None) -> None:
     print(f"{path}: the experiment that would tell apart what the recordings do not")
 
 
-def _write_valve(diagnosis: "Diagnosis", arguments: argparse.Namespace) -> None:
-    """Write what was found with its journal, where the diagnosis is sure of it; say so where it is not."""
+def _require_out(arguments: argparse.Namespace) -> None:
+    """Check that what is to be added has a file to be written to.
+
+    Raises:
+        InputError: it has none.
+    """
+    from config.errors import InputError
+
+    if arguments.add and arguments.out is None:
+        raise InputError("--add", "needs -o BETTER.toml, where the valve is written")
+
+
+def _added(
+    diagnosis: "Diagnosis",
+    valve: "ValveFile",
+    recordings: "list[Recording]",
+    test: "Recording | None",
+    arguments: argparse.Namespace,
+) -> "Extension":
+    """Return the valve with the effects that were asked for, gone on from the diagnosis's own fits."""
+    from positioner.cli.parts.naming import files_named, naming
+    from positioner.cli.parts.progress import at_work
+    from workbench.diagnosis.extension import extend
+
+    named = files_named(arguments.recordings, arguments.test, arguments.valve)
+    with naming(named), at_work("extend") as progress:
+        return extend(
+            recordings,
+            valve,
+            arguments.add,
+            test=test,
+            diagnosis=diagnosis,
+            seed=arguments.seed,
+            progress=progress,
+            from_pressure=arguments.from_pressure,
+        )
+
+
+def _write_valve(diagnosis: "Diagnosis", added: "Extension | None", arguments: argparse.Namespace) -> None:
+    """Write what was added or found with its journal, where the diagnosis is sure of that; say so where it is not."""
     from config.valve_file import find_valve
     from positioner.cli.parts.next_step import not_written
     from workbench.diagnosis.extension import extension_of
     from workbench.diagnosis.extension_journal import write_extended
 
-    if not diagnosis.sure:
+    if added is None and not diagnosis.sure:
         print(not_written(arguments.out, diagnosis))
         return
-    journal = write_extended(extension_of(diagnosis), find_valve(arguments.valve), arguments.out)
+    journal = write_extended(added or extension_of(diagnosis), find_valve(arguments.valve), arguments.out)
+    if added:
+        print(added.summary())
     print(f"{arguments.out}: {journal.steps[-1].why}")
 
 

@@ -189,6 +189,24 @@ def test_a_data_sheet_that_cannot_be_is_one_line(
     assert not (tmp_path / "v.toml").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--of", "seed", "--set", "coulomb_n=x"], "--set: must be NAME=VALUE, as coulomb_n=1300, got 'coulomb_n=x'"),
+        (["--of", "seed", "--set", "coulomb=1"], "coulomb: is no parameter of the valve; allowed: mass_kg"),
+        (["--of", "seed", "--without", "preload"], "preload: is no effect of the valve; allowed: none"),
+        (["--of", "seed", "--area-cm2", "7"], "--area-cm2: is of a data sheet, so --of must not be given"),
+        (["--set", "coulomb_n=1"], "--area-cm2: is needed of a data sheet; --of VALVE.toml changes another valve"),
+    ],
+)
+def test_a_valve_that_cannot_be_made_of_another_is_one_line(
+    words: list[str], said: str, tmp_path: Path, capsys: Capture
+) -> None:
+    assert main(["valve", *words, "-o", str(tmp_path / "v.toml")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "v.toml").exists()
+
+
 def test_units_at_the_end_of_names_and_a_clock_of_another_name_are_proposed(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "log.csv"
     path.write_text("logged,stem_mm,drive_bar\n" + "".join(f"2026-01-31T12:00:0{i},{i}.5,0.{i}\n" for i in range(8)))

@@ -1,7 +1,6 @@
 """What lies on a desk: a step back brings it again, and what is shown goes home as words of a command line."""
 
 import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -14,19 +13,18 @@ import pytest
 
 from config.errors import CommandFailed, InputError
 from config.exports.export_preview import preview
-from config.recording import Recording, write_recording
-from config.valve_file import load_valve, shipped_valve
-from config.writing import write_valve
+from config.recording import Recording
+from config.valve_file import shipped_valve
 from positioner.cli.parts.export_arguments import add_export_arguments, read_mapped
 from positioner.pages.workbench_page.background import Limits, News, Raced, Work, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
-from positioner.pages.workbench_page.desk import SAVED, Desk, NamedValve, named_valve
+from positioner.pages.workbench_page.desk import SAVED, Desk, named_valve
 from positioner.pages.workbench_page.notebook import notebook
 from positioner.pages.workbench_page.opening import ColumnChoice, Export, Opened, mapped, opened_like, wrong_with
+from positioner.pages.workbench_page.provenance import NamedValve
 from positioner.pages.workbench_page.search import Search
 from positioner.pages.workbench_page.search_panel import SearchPanel
 from tests.pages.laid_out import hidden
-from workbench.diagnosis.extension import extend
 
 
 @cache
@@ -78,7 +76,7 @@ def test_step_by_step_all_of_it_is_undone(desk: Desk) -> None:
 def test_what_is_held_out_and_how_long_it_may_take_stands_on_the_command_line(desk: Desk) -> None:
     desk.hold_out(other())
     desk.budget_s = 90.0
-    compare, diagnose = command_lines(desk)
+    diagnose, compare = command_lines(desk)
     assert compare == "positioner compare fit.csv --valve valve.toml"
     assert diagnose == "positioner diagnose fit.csv --valve valve.toml --test other.csv --budget-s 90"
     desk.take_recording(first())
@@ -115,28 +113,6 @@ def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:
     with pytest.raises(CommandFailed, match="nothing is known"):
         diagnosed(told.append, hidden().fit, hidden().base, Limits(hidden().test, 0.0), ["backlash"])
     assert not any(isinstance(each, Raced) for each in told)
-
-
-@pytest.mark.long
-def test_the_notebook_run_from_top_to_bottom_comes_to_the_same(
-    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    desk.valve = replace(valve(), path=tmp_path / "valve.toml")
-    write_valve(tmp_path / "valve.toml", hidden().base)
-    desk.add(extend(hidden().fit, hidden().base, ["preload"]))
-    written = json.loads(notebook(desk))
-    cells = ["".join(each["source"]) for each in written["cells"] if each["cell_type"] == "code"]
-    write_recording(tmp_path / "fit.csv", hidden().fit)
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for cell in cells:
-        if "diagnose" not in cell:  # minutes
-            exec(cell, names)
-    assert desk.valve is not None
-    assert names["valve"] == desk.valve.file
-    assert load_valve(tmp_path / "better.toml") == desk.valve.file
-    assert written["nbformat"] == 4
-    assert "preload" in cells[-2]
 
 
 def test_the_notebook_reads_an_export_as_it_was_read(desk: Desk) -> None:
@@ -187,9 +163,8 @@ def test_a_dropped_valve_file_whose_own_effect_stayed_behind_says_so(tmp_path: P
 
 
 def test_the_race_and_the_errors_are_in_the_unit_that_was_chosen(desk: Desk) -> None:
-    desk.search = Search(
-        "diagnose", valve().file, None, 0, cast(Work, SimpleNamespace(is_over=True)), race={"backlash": 2.54e-3}
-    )
+    over = cast(Work, SimpleNamespace(is_over=True))
+    desk.search = Search("diagnose", valve(), first(), None, over, race={"backlash": 2.54e-3})
     panel = cast(SearchPanel, SimpleNamespace(_desk=desk))
     for unit, error in {"mm": 2.54, "in": 0.1}.items():
         desk.units.position = unit

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, cast
 import pytest
 
 from positioner.pages.workbench_page.background import Work
-from positioner.pages.workbench_page.desk import Desk, NamedValve
+from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.opening import Opened
+from positioner.pages.workbench_page.provenance import NamedValve
 from tests.cli.test_daemon_process import until
 from tests.pages.laid_out import ends, hidden, never_ends
 

@@ -1,5 +1,6 @@
 """The report of a comparison: whether the model holds, and where it fails."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -52,13 +53,14 @@ LISTED = 12
 """Times of slips that are spelt out."""
 
 
-def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> None:
+def report_comparison(comparison: Comparison, path: Path, subject: Subject, grown: Sequence[Html] = ()) -> None:
     """Write the report.
 
     Args:
         comparison: what `compare` returned.
         path: the HTML file.
         subject: the valve and the recording that were compared.
+        grown: sections of how the valve came to be.
 
     Raises:
         InputError: plotly is not installed, or the file cannot be written.
@@ -78,6 +80,7 @@ def report_comparison(comparison: Comparison, path: Path, subject: Subject) -> N
             _friction(comparison),
             _slips(comparison),
             _statistics(comparison),
+            *grown,
             recording(subject, comparison.notes, _pressure(comparison)),
             section("words", "Words used here", glossary(WORDS)),
         ],

@@ -60,24 +60,32 @@ def report_journal(journal: Journal, path: Path, name: str, kind: Kind) -> None:
                 f"{fell}.",
                 bullets([_remark(*each, read) for each in enumerate(journal.steps, start=1)]),
             ),
-            section(
-                "fall",
-                "How the error fell",
-                plot(
-                    "plot-journal",
-                    ranking.error_reduction(_stages(journal.steps), last.floor_m, read.errors),
-                    320,
-                    f"Error, rms, at each step. Dashed: the floor of the last, {read.said(last.floor_m)}.",
-                ),
-                table(
-                    "table-journal",
-                    [read.title(each) for each in HEAD],
-                    [_row(*each, last.floor_m, read) for each in _stages(journal.steps)],
-                ),
-            ),
-            *(_step(number, each, read) for number, each in enumerate(journal.steps, start=1)),
+            *journal_sections(journal.steps, read),
             section("words", "Words used here", glossary(WORDS)),
         ],
+    )
+
+
+def journal_sections(steps: Sequence[ExtensionStep], read: Reading) -> tuple[Html, ...]:
+    """Return the sections of how the error fell, and of what was done in each step."""
+    floor_m, stages = steps[-1].floor_m, _stages(steps)
+    return (
+        section(
+            "fall",
+            "How the error fell",
+            plot(
+                "plot-journal",
+                ranking.error_reduction(stages, floor_m, read.errors),
+                320,
+                f"Error, rms, at each step. Dashed: the floor of the last, {read.said(floor_m)}.",
+            ),
+            table(
+                "table-journal",
+                [read.title(each) for each in HEAD],
+                [_row(*each, floor_m, read) for each in stages],
+            ),
+        ),
+        *(_step(number, each, read) for number, each in enumerate(steps, start=1)),
     )
 
 

@@ -14,13 +14,23 @@ def read_valve(text: str) -> "ValveFile":
         InputError: it is not there, or names file, key, value and what is allowed.
     """
     from config.valve_file import find_valve, load_valve
-    from sim.composition import parameter_vector
-    from sim.effect import find_effect
 
     path = find_valve(text)
     file = load_valve(path)
-    parameter_vector(file, [find_effect(each.name, str(path)) for each in file.effect], str(path))
+    require_parameters(file, str(path))
     return file
+
+
+def require_parameters(file: "ValveFile", source: str) -> None:
+    """Check that a valve's effects are there, and their parameters within their ranges.
+
+    Raises:
+        InputError: names source, key, value and what is allowed.
+    """
+    from sim.composition import parameter_vector
+    from sim.effect import find_effect
+
+    parameter_vector(file, [find_effect(each.name, source) for each in file.effect], source)
 
 
 def require_effects(names: Sequence[str] | None, option: str) -> None:

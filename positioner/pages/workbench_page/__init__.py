@@ -3,6 +3,7 @@
 Its files; those up to `search` know no browser:
 
     desk                            what lies on the desk of one tab
+    provenance                      how each valve on it came to be
     command_lines, notebook         what does the same on a command line; and as a notebook
     opening                         from a file to a recording
     live_model                      the model run anew while a parameter moves

@@ -21,8 +21,6 @@ from sim.own_effect import checked
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis.extension import Extension, extend
 from workbench.fit.breaking_off import BrokenOff
-from workbench.fit.fit_result import Fit
-from workbench.fit.fitting import fit
 from workbench.select.tangent_preview import TangentScore
 
 FRESH = multiprocessing.get_context("spawn")
@@ -177,7 +175,7 @@ def extended(
     effects: Sequence[str],
     diagnosis: Diagnosis | None,
 ) -> Extension:
-    """Add effects and refit.
+    """Add effects, or none, and refit.
 
     Args:
         tell: is told the progress.
@@ -195,20 +193,6 @@ def extended(
         tell(Progressed(what, done))
 
     return extend(recording, valve, effects, test=limits.test, diagnosis=diagnosis, progress=progressed)
-
-
-def refitted(tell: Tell, recording: Recording, valve: ValveFile, _limits: Limits) -> Fit:
-    """Fit a valve as it is, with intervals.
-
-    Args:
-        tell: is told the progress.
-        recording: of the valve.
-        valve: that is fitted.
-
-    Raises:
-        InputError: as `fit`.
-    """
-    return fit(recording, valve, progress=lambda done: tell(Progressed("fitting the valve as it is", done)))
 
 
 def effect_checked(tell: Tell, valve: ValveFile, path: Path) -> None:

@@ -1,6 +1,7 @@
 """Measured and simulated over time, forces over velocity and position, the sentences of `compare`, and the sliders."""
 
 import asyncio
+from collections.abc import Callable
 
 from nicegui import background_tasks, events, ui
 
@@ -31,13 +32,14 @@ TIME_PX, FORCE_PX = 520, 300
 
 
 class ComparePanel:
-    """The panel of the valve and the recording that are on the desk."""
+    """The panel of the valve and the recording that are on the desk; `settled` is called once a slider has rested."""
 
-    def __init__(self, desk: Desk, theme: Theme) -> None:
+    def __init__(self, desk: Desk, theme: Theme, settled: Callable[[], None]) -> None:
         assert desk.live is not None
         assert desk.compared is not None
         self._desk = desk
         self._theme = theme
+        self._when_settled = settled
         self._live: LiveModel = desk.live
         self._to_draw = self._drawing = False
         self._asked = 0
@@ -136,6 +138,7 @@ class ComparePanel:
                 self._marked()
                 self._tell(compared)
                 self._redraw_clouds()
+                self._when_settled()
 
     async def _is_quiet(self) -> bool:
         """Wait a moment; whether nothing else was asked in it."""

@@ -7,60 +7,50 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from config.errors import InputError
 from config.recording import Column, Recording
-from config.valve_file import ValveFile, find_valve, load_valve, valve_alone
+from config.valve_file import find_valve, load_valve, valve_alone
 from config.writing import valve_toml, write_valve
 from positioner.pages.parts.units import NO_NUMBER, Units
-from positioner.pages.workbench_page.background import Limits, Task, Work, effect_checked
+from positioner.pages.workbench_page.background import Limits, Task, Work, diagnosed, effect_checked, extended
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
+from positioner.pages.workbench_page.provenance import (
+    Diagnosed,
+    Extended,
+    Hidden,
+    NamedValve,
+    SetByHand,
+    blind_folder,
+    refitting,
+    steps_on,
+)
 from positioner.pages.workbench_page.search import Search
 from sim.effect import written_here
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
-from workbench.diagnosis.diagnosis import Diagnosis
-from workbench.diagnosis.extension import Extension
+from workbench.diagnosis.extension import Extension, extension_of
 from workbench.diagnosis.extension_journal import Journal, write_extended
-from workbench.fit.fit_result import Fit
 from workbench.fit.fitted_parameter import Fitted
 from workbench.report.units import Quantity, Shown
 
 SAVED = "saved"
 """The line of a variant that a person keeps."""
-BLIND = "blind"
-"""The folder of a blind case on a command line."""
-
-UNDONE = ("opened", "held_out", "export", "valve", "live", "compared", "fitted", "journal", "found", "sealed", "seed")
+UNDONE = ("opened", "held_out", "export", "valve", "live", "compared", "fitted", "found", "sealed")
 """What a step back brings again."""
 MOST_UNDONE = 20
 EFFECTS, EFFECT_NAME = "effects", "[a-z][a-z0-9_]{0,39}"
 """The folder of effects of one's own; what one may be called."""
-
-
-@dataclass(frozen=True, slots=True)
-class NamedValve:
-    """A valve file: what it is called on the page, and where it lies."""
-
-    name: str
-    path: Path
-    file: ValveFile
-
-
-@dataclass(frozen=True, slots=True)
-class JournalStep:
-    """What was added, and the valve before."""
-
-    before: NamedValve
-    extension: Extension
 
 
 @dataclass(slots=True)
@@ -84,16 +74,12 @@ class Desk:
     """Values and intervals of the last fit, by the parameter's name."""
     variants: dict[str, Column] = field(default_factory=dict)
     """Positions, m, of other variants that are laid over, by the line's name."""
-    journal: tuple[JournalStep, ...] = ()
-    """What was added, in order."""
     search: Search | None = None
     """A search under way, or what the last one has come to."""
     found: Search | None = None
     """The last diagnosis that has come to its end."""
     sealed: Path | None = None
-    """The folder of a blind case,"""
-    seed: int = 0
-    """and what it was drawn from."""
+    """The folder of a blind case."""
     may_write_effects: bool = False
     """Whether only this machine's user comes here: an effect is a program."""
     effects: dict[str, Path] = field(default_factory=dict)
@@ -107,6 +93,30 @@ class Desk:
     _before: list[dict[str, Any]] = field(default_factory=list)
     """What lay here before each of the last steps."""
     _written: int = 0
+    _set: NamedValve | None = None
+    """The valve as sliders and switches were set last."""
+
+    @property
+    def journal(self) -> tuple[NamedValve, ...]:
+        """The valves that were refitted to the recording here, with effects added or without, in order."""
+        return steps_on(self.valve, self.opened)
+
+    def as_set(self) -> NamedValve:
+        """Return the valve as sliders and switches are set, written down; itself where none was touched.
+
+        Raises:
+            InputError: there is none, or it cannot be written.
+        """
+        live, before = self._model(), self.valve
+        assert before is not None
+        made = SetByHand(before, live.moved, live.switched_off)
+        if not made.is_any:
+            return before
+        if self._set is None or not made.is_as(self._set.made):
+            path = self._path("set")
+            write_valve(path, live.valve)
+            self._set = NamedValve(path.name, path, live.valve, made)
+        return self._set
 
     @property
     def errors(self) -> Quantity:
@@ -136,6 +146,8 @@ class Desk:
         """
         if opened is not None:
             LiveModel(opened.record, self._model().valve)
+            if self.opened is not None and _same(opened.recording, self.opened.recording):
+                raise InputError(opened.name, "is the recording itself, so it would judge nothing; allowed is another")
         self.held_out = opened
 
     def keep_variant(self) -> None:
@@ -160,12 +172,13 @@ class Desk:
         Raises:
             InputError: the folder cannot be written.
         """
-        folder = self.folder / f"blind-{seed}"
+        folder = self.folder / blind_folder(seed)
         if not folder.exists():
             seal(folder, hide(seed))
-        opened = Opened.of(f"{BLIND}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"))
-        self._held(opened, named_valve(str(folder / "valve.toml"), f"{BLIND}/valve.toml"))
-        self.export, self.held_out, self.sealed, self.seed = None, None, folder, seed
+        opened = Opened.of(f"{folder.name}/fit.csv", folder / "fit.csv", Recording.read(folder / "fit.csv"), seed=seed)
+        known = named_valve(str(folder / "valve.toml"), f"{folder.name}/valve.toml")
+        self._held(opened, replace(known, made=Hidden(seed)))
+        self.export, self.held_out, self.sealed = None, None, folder
 
     def compare(self) -> Comparison:
         """Compare the valve as it is set.
@@ -229,26 +242,68 @@ class Desk:
     def begin(self, what: str, task: Task, *arguments: Any) -> Search:
         """Begin a search on the recording with the valve as it is set; one that is under way is stopped.
 
+        Args:
+            what: it is for, in words.
+            task: that is done in a process of its own.
+            arguments: of the task after recording, valve and limits.
+
         Raises:
             InputError: there is no recording or no valve.
         """
-        valve = self._model().valve
+        begins = self.as_set()
         self.stop()
         assert self.opened is not None
         own = self.folder / EFFECTS
         limits = Limits(self.held_out.recording if self.held_out else None, self.budget_s)
-        given = (self.opened.recording, valve, limits, *arguments)
-        self.search = Search(what, valve, self.held_out, len(self.journal), Work(task, *given, own_effects=own))
+        work = Work(task, self.opened.recording, begins.file, limits, *arguments, own_effects=own)
+        self.search = Search(what, begins, self.opened, self.held_out, work)
         return self.search
 
+    def diagnose(self, effects: Sequence[str]) -> None:
+        """Begin to look for what is missing, of these effects.
+
+        Raises:
+            InputError: as `begin`.
+        """
+        self.begin("diagnose", diagnosed, tuple(effects)).tried = tuple(effects)
+
+    def extend(self, effects: Sequence[str]) -> None:
+        """Begin to add effects, or to refit the valve as it is; a diagnosis of what lies here is gone on from.
+
+        Raises:
+            InputError: as `begin`.
+        """
+        found = self.diagnosed if effects else None
+        search = self.begin("extend", extended, tuple(effects), found and found.result)
+        search.went_on = Diagnosed(found.tried, is_verdict=False) if found else None
+
+    def take(self, search: Search) -> None:
+        """Go on with what a search has come to: a diagnosis is kept, a refitted valve is the next.
+
+        Raises:
+            InputError: as `add`.
+        """
+        if isinstance(search.result, Extension):
+            self.add(search.result, search, search.went_on)
+        else:
+            self.found = search
+
+    def add_verdict(self, search: Search) -> None:
+        """Go on with what a diagnosis is sure of; nothing is fitted again.
+
+        Raises:
+            InputError: as `add`.
+        """
+        self.add(extension_of(search.result), search, Diagnosed(search.tried, is_verdict=True))
+
     @property
-    def diagnosis(self) -> Diagnosis | None:
+    def diagnosed(self) -> Search | None:
         """The last diagnosis, if it is of what lies here now."""
         found, live = self.found, self.live
-        if found is None or live is None or found.valve != live.valve or found.held_out is not self.held_out:
+        same = found is not None and live is not None and found.begins.file == live.valve
+        if found is None or not same or found.recording is not self.opened or found.held_out is not self.held_out:
             return None
-        diagnosis: Diagnosis = found.result
-        return diagnosis
+        return found
 
     def stop(self) -> None:
         """Stop what is under way."""
@@ -256,28 +311,21 @@ class Desk:
         if self.search is not None:
             self.search.cancel()
 
-    def take_fit(self, found: Fit) -> None:
-        """Go on with a fitted valve.
+    def add(self, extension: Extension, search: Search, went_on: Diagnosed | None = None) -> None:
+        """Go on with a valve that was refitted, with effects added or none; the step joins the journal.
+
+        Args:
+            extension: what was found or asked for.
+            search: that it came of, with the valve that it begins with.
+            went_on: the diagnosis that it goes on from.
 
         Raises:
             InputError: the valve file cannot be written.
         """
-        path = self._path("fitted")
-        write_valve(path, found.valve)
-        self._go_on(NamedValve(path.name, path, found.valve), found.parameters)
-
-    def add(self, extension: Extension) -> None:
-        """Go on with an extended valve; the step joins the journal.
-
-        Raises:
-            InputError: the valve file cannot be written.
-        """
-        before = self.valve
-        assert before is not None
         path = self._path("better")
-        write_extended(extension, before.path, path)
-        self._go_on(NamedValve(path.name, path, extension.valve), extension.extended.parameters)
-        self.journal = (*self.journal, JournalStep(before, extension))
+        write_extended(extension, search.begins.path, path)
+        made = Extended(search.begins, extension, search.recording, search.held_out, went_on)
+        self._go_on(NamedValve(path.name, path, extension.valve, made), extension.extended.parameters)
 
     def undo(self) -> bool:
         """Take back what was done last, a move of a slider or another recording or valve; whether there was anything.
@@ -304,10 +352,9 @@ class Desk:
         """
         if not self.journal:
             raise InputError("journal", "is empty")
-        *rest, last = self.journal
         found = self.found
-        self._held(self.opened, last.before)
-        self.journal, self.found = tuple(rest), found
+        self._held(self.opened, refitting(self.journal[-1]).before)
+        self.found = found
 
     @property
     def toml(self) -> str:
@@ -316,9 +363,10 @@ class Desk:
         Raises:
             InputError: there is none.
         """
-        file = self._model().valve
-        remarks = Journal.beside(self.valve.path).remarks(file.valve.own.length) if self.valve else ()
-        return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(file))
+        valve = self.as_set()
+        beside = [each.path for each in valve.chain if isinstance(each.made, Extended)]
+        remarks = Journal.beside(beside[-1]).remarks(valve.file.valve.own.length) if beside else ()
+        return self.plain("".join(f"# {each}\n" for each in remarks) + valve_toml(valve.file))
 
     def clear(self) -> None:
         """Stop what is under way, and remove what was written for it."""
@@ -339,21 +387,27 @@ class Desk:
         self._before.append({name: getattr(self, name) for name in UNDONE} | {"variants": dict(self.variants)})
         del self._before[:-MOST_UNDONE]
         self.opened, self.valve, self.live, self.compared = opened, valve, live, compared
-        self.fitted, self.journal, self.search, self.found = {}, (), None, None
+        self.fitted, self.search, self.found = {}, None, None
         self.variants = {"as opened": live.curve().simulated_m} if live else {}
 
     def _go_on(self, valve: NamedValve, fitted: Mapping[str, Fitted]) -> None:
-        """Take a valve that was found here: the one before stays laid over it, and the journal stays."""
-        kept, before = (self.journal, self.search, self.found), self._model().curve().simulated_m
+        """Take a valve that was found here: the one before stays laid over it."""
+        kept, before = (self.search, self.found), self._model().curve().simulated_m
         saved = {name: each for name, each in self.variants.items() if name == SAVED}
         self._held(self.opened, valve)
-        self.journal, self.search, self.found = kept
+        self.search, self.found = kept
         self.fitted = fitted
         self.variants = saved | {"as opened": before, "fitted": self._model().curve().simulated_m}
 
     def _path(self, name: str) -> Path:
         self._written += 1
         return self.folder / f"{name}-{self._written}.toml"
+
+
+def _same(one: Recording, other: Recording) -> bool:
+    """Whether two recordings have the same samples."""
+    same_names = one.columns.keys() == other.columns.keys()
+    return same_names and all(np.array_equal(each, other.columns[name], True) for name, each in one.columns.items())
 
 
 def named_valve(text: str, name: str = "") -> NamedValve:

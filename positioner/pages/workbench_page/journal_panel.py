@@ -11,9 +11,13 @@ from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.notebook import notebook
+from positioner.pages.workbench_page.provenance import refitting
 from workbench.blind.sealing import reveal
+from workbench.diagnosis.extension_journal import ExtensionStep
 from workbench.report import Subject, report_comparison, report_diagnosis
+from workbench.report.journal_report import journal_sections
 from workbench.report.ranking import error_reduction
+from workbench.report.units import Reading
 
 FALL_PX = 320
 
@@ -28,9 +32,8 @@ class JournalPanel:
             heading("How the error fell", "journal")
             FigureView(theme, self._drawn, FALL_PX, "how the error fell")
             ui.label("dashed: the floor").classes("quiet")
-            for number, step in enumerate(desk.journal, start=1):
-                added = ", ".join(step.extension.effects)
-                ui.label(desk.plain(f"{number}. {added}: {step.extension.summary().splitlines()[0]}")).props(
+            for number, step in enumerate(map(refitting, desk.journal), start=1):
+                ui.label(desk.plain(f"{number}. {step.extension.summary().splitlines()[0]}")).props(
                     'data-testid="journal-step"'
                 )
             back = ui.button("Take the last step back", icon="undo", on_click=self._back)
@@ -46,16 +49,24 @@ class JournalPanel:
                 ui.button("Reveal what was hidden", icon="visibility", on_click=self._reveal).props("outline no-caps")
         self._answer = ui.column()
         ui.label("the same on a command line:").classes("quiet")
-        ui.code("\n".join(command_lines(desk)), language="bash").classes("w-full")
+        self._commands = ui.column().classes("w-full").props('data-testid="commands"')
+        self.retell()
+
+    def retell(self) -> None:
+        """Show the command lines anew: a slider was moved, or something was found."""
+        self._commands.clear()
+        with self._commands, errors_told():
+            ui.code("\n".join(command_lines(self._desk)), language="bash").classes("w-full")
 
     def _drawn(self) -> Figure:
         """Every model on the way, as the report of a journal draws it: fitted, held out, and the floor."""
         stages = []
-        for number, step in enumerate(self._desk.journal, start=1):
-            for name, (train_m, test_m) in step.extension.stages.items():
-                if number == 1 or name.startswith("with"):
+        extensions = [refitting(each).extension for each in self._desk.journal]
+        for number, extension in enumerate(extensions, start=1):
+            for i, (name, (train_m, test_m)) in enumerate(extension.stages.items()):
+                if number == 1 or i == len(extension.stages) - 1:
                     stages.append((self._desk.plain(name), train_m, test_m))
-        return error_reduction(stages, self._desk.journal[-1].extension.split.floor_m, self._desk.errors)
+        return error_reduction(stages, extensions[-1].split.floor_m, self._desk.errors)
 
     async def _back(self) -> None:
         with errors_told():
@@ -77,19 +88,8 @@ class JournalPanel:
     async def _report(self) -> None:
         with errors_told():
             path = self._desk.folder / "report.html"
-            await aside(self._write_report, path)
+            await aside(write_report, self._desk, path)
             ui.download.content(path.read_bytes(), path.name, "text/html")
-
-    def _write_report(self, path: Path) -> None:
-        desk = self._desk
-        assert desk.opened is not None
-        assert desk.live is not None
-        valve = desk.found.valve if desk.found else desk.live.valve
-        subject = Subject(valve, (desk.opened.name,), desk.opened.recording.metadata)
-        if desk.found is not None:
-            report_diagnosis(desk.found.result, path, subject, command_lines(desk))
-        else:
-            report_comparison(desk.compare(), path, subject)
 
     def _reveal(self) -> None:
         with errors_told():
@@ -100,3 +100,23 @@ class JournalPanel:
                 for effect in answer["effects"]:
                     told = ", ".join(f"{key} = {value:.4g}" for key, value in effect.items() if key != "name")
                     ui.label(f"hidden: {effect['name']}, {told}").props('data-testid="hidden"')
+
+
+def write_report(desk: Desk, path: Path) -> None:
+    """Write the report of what is on a desk: of its diagnosis, or, where another valve is there by now, of that.
+
+    Raises:
+        InputError: plotly is not installed, or the file cannot be written.
+    """
+    assert desk.opened is not None
+    assert desk.live is not None
+    found, journal = desk.found, desk.journal
+    files = tuple(each.name for each in (desk.opened, desk.held_out) if each)
+    if found is not None and desk.live.valve in (found.begins.file, found.result.best.fit.valve):
+        subject = Subject(found.begins.file, files, desk.opened.recording.metadata)
+        report_diagnosis(found.result, path, subject, command_lines(desk))
+        return
+    steps = tuple(ExtensionStep.of(refitting(each).extension) for each in journal)
+    subject = Subject(desk.live.valve, files, desk.opened.recording.metadata)
+    grown = journal_sections(steps, Reading(desk.live.valve.valve.own)) if steps else ()
+    report_comparison(desk.compare(), path, subject, grown)

@@ -51,7 +51,7 @@ class LiveModel:
         self._composition = Composition.from_file(valve)
         self._run = FreeRun(self._composition, self.record)
         self.parameters = self._movable()
-        self.setting = Setting(np.array(self._composition.theta))
+        self.setting = self._given = Setting(np.array(self._composition.theta))
         self._before: list[Setting] = []
 
     @property
@@ -118,6 +118,22 @@ class LiveModel:
             if effect.name not in self.setting.off
         ]
         return file.model_copy(update={"effect": tuple(on)})
+
+    @property
+    def moved(self) -> Mapping[str, float]:
+        """The parameters that are no longer as the valve file says, SI by name; none of an effect that is off."""
+        changed = np.flatnonzero(self.setting.theta != self._given.theta).tolist()
+        names = [(self._composition.names[index], index) for index in changed]
+        return {
+            name: float(self.setting.theta[index])
+            for name, index in names
+            if name.rpartition(".")[0] not in self.setting.off
+        }
+
+    @property
+    def switched_off(self) -> tuple[str, ...]:
+        """The effects that are off, in the file's order."""
+        return tuple(name for name in self.effects if name in self.setting.off)
 
     def curve(self) -> Curve:
         """Run the model through the recording as it is set."""

@@ -18,6 +18,7 @@ from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.columns_panel import ColumnsPanel
 from positioner.pages.workbench_page.desk import Desk, named_valve
 from positioner.pages.workbench_page.opening import Export, Opened, opened, opened_like, wrong_with
+from positioner.pages.workbench_page.provenance import DataSheetMade, NamedValve
 
 SUFFIXES = (".csv", ".txt", ".parquet", ".xlsx", ".mat")
 """Of files that a folder offers."""
@@ -140,7 +141,8 @@ class OpenPanel:
                 told.clear()
                 with told:
                     sentences([*given, *(f"assumed: {each}" for each in assumed)], "assumed")
-                await self._take_valve(str(path), path.name)
+                await aside(self._desk.take_valve, NamedValve(path.name, path, file, DataSheetMade(sheet)))
+                self._changed()
 
         for each in (area, low, high, stroke, friction, ratio):
             each.classes("w-full").props("dense")

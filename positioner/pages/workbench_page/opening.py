@@ -68,7 +68,7 @@ class ColumnChoice:
         return (*words, *(["--decimal", self.decimal] if self.decimal else []))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Opened:
     """A recording that was read, and made ready once for all: the name it came by, and where it lies."""
 
@@ -78,16 +78,26 @@ class Opened:
     record: Record
     choice: ColumnChoice | None = None
     """How it was read, of an export."""
+    seed: int | None = None
+    """Of a blind case, what it was drawn from."""
 
     @classmethod
-    def of(cls, name: str, path: Path, recording: Recording, choice: ColumnChoice | None = None) -> Self:
+    def of(
+        cls,
+        name: str,
+        path: Path,
+        recording: Recording,
+        choice: ColumnChoice | None = None,
+        *,
+        seed: int | None = None,
+    ) -> Self:
         """Make a recording ready.
 
         Raises:
             InputError: as `ready`, and of more samples than may be fitted.
         """
         require_few_samples(recording)
-        return cls(name, path, recording, ready(recording), choice)
+        return cls(name, path, recording, ready(recording), choice, seed)
 
     @property
     def words(self) -> tuple[str, ...]:

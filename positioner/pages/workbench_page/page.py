@@ -114,6 +114,10 @@ class TabPage:
             if await aside(self._desk.undo):
                 self.changed()
 
+    def _retell(self) -> None:
+        """Say anew what does the same on a command line."""
+        self._journal.retell()
+
     def changed(self, at: str = "") -> None:
         """Show what goes with the recording and the valve on the desk; `at` is the heading that is looked at then."""
         self._theme.forget()
@@ -125,9 +129,9 @@ class TabPage:
             return
         with self._rest:
             heading("Model against measurement", "comparison")
-            ComparePanel(self._desk, self._theme)
-            SearchPanel(self._desk, self._theme, self.changed)
-            JournalPanel(self._desk, self._theme, self.changed)
+            ComparePanel(self._desk, self._theme, self._retell)
+            SearchPanel(self._desk, self._theme, self.changed, self._retell)
+            self._journal = JournalPanel(self._desk, self._theme, self.changed)
             if at:
                 look_at(at)
 

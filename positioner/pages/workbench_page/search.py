@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from config.valve_file import ValveFile
 from positioner.pages.workbench_page.background import Failed, Finished, Previewed, Progressed, Raced, Work
 from positioner.pages.workbench_page.opening import Opened
+from positioner.pages.workbench_page.provenance import Diagnosed, NamedValve
 from workbench.select.tangent_preview import TangentScore
 
 PREVIEWED = 5
@@ -13,15 +13,19 @@ PREVIEWED = 5
 
 @dataclass(slots=True)
 class Search:
-    """What a search of `valve` is for, in words, and what it has come to."""
+    """What a search is for, in words, what it begins with, and what it has come to."""
 
     what: str
-    valve: ValveFile
+    begins: NamedValve
+    """The valve as it was set."""
+    recording: Opened
     held_out: Opened | None
     """The recording that no fit of it sees."""
-    journal: int
-    """How many steps the journal had when it began: what it found goes with that valve."""
     work: Work
+    tried: tuple[str, ...] = ()
+    """The effects that a diagnosis tries."""
+    went_on: Diagnosed | None = None
+    """The diagnosis that an extension goes on from."""
     doing: str = ""
     done: float = 0.0
     step: int = 0

@@ -11,14 +11,11 @@ from positioner.pages.parts.number_field import NumberField
 from positioner.pages.parts.page_words import in_page_words
 from positioner.pages.parts.telling import aside, errors_told, heading, is_looked_at, look_at, tell_error
 from positioner.pages.parts.theme import Theme
-from positioner.pages.workbench_page.background import diagnosed, extended, refitted
 from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.effect_panel import effect_section
 from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
 from workbench.diagnosis.diagnosis import Diagnosis
-from workbench.diagnosis.extension import Extension, extension_of
-from workbench.fit.fit_result import Fit
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
@@ -33,17 +30,22 @@ ROW_PX, FRAME_PX = 18, 70
 
 
 class SearchPanel:
-    """Begins searches; `changed` is called when another valve is on the desk, with the heading of interest."""
+    """Begins searches; `changed` is called when another valve is on the desk, `told` when something was found."""
 
-    def __init__(self, desk: Desk, theme: Theme, changed: Callable[[str], None]) -> None:
+    def __init__(
+        self, desk: Desk, theme: Theme, changed: Callable[[str], None], told: Callable[[], None] = lambda: None
+    ) -> None:
         self._desk = desk
         self._theme = theme
         self._changed = changed
+        self._told = told
         heading("Which effect is missing?", "search")
         with ui.row().classes("w-full items-center"):
             self._begin = ui.button("Diagnose", icon="search", on_click=self._diagnose)
             self._begin.props('no-caps data-testid="diagnose"')
-            self._fit = ui.button("Fit the valve as it is", icon="tune", on_click=self._refit).props("outline no-caps")
+            self._fit = ui.button("Fit the valve as it is", icon="tune", on_click=lambda: self._extend(())).props(
+                "outline no-caps"
+            )
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
@@ -95,19 +97,14 @@ class SearchPanel:
     def _diagnose(self) -> None:
         with errors_told():
             self._take_budget()
-            self._desk.begin("diagnose", diagnosed, self._names.value or list(self._tried()))
-        self._began()
-
-    def _refit(self) -> None:
-        with errors_told():
-            self._take_budget()
-            self._desk.begin("fit", refitted)
+            self._desk.diagnose(self._names.value or list(self._tried()))
         self._began()
 
     def _extend(self, effects: Sequence[str]) -> None:
+        """Add effects and refit; with none, refit the valve as it is."""
         with errors_told():
             self._take_budget()
-            self._desk.begin("extend", extended, tuple(effects), self._desk.diagnosis)
+            self._desk.extend(effects)
         self._began()
 
     def _began(self) -> None:
@@ -136,15 +133,12 @@ class SearchPanel:
     async def _take(self, search: Search) -> None:
         """Do what the search was for."""
         with errors_told():
-            if isinstance(search.result, Fit):
-                await aside(self._desk.take_fit, search.result)
-                self._changed("comparison")
-            elif isinstance(search.result, Extension):
-                await aside(self._desk.add, search.result)
-                self._changed("journal")
-            else:
-                self._desk.found = search
+            await aside(self._desk.take, search)
+            if self._desk.found is search:
                 self._tell(search)
+                self._told()
+            else:
+                self._changed("journal")
 
     def _show(self) -> None:
         search = self._desk.search
@@ -204,7 +198,7 @@ class SearchPanel:
         """Show the verdict and every candidate, each with why it was refused and a button that adds it."""
         diagnosis: Diagnosis = search.result
         self._result.clear()
-        may_add = search.journal == len(self._desk.journal)
+        may_add = self._desk.diagnosed is search
         kind, first = headline(diagnosis.verdict, diagnosis.missing, parameters_off=diagnosis.parameters_off)
         with self._result:
             plain = self._desk.plain
@@ -257,8 +251,7 @@ class SearchPanel:
             self._extend(effects)
             return
         with errors_told():
-            extension = await aside(extension_of, search.result)
-            await aside(self._desk.add, extension)
+            await aside(self._desk.add_verdict, search)
             self._changed("journal")
 
 
