@@ -183,7 +183,7 @@ def test_what_a_terminal_cannot_show_is_escaped(
     ("words", "said"),
     [
         ([], "positioner: the following arguments are required: COMMAND; `positioner --help` says more"),
-        (["valve"], "--stroke-mm, -o/--out; `positioner valve --help` says more"),
+        (["valve"], "required: -o/--out; `positioner valve --help` says more"),
         (["demo", "--bus", "x"], "invalid choice: 'x' (choose from 'modbus', 'canopen', 'rtu')"),
         (["events", "daemon.toml", "--since", "noon"], "positioner events: argument --since: allowed are 30m, 2h, 7d"),
         (["get", "--bogus"], "positioner get: unrecognized arguments: --bogus; `positioner get --help` says more"),

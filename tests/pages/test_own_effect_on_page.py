@@ -84,7 +84,7 @@ def test_a_checked_effect_is_run_by_the_desk_that_wrote_it_and_by_nobody_else(
     assert end_of(desk.checking) == Finished(None)
     desk.keep_effect("tight_spot")
     assert find_effect(str(path), "effects").name == "tight_spot"
-    assert re.search(r"diagnose fit\.csv .*--effects \./tight_spot\.py ", command_lines(desk)[1])
+    assert re.search(r"diagnose fit\.csv .*--effects \./tight_spot\.py ", command_lines(desk)[0])
     desk.clear()
     assert not path.exists()
     path.parent.mkdir(parents=True)
