@@ -6,9 +6,9 @@ One notation holds for a whole file, and its numbers show which:
     50.5   0.612   1,234.5   1,234,567     the point is
     1,234  1.234                           either: a thousand or one and a bit
 
-Spaces and apostrophes (1 234,5; 1'234.5) only ever group. Where all that a file shows is of the third kind, or
-numbers of both first kinds stand in it, a person must say; but a point in fields that commas separate is the decimal
-sign, for nobody writes decimal commas there.
+Spaces and apostrophes (1 234,5; 1'234.5) only ever group; a minus may stand behind, as business programs put it
+(12,5-). Where all that a file shows is of the third kind, or numbers of both first kinds stand in it, a person must
+say; but a point in fields that commas separate is the decimal sign, for nobody writes decimal commas there.
 """
 
 import re
@@ -39,8 +39,8 @@ def is_numeral(text: str) -> bool:
 def number(text: str, decimal: str) -> float | None:
     """Return a text's number; NaN for words, None for a numeral that is none with this decimal sign.
 
-    >>> number("1.234,5", ","), number("1 234,5", ","), number("Bad", ","), number("12.34", ",")
-    (1234.5, 1234.5, nan, None)
+    >>> number("1.234,5", ","), number("1 234,5-", ","), number("Bad", ","), number("12.34", ",")
+    (1234.5, -1234.5, nan, None)
     """
     if decimal == "." and _PLAIN.fullmatch(text):
         return float(text)
@@ -53,7 +53,8 @@ def number(text: str, decimal: str) -> float | None:
 
 
 def _signed(text: str) -> str:
-    return text.replace("\u2212", "-") if "\u2212" in text else text
+    plain = text.replace("\u2212", "-") if "\u2212" in text else text
+    return f"-{plain[:-1]}" if plain.endswith("-") and plain[:1].isdigit() else plain
 
 
 def decimal_sign(source: str, texts: Iterable[str], separator: str) -> str:

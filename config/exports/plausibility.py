@@ -1,15 +1,16 @@
 """What is odd about a recording, said before anything is fitted to it: each a line that says what to do about it.
 
-The reading may be right and the export still useless: units a thousand off, a valve that air closes, commands sampled
-at other moments than positions, a stem that never moves, samples too far apart to see it move. None of this stops
-anybody.
+The reading may be right and the export still useless: units a thousand off, a valve that air closes, commands or set
+points sampled at other moments than positions, a stem that never moves, samples too far apart to see it move, a number
+read without its sign. None of this stops anybody.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from config.drive import VALVE
+from config.drive import VALVE, Kind
 from config.recording import Column, Recording
 
 LONGEST_STROKE_M = 1.5
@@ -26,6 +27,21 @@ FAR = 5.0
 GAP_PERIODS = 20.0
 MOVED = 0.02
 """Of the span of the positions: what counts as a move, and of the commands: as a change."""
+LONG_ROWS = 10
+"""Rows for which a command is held, so that what the stem did before and after its change can be told apart."""
+ANSWER = 0.1
+"""Of the span of the positions: what counts as an answer to a change."""
+FEW_JUMPS = 3
+JUMP = 0.9
+"""Of the span of the positions: a jump over nearly all of it."""
+WRAPS = 0.9
+"""Of 65536 steps: what a register of 16 bits without its sign spans."""
+SELDOM, OFTEN = 0.2, 0.8
+"""Parts of the rows in which a set point changes, and a measured position, with its noise."""
+UNLIKE = 0.02
+"""Ratio of the spans of position and set point below which, or over whose inverse, their units differ."""
+STEADY = 0.9
+"""Part of the runs of equal positions that are as long as most, or twice, and so on."""
 STRAIGHT = 0.3
 """Share of the moving rows on straight lines, from which on a historian drew them."""
 
@@ -37,20 +53,48 @@ def oddities(recording: Recording, stroke_m: float | None = None) -> list[str]:
         recording: as read.
         stroke_m: of its valve, if that is known.
     """
-    position_m, command_pa, kind = recording.position_m, recording.columns.get("command_pa"), recording.kind
+    position_m, kind = recording.position_m, recording.kind
     said = [*odd_sizes(recording, stroke_m), *_of_rows(recording)]
     whole = np.isfinite(position_m)
-    if whole.any() and np.ptp(position_m[whole]) == 0.0:
+    if not whole.any():
+        return said
+    if np.ptp(position_m[whole]) == 0.0:
         where = f"{position_m[whole][0]:g} {kind.travel.si}"
-        said.append(f"the position is {where} throughout: a stem that never moves says nothing")
-    elif whole.any() and command_pa is not None and kind is VALVE and not in_each_others_place(position_m, command_pa):
-        held_pa = _held(command_pa)
-        said += [
-            *_of_constant(command_pa),
-            *_of_action(position_m, held_pa),
-            *_of_sampling(recording.time_s, position_m, held_pa),
-        ]
-    return said
+        return [*said, f"the position is {where} throughout: a stem that never moves says nothing"]
+    asked = _asked(recording)
+    if asked is None or (asked.name == "command_pa" and in_each_others_place(position_m, asked.values)):
+        return [*said, *_of_repeats(recording.time_s, position_m, None), *_of_lines(position_m)]
+    said += _of_constant(asked)
+    # Of what is no position at all, nothing more is to be said.
+    by_setpoint = kind is VALVE and asked.name == "reference_m"
+    none_at_all = [*_of_registers(position_m, kind), *(_of_setpoint(position_m, asked.values) if by_setpoint else [])]
+    if none_at_all:
+        return said + none_at_all
+    if kind is VALVE:
+        said += [*_of_action(position_m, asked), *_of_sampling(recording.time_s, position_m, asked)]
+    return [*said, *_of_repeats(recording.time_s, position_m, asked.values), *_of_lines(position_m)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is asked of the stem: its column, held where none is written, what it is called, and its unit."""
+
+    name: str
+    values: Column
+    words: str
+    unit: str
+
+
+def _asked(recording: Recording) -> _Asked | None:
+    """Return the command of a recording, or else its set point."""
+    kind = recording.kind
+    for name, words, unit in (
+        ("command_pa", "command", kind.command.si),
+        ("reference_m", "set point", kind.travel.si),
+    ):
+        if (column := recording.columns.get(name)) is not None and np.isfinite(column).any():
+            return _Asked(name, _held(column), words, unit)
+    return None
 
 
 def odd_sizes(recording: Recording, stroke_m: float | None = None) -> list[str]:
@@ -136,21 +180,84 @@ def _of_pressure(command_pa: Column) -> Iterator[str]:
         yield f"commands go to {1e-5 * high:.3g} bar: is the unit right?"
 
 
-def _of_constant(command_pa: Column) -> Iterator[str]:
-    low, high = _ends(command_pa)
+def _of_constant(asked: _Asked) -> Iterator[str]:
+    low, high = _ends(asked.values)
     if low == high:
-        yield f"the command is {low:g} Pa throughout: a stem that is not driven says nothing"
+        yield f"the {asked.words} is {low:g} {asked.unit} throughout: a stem that is not driven says nothing"
 
 
-def _of_action(position_m: Column, command_pa: Column) -> Iterator[str]:
-    whole = np.isfinite(position_m) & np.isfinite(command_pa)
-    x, u = position_m[whole], command_pa[whole]
-    if x.size < 5 or np.ptp(u) == 0.0 or np.ptp(x) == 0.0:
+def _of_setpoint(position_m: Column, reference_m: Column) -> Iterator[str]:
+    """Yield what is odd about a set point beside the travel: one signal, the other's place, another unit."""
+    whole = np.isfinite(position_m) & np.isfinite(reference_m)
+    x, r = position_m[whole], reference_m[whole]
+    if x.size < FEWEST_ROWS or np.ptp(r) == 0.0:
         return
-    if float(np.corrcoef(x, u)[0, 1]) < REVERSE:
+    if np.array_equal(x, r):
+        yield "set point and position are one signal, to the last digit: which column is measured on the stem?"
+        return
+    changes_x, changes_r = (float((np.diff(each) != 0.0).mean()) for each in (x, r))
+    if changes_x < SELDOM and changes_r > OFTEN:
+        changing = f"the set point changes in {100 * changes_r:.0f} % of the rows"
+        yield f"{changing}, the position in {100 * changes_x:.0f} %: do their columns stand in each other's place?"
+    if not UNLIKE < np.ptp(x) / np.ptp(r) < 1.0 / UNLIKE:
         yield (
-            "more pressure, less position: air closes this valve, or the position counts from the other end. "
-            "The model opens with pressure: position_m=THEIRS:-% (or :-mm) counts from there"
+            f"positions go over {1e3 * np.ptp(x):.3g} mm and set points over {1e3 * np.ptp(r):.3g} mm: are both in the "
+            "same unit, a share of 1, % or mm?"
+        )
+
+
+def _of_action(position_m: Column, asked: _Asked) -> Iterator[str]:
+    whole = np.isfinite(position_m) & np.isfinite(asked.values)
+    x, u = position_m[whole], asked.values[whole]
+    if x.size < 5 or np.ptp(u) == 0.0 or np.ptp(x) == 0.0 or not float(np.corrcoef(x, u)[0, 1]) < REVERSE:
+        return
+    if asked.name == "reference_m":
+        yield (
+            "the higher the set point, the lower the position: one of them counts from the other end; "
+            "position_m=THEIRS:-% (or :-mm) counts from there"
+        )
+        return
+    yield (
+        "more pressure, less position: air closes this valve, or the position counts from the other end. "
+        "The model opens with pressure: position_m=THEIRS:-% (or :-mm) counts from there"
+    )
+
+
+def _of_registers(position_m: Column, kind: Kind) -> Iterator[str]:
+    """Yield what is odd about jumps over a power of two: a register read without its sign."""
+    x = position_m[np.isfinite(position_m)]
+    steps = np.abs(np.diff(x))
+    gaps = np.diff(np.unique(x))
+    if x.size < FEWEST_ROWS or not gaps.size:
+        return
+    jumps = steps[steps > JUMP * np.ptp(x)]
+    quantum = float(gaps[gaps > 0.0].min())
+    counts = float(np.ptp(x)) / quantum
+    if jumps.size >= FEW_JUMPS and jumps.size < 0.5 * steps.size and WRAPS * 2**16 < counts < 2**16:
+        others = steps[steps <= JUMP * np.ptp(x)]
+        if others.size and float(others.max()) < (1.0 - JUMP) * np.ptp(x):
+            yield (
+                f"positions jump {jumps.size} times by nearly all of 65536 steps of {quantum:.3g} {kind.travel.si}: a "
+                "register of 16 bits read without its sign? Numbers from 32768 on are then less by 65536"
+            )
+
+
+def _of_repeats(time_s: Column, position_m: Column, asked: Column | None) -> Iterator[str]:
+    """Yield what is odd about positions that stand for several rows each: they are read more seldom than written."""
+    changes = np.flatnonzero(np.diff(position_m) != 0.0)
+    if changes.size < FEWEST_ROWS / 2:
+        return
+    if asked is not None:
+        at = np.flatnonzero(np.diff(asked) != 0.0)
+        if float(np.isin(changes, [at - 1, at, at + 1]).mean()) > OFTEN:
+            return  # it moves when it is asked to, and is read coarsely
+    runs = np.diff(changes)
+    often = int(np.median(runs))
+    if often > 1 and float((runs % often == 0).mean()) > STEADY:
+        period_s = often * float(np.median(np.diff(time_s)))
+        yield (
+            f"the position changes every {often} rows alone: it is read every {period_s:.3g} s and written more often; "
+            "export the rows in which it was read"
         )
 
 
@@ -160,9 +267,9 @@ def _held(command_pa: Column) -> Column:
     return command_pa[np.maximum.accumulate(np.where(known, np.arange(known.size), 0))]
 
 
-def _of_sampling(time_s: Column, position_m: Column, command_pa: Column) -> Iterator[str]:
-    """Yield what is odd about when it was sampled: after the command's change, too seldom, on a historian's lines."""
-    t, x, u = time_s, position_m, command_pa
+def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[str]:
+    """Yield what is odd about when it was sampled: the stem before it is asked, too seldom."""
+    t, x, u = time_s, position_m, asked.values
     whole = np.isfinite(x) & np.isfinite(u)
     t, x, u = t[whole], x[whole], u[whole]
     if x.size < FEWEST_ROWS or np.ptp(u) == 0.0:
@@ -170,13 +277,20 @@ def _of_sampling(time_s: Column, position_m: Column, command_pa: Column) -> Iter
     dx, du = np.diff(x), np.diff(u)
     moves = np.abs(dx) > MOVED * np.ptp(x)
     period_s = float(np.median(np.diff(t)))
+    if ahead := _answered_before(x, u):
+        yield (
+            f"in {ahead[0]} of {ahead[1]} changes of the {asked.words} the stem had gone most of its way before: their "
+            "clocks differ, or one column was shifted against the other"
+        )
+        return
     changes = np.flatnonzero(np.abs(du[1:-1]) > MOVED * np.ptp(u)) + 1
     rested = changes[~moves[changes - 1]]
     early, late = int(moves[rested].sum()), int((moves[rested] | moves[rested + 1]).sum())
     if rested.size >= 5 and early > RESPONDS_TOO_EARLY * rested.size:
         yield (
-            f"in {early} of {late} answers the stem had moved by the row of the command's change: snapshots, the "
-            "command changed between them. A row's command is in force from its time: export changes with their times"
+            f"in {early} of {late} answers the stem had moved by the row of the {asked.words}'s change: snapshots, the "
+            f"{asked.words} changed between them. A row's {asked.words} is in force from its time: export changes with "
+            "their times"
         )
     begins = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
     ends = np.flatnonzero(moves & ~np.append(moves[1:], False))
@@ -185,8 +299,31 @@ def _of_sampling(time_s: Column, position_m: Column, command_pa: Column) -> Iter
             f"most moves are over within two samples, {period_s:.3g} s apart: response times and friction in motion "
             "do not show; export the raw samples, not averages"
         )
+
+
+def _answered_before(x: Column, u: Column) -> tuple[int, int] | None:
+    """Return at how many changes, of how many, the stem was past half its way the row before; None where not at most.
+
+    Its way is from where it was in the middle of the last hold to where it is in the middle of the next.
+    """
+    changes = np.flatnonzero(np.abs(np.diff(u)) > MOVED * np.ptp(u)) + 1
+    bounds = np.concatenate([[0], changes, [u.size]])
+    held = np.diff(bounds)
+    middles = x[(bounds[:-1] + bounds[1:]) // 2]
+    way = np.diff(middles)
+    told = (np.minimum(held[:-1], held[1:]) >= LONG_ROWS) & (np.abs(way) > ANSWER * np.ptp(x))
+    gone = (x[changes - 1] - middles[:-1])[told] / way[told]
+    before, of = int((gone > 0.5).sum()), int(told.sum())
+    return (before, of) if of >= FEW_JUMPS and before > 0.5 * of else None
+
+
+def _of_lines(position_m: Column) -> Iterator[str]:
+    """Yield what is odd about positions on straight lines: a historian's."""
+    x = position_m[np.isfinite(position_m)]
+    if x.size < FEWEST_ROWS:
+        return
     bends = np.abs(np.diff(x, 2)) < 1e-9 * np.ptp(x)
-    moving = np.abs(dx[1:]) > 1e-6 * np.ptp(x)
+    moving = np.abs(np.diff(x)[1:]) > 1e-6 * np.ptp(x)
     if moving.sum() > FEWEST_ROWS and float((bends & moving).sum() / moving.sum()) > STRAIGHT and x[1] != x[0]:
         yield "many positions lie on straight lines: the historian drew them between its samples; export raw samples"
 

@@ -24,7 +24,7 @@ from config.exports.time_stamps import proposed_formats
 
 Array = npt.NDArray[np.float64]
 STAMP = r"\d{4}-\d\d-\d\d"
-VOLTS = (("1-5V", 0.9, 5.1), ("0-5V", -0.1, 5.1), ("2-10V", 1.9, 10.2), ("0-10V", -0.2, 10.3))
+VOLTS = (("1-5V", 0.9, 5.1), ("0-10V", -0.2, 10.3), ("0-5V", -0.1, 5.1), ("2-10V", 1.9, 10.2))
 """Ranges of a signal in volts, by the least and the greatest of it."""
 LEAST_PER_CENT, MOST_SHARE = 3.0, 130.0
 """Between which the greatest of some numbers in % lies: below are shares of 1, or bar."""

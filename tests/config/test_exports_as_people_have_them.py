@@ -371,6 +371,10 @@ READ = {
     "seconds since 1970": Good(
         text(rows(time=[f"{1_772_698_500 + t:.1f}" for t in T])), said="recorded: 2026-03-05T08:15:00"
     ),
+    "a minus behind the number, as business programs write it": Good(
+        text(rows(pv=[f"{50.0 - x:.2f}".removeprefix("-") + ("-" if x > 50.0 else "") for x in PV - 50.0])),
+        ("time_s=t", "position_m=PV:-%", "command_pa=OUT:bar"),
+    ),
     "no time, and a period said": Good(
         text([line.partition(",")[2] for line in rows()]),
         WORDS[1:],
@@ -657,6 +661,20 @@ def test_a_clock_that_was_set_back_is_said() -> None:
     assert said in oddities(recording, STROKE_M)
 
 
+@pytest.mark.parametrize("separator", [";", ",", "\t", "|"])
+def test_what_is_proposed_is_read_with_the_separator_that_was_shown(separator: str, tmp_path: Path) -> None:
+    """The names are in the header of several readings, and the cells of one alone are numbers."""
+    other = "," if separator != "," else ";"
+    named = separator.join(["t", "PV", "OUT", f"why{other} who"])
+    lines = [named, *(f"{line}{separator}a{other} b" for line in rows(separator)[1:])]
+    (tmp_path / "a.csv").write_bytes(text([f"Trend{other} t{other} PV{other} OUT", *lines]))
+    found = preview(tmp_path / "a.csv")
+    sources = read_mapping([word for word in found.words if "=" in word])
+    recording = read_export(tmp_path / "a.csv", sources, STROKE_M)
+    np.testing.assert_allclose(recording.time_s, T, atol=1e-6)
+    np.testing.assert_allclose(recording.position_m, STROKE_M * PV / 100, rtol=1e-6)
+
+
 def beside(header: str, *cells: str) -> list[str]:
     """Return a text file of ISO times and, in every row, these cells."""
     return [header, *(",".join((stamp, *cells)) for stamp in ISO)]
@@ -699,6 +717,34 @@ PROPOSED = {
     "units in words behind a point or a space": (
         rows(header="Zeit,Hub.Prozent,Stelldruck mbar"),
         "--column time_s=Zeit --column position_m=Hub.Prozent:% --column command_pa=Stelldruck mbar:mbar",
+    ),
+    "French": (
+        rows(";", header="Temps;Consigne (%);Position vanne (%)"),
+        "--column time_s=Temps --column position_m=Position vanne (%):% --column reference_m=Consigne (%):%",
+    ),
+    "Spanish": (
+        rows(";", header="Tiempo;Salida (%);Posición válvula (%)"),
+        "--column time_s=Tiempo --column position_m=Posición válvula (%):% --column command_pa=Salida (%):%",
+    ),
+    "Italian": (
+        rows(";", header="Data e ora;Uscita (%);Posizione (%)"),
+        "--column time_s=Data e ora --column position_m=Posizione (%):% --column command_pa=Uscita (%):%",
+    ),
+    "Polish": (
+        rows(";", header="Czas;Sygnał (%);Położenie (%)"),
+        "--column time_s=Czas --column position_m=Położenie (%):% --column command_pa=Sygnał (%):%",
+    ),
+    "a time in a language that nobody has listed": (
+        rows(";", header="Aeg;Hub [mm];Stelldruck [bar]"),
+        "--column time_s=Aeg --column position_m=Hub [mm]:mm --column command_pa=Stelldruck [bar]:bar",
+    ),
+    "no time": (
+        [line.partition(",")[2] for line in rows(header="t,Hub [mm],Stelldruck [bar]")],
+        "--period-s S --column position_m=Hub [mm]:mm --column command_pa=Stelldruck [bar]:bar",
+    ),
+    "volts": (
+        rows(header="t,Hub [V],Stelldruck [bar]", pv=[f"{0.1 * x:.3f}" for x in PV]),
+        "--column time_s=t --column position_m=Hub [V]:0-10V --column command_pa=Stelldruck [bar]:bar",
     ),
     "a clock in milliseconds": (
         rows(time=[f"{1e3 * (1_772_612_100 + t):.0f}" for t in T], header="ts,PV,OP"),

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from config.drive import KINDS
 from config.exports.plausibility import oddities
-from config.recording import Column, Recording
+from config.recording import KIND, Column, Recording
 
 T = np.arange(0.0, 60.0, 0.05)
 RNG = np.random.default_rng(1)
@@ -63,3 +64,61 @@ def test_a_command_that_is_kept_with_its_changes_alone_did_not_change_between_sa
     kept = np.where(np.diff(COMMAND, prepend=0.0) != 0.0, COMMAND, np.nan)
     position_m = answered(COMMAND)
     assert oddities(recording(command_pa=kept, position_m=position_m), 0.04) == ["98 % of command_pa is missing"]
+
+
+SETPOINT = 0.04 * np.repeat(RNG.uniform(0.1, 0.9, 30), 40)
+TRAVEL = answered(2e4 + 2e6 * SETPOINT)
+
+
+def behind_a_positioner(**columns: Column) -> Recording:
+    return Recording({"time_s": T, "reference_m": SETPOINT, "position_m": TRAVEL} | columns)
+
+
+def test_a_sound_record_of_set_point_and_travel_is_left_alone() -> None:
+    assert oddities(behind_a_positioner(), 0.04) == []
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"reference_m": np.full(T.size, 0.02)}, "the set point is 0.02 m throughout"),
+        ({"position_m": 0.04 - TRAVEL}, "the higher the set point, the lower the position"),
+        ({"position_m": SETPOINT}, "set point and position are one signal, to the last digit"),
+        (
+            {"position_m": SETPOINT, "reference_m": TRAVEL},
+            "the set point changes in 100 % of the rows, .* do their columns stand in each other's place",
+        ),
+        ({"position_m": 0.01 * TRAVEL}, "are both in the same unit, a share of 1, % or mm"),
+        ({"position_m": np.interp(T, T[::13], TRAVEL[::13])}, "lie on straight lines"),
+        ({"position_m": np.roll(TRAVEL, -6)}, "changes of the set point the stem had gone most of its way before"),
+        ({"position_m": np.repeat(TRAVEL[::5], 5)}, "the position changes every 5 rows alone: it is read every 0.25 s"),
+    ],
+)
+def test_what_is_odd_of_set_point_and_travel_is_said(columns: dict[str, Column], said: str) -> None:
+    import re
+
+    found = oddities(behind_a_positioner(**columns))
+    assert any(re.search(said, each) for each in found), found
+
+
+def test_the_stem_before_its_command_is_said_too() -> None:
+    found = oddities(recording(position_m=np.roll(answered(COMMAND), -6)), 0.04)
+    assert any("changes of the command the stem had gone most of its way before" in each for each in found), found
+
+
+def test_a_register_read_without_its_sign_is_said() -> None:
+    counts = np.round(3e4 * np.sin(T / 3.0))
+    found = oddities(recording(position_m=1e-6 * np.where(counts < 0, counts + 65536, counts)))
+    assert any("a register of 16 bits read without its sign" in each for each in found), found
+    assert not any("register" in each for each in oddities(recording(position_m=1e-6 * counts)))
+
+
+def test_a_drive_that_is_never_driven_is_said() -> None:
+    told = {KIND: next(each for each in KINDS if each != "valve")}
+    still = Recording({"time_s": T, "command_pa": np.zeros(T.size), "position_m": TRAVEL}, told)
+    assert any("throughout: a stem that is not driven says nothing" in each for each in oddities(still))
+
+
+def test_a_coarse_sensor_of_a_stem_that_steps_as_it_is_asked_is_no_slow_reading() -> None:
+    stepped = np.round(np.roll(SETPOINT, 1), 4)
+    assert not any("it is read every" in each for each in oddities(behind_a_positioner(position_m=stepped)))
