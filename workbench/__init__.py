@@ -21,6 +21,7 @@ Its rooms, each on those before it:
     blind          recordings with an effect that nobody knows
     report         all of it for a browser
     fleet          many valves at once
+    loops          control loops without a stem signal
 """
 
 from config.recording import Recording

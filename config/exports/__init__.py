@@ -25,6 +25,7 @@ From the file to the recording:
     plausibility                            what is odd about a recording, before anything is fitted to it
     column_names, proposal                  what columns are called, by language and trade; words that may read them
     control_loop                            whether it is a loop's, OP, PV and SP, and tells of no stem
+    loop_reader                             a loop read: time, OP, PV, SP and mode
     column_preview, export_preview          what a file holds, looked at by the code that reads it
     import_questions, mapping_file          what they leave open, asked; the answers, kept in a file for next time
 """

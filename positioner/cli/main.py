@@ -40,6 +40,7 @@ COMMANDS = (
     "discover",
     "extend",
     "fleet",
+    "loop",
     "workbench",
     "page",
     "reproduce",

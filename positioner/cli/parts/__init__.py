@@ -9,6 +9,7 @@ A command imports from here what it needs when it runs.
     hidden_demo                                 `demo --hidden`: an effect found in the daemon's own recording
     csv_series, export_arguments, naming        series, historian's exports, and names of files in messages
     noise_argument, pressure_argument           `--noise-m`; `--from-pressure`
+    loop_arguments                              the columns of a control loop
     model_arguments                             a valve file and effects, checked before the work begins
     diagnose_forces, next_step                  `diagnose` on a bench's recording; what to type after a diagnosis
     extended_valves                             `[law] valve` of a daemon's file, worked out

@@ -1,0 +1,34 @@
+"""`positioner loop`: does the valve of a control loop stick, from OP, PV and SP alone."""
+
+import argparse
+from pathlib import Path
+
+from positioner.cli.parts.loop_arguments import add_loop_arguments, read_record
+from positioner.cli.parts.output_files import writable, write_json
+
+HELP = "does a loop's valve stick, from OP, PV and SP alone; exit status 1 where it sticks or cannot be told"
+EXAMPLE = "positioner loop FIC101.csv --report loop.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.add_argument("recording", type=Path, nargs="+", metavar="REC", help="a historian's export: time, OP, PV, SP")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON, a list")
+    add_loop_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the verdict of each loop; 0 if every valve is without fault, else 1."""
+    from positioner.cli.parts.progress import at_work
+    from workbench.loops import diagnose_loop
+
+    writable(arguments.json, "--json")
+    found = []
+    for path in arguments.recording:
+        record = read_record(path, arguments)
+        with at_work("loop", f"holding causes against each other on {record.pv.size} samples"):
+            found.append(diagnose_loop(record))
+        print(found[-1].summary())
+    if arguments.json is not None:
+        write_json(arguments.json, [each.as_json() for each in found])
+    return 0 if all(each.verdict == "something else" for each in found) else 1

@@ -1,0 +1,50 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.drawn_loops import draw_loop
+from positioner.cli.main import main
+
+LOOP = draw_loop(10, "sticks")
+
+
+def written(path: Path, header: str, *columns: np.ndarray, delimiter: str = ",") -> Path:
+    np.savetxt(path, np.column_stack(columns), "%.4f", delimiter, header=header, comments="")
+    return path
+
+
+def test_a_loop_goes_from_its_export_to_a_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    columns = (LOOP.time_s, LOOP.sp, LOOP.pv, LOOP.op_pct)
+    export = written(tmp_path / "a.csv", "Time;FIC101.SP;FIC101.PV;FIC101.OP", *columns, delimiter=";")
+    assert main(["loop", str(export), "--json", str(tmp_path / "a.json")]) == 1
+    (found,) = json.loads((tmp_path / "a.json").read_text())
+    assert found["verdict"] == "sticks"
+    assert found["stiction_pct_95"][0] < LOOP.truth.stiction_pct < found["stiction_pct_95"][1]
+    assert "the valve sticks" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "words", "said"),
+    [
+        ("t,a,b", 1.0, [], "no loop is recognised"),
+        ("t,a,b", 276.48, ["--time", "t", "--op", "a", "--pv", "b"], "--op-range 0 27648"),
+    ],
+)
+def test_what_a_file_leaves_open_is_said_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], header: str, factor: float, words: list[str], said: str
+) -> None:
+    export = written(tmp_path / "a.csv", header, LOOP.time_s, factor * LOOP.op_pct, LOOP.pv)
+    assert main(["loop", str(export), *words]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_counts_are_read_by_the_range_that_a_person_says(tmp_path: Path) -> None:
+    export = written(tmp_path / "a.csv", "t,a,b", LOOP.time_s, 276.48 * LOOP.op_pct, LOOP.pv)
+    words = ["--time", "t", "--op", "a", "--pv", "b", "--op-range", "0", "27648", "--json", str(tmp_path / "a.json")]
+    main(["loop", str(export), *words])
+    (found,) = json.loads((tmp_path / "a.json").read_text())
+    assert found["stiction_pct"] == pytest.approx(LOOP.truth.stiction_pct, rel=0.2)

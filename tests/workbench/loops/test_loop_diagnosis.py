@@ -1,0 +1,60 @@
+"""Drawn loops with truth, by equations that are not the product's (`benchmarks.drawn_loops`)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.drawn_loops import DrawnLoop, draw_loop
+from workbench.loops import LoopDiagnosis, LoopRecord, diagnose_loop
+
+
+def record_of(loop: DrawnLoop) -> LoopRecord:
+    return LoopRecord.of_samples("FIC1", loop.time_s, loop.op_pct, loop.pv, loop.sp)
+
+
+def diagnosed(seed: int, cause: str) -> tuple[DrawnLoop, LoopDiagnosis]:
+    loop = draw_loop(seed, cause)
+    return loop, diagnose_loop(record_of(loop))
+
+
+@pytest.mark.parametrize("seed", [10, 13])
+def test_a_sticking_valve_is_called_so_and_how_much(seed: int) -> None:
+    loop, found = diagnosed(seed, "sticks")
+    assert found.verdict == "sticks"
+    assert found.causes is not None
+    assert found.causes.friction is not None
+    friction = found.causes.friction
+    assert friction.low_pct < loop.truth.stiction_pct < friction.high_pct
+    assert friction.stiction_pct == pytest.approx(loop.truth.stiction_pct, rel=0.2)
+
+
+@pytest.mark.parametrize("cause", ["tight tuning", "external sine", "external noise", "nonlinear process"])
+def test_another_cause_is_not_called_sticking(cause: str) -> None:
+    assert diagnosed(7, cause)[1].verdict != "sticks"
+
+
+@pytest.mark.parametrize(
+    ("code", "broken"),
+    [
+        ("manual", lambda r: replace(r, op_pct=np.full(r.op_pct.size, 40.0))),
+        ("manual", lambda r: replace(r, automatic=np.arange(r.pv.size) > r.pv.size // 2)),
+        ("saturated", lambda r: replace(r, op_pct=np.clip(50.0 + 40.0 * (r.op_pct - r.op_pct.mean()), 0.0, 100.0))),
+        ("rounded", lambda r: replace(r, pv=np.round((r.pv - r.pv.min()) / np.ptp(r.pv) * 5.0))),
+        ("short", lambda r: replace(r, op_pct=r.op_pct[:80], pv=r.pv[:80], sp=None)),
+        ("missing", lambda r: replace(r, missing=0.2)),
+    ],
+)
+def test_what_a_record_cannot_tell_is_said_and_what_to_record_instead(code, broken) -> None:  # type: ignore[no-untyped-def]
+    found = diagnose_loop(broken(record_of(draw_loop(10, "sticks"))))
+    assert found.verdict == "cannot be told"
+    assert code in [each.code for each in found.gates]
+    assert all(each.instead for each in found.gates)
+    assert "insufficient" in found.sentence
+
+
+def test_lines_that_a_historian_drew_are_seen() -> None:
+    record = record_of(draw_loop(10, "sticks"))
+    rows = np.arange(record.pv.size)
+    drawn = replace(record, pv=np.interp(rows, rows[::12], record.pv[::12]))
+    assert "compressed" in [each.code for each in diagnose_loop(drawn).gates]

@@ -1,0 +1,45 @@
+"""From evidence to the probability that the valve sticks, calibrated by loop.
+
+    p = 1 / (1 + exp(-(b_0 + b_1 log(1 + E) + b_2 q)))
+
+E evidence for friction, nats (0 where it is negative); q share of the output's span that the apparent stiction is:
+friction of a tenth of the span is seldom what moves the loop. Fitted on drawn loops, each counted once, half of them
+sticking; `python -m benchmarks.loops --calibrate` prints the numbers.
+"""
+
+from dataclasses import dataclass
+from math import exp, log1p
+
+import numpy as np
+
+from workbench.loops.loop_record import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The three numbers."""
+
+    constant: float
+    of_evidence: float
+    of_share: float
+
+    def probability(self, evidence: float, share: float) -> float:
+        """Return p, 0 to 1."""
+        weighted = self.constant + self.of_evidence * log1p(max(evidence, 0.0)) + self.of_share * share
+        return 1.0 / (1.0 + exp(-min(max(weighted, -30.0), 30.0)))
+
+
+CALIBRATION = Calibration(constant=-3.0, of_evidence=1.0, of_share=2.0)
+
+
+def calibrate(evidence: Array, share: Array, sticks: Array) -> Calibration:
+    """Return the calibration of n loops, (n,) each; `sticks` is 1 or 0. By Newton's method, weakly regularised."""
+    features = np.column_stack([np.ones(evidence.size), np.log1p(np.maximum(evidence, 0.0)), share])
+    weights = np.zeros(3)
+    penalty = np.diag([0.0, 0.05, 0.05])
+    for _ in range(50):
+        found = 1.0 / (1.0 + np.exp(-np.clip(features @ weights, -30.0, 30.0)))
+        slope = features.T @ (sticks - found) - penalty @ weights
+        curvature = (features * (found * (1.0 - found))[:, None]).T @ features + penalty
+        weights = weights + np.linalg.solve(curvature, slope)
+    return Calibration(*weights.tolist())

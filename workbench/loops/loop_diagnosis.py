@@ -1,0 +1,222 @@
+"""The verdict on one loop: it sticks (how much), something else (what), or it cannot be told (why, what would tell)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from config.extras import needed
+from config.results.block import Block, Table
+from config.results.result import Result
+from workbench.loops.calibration import CALIBRATION
+from workbench.loops.causes import Causes, hold_causes
+from workbench.loops.controller_law import ControllerLaw, see_law
+from workbench.loops.loop_record import LoopRecord
+from workbench.loops.oscillation import Oscillation, find_oscillation
+from workbench.loops.quality_gates import Gate, closed_gates
+from workbench.loops.shape_methods import Vote, votes
+from workbench.loops.thresholds import LIMITS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Verdict = Literal["sticks", "something else", "cannot be told"]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class LoopDiagnosis(Result):
+    """What is said of a loop.
+
+    Attributes:
+        record: of the loop.
+        verdict: one of three.
+        cause: what it is, where the valve does not stick; "" where nothing is named.
+        probability: that the valve sticks; None where the record is insufficient.
+        oscillation, setpoint: of PV, and of SP; None where there is none or it stands.
+        law: the controller's.
+        gates: why the record is insufficient.
+        causes: as they were held against each other; None where the record is insufficient.
+        votes: of the literature's methods.
+        sensitivity: greatest |1/(1+L)| of the identified loop, and its period, s; None where the law is not seen.
+    """
+
+    record: LoopRecord
+    verdict: Verdict
+    cause: str
+    probability: float | None
+    oscillation: Oscillation
+    setpoint: Oscillation | None
+    law: ControllerLaw
+    gates: tuple[Gate, ...]
+    causes: Causes | None
+    votes: tuple[Vote, ...]
+    sensitivity: tuple[float, float] | None
+
+    @property
+    def variance_cost(self) -> float:
+        """Standard deviation of PV against its set point, in shares of PV's or SP's typical size."""
+        error = self.record.pv - (self.record.pv.mean() if self.record.sp is None else self.record.sp)
+        return float(error.std() / max(abs(float(self.record.pv.mean())), 1e-12))
+
+    @property
+    def sentence(self) -> str:
+        """The whole in one line."""
+        if self.verdict == "sticks":
+            assert self.causes is not None
+            assert self.causes.friction is not None
+            assert self.probability is not None
+            each = self.causes.friction
+            return (
+                f"{self.record.name}: the valve sticks ({100 * self.probability:.0f} %): apparent stiction "
+                f"{each.stiction_pct:.2g} % of the output ({each.low_pct:.2g} to {each.high_pct:.2g}), "
+                f"slip jump {each.slip_jump_pct:.2g} %"
+            )
+        if self.verdict == "something else":
+            return f"{self.record.name}: not the valve's friction: {self.cause}"
+        if self.gates:
+            said = "; ".join(each.says for each in self.gates)
+            instead = "; ".join(dict.fromkeys(each.instead for each in self.gates))
+            return f"{self.record.name}: insufficient: {said}; record {instead}"
+        return f"{self.record.name}: cannot be told ({100 * (self.probability or 0.0):.0f} % sticks): {OPEN}"
+
+    def blocks(self) -> list[Block]:
+        """Return the verdict, the causes, and the votes beside it."""
+        said: list[Block] = [self.sentence, *self.record.notes, self._motion(), self._law()]
+        if self.causes is not None:
+            least = min(self.causes.costs.values())
+            said.append(
+                Table(
+                    ("cause", "behind the best, nats"),
+                    [(name, f"{cost - least:.1f}") for name, cost in sorted(self.causes.costs.items(), key=_second)],
+                )
+            )
+        said.append(
+            Table(("method of the literature", "index", ""), [(v.method, f"{v.index:.2f}", v.says) for v in self.votes])
+        )
+        return said
+
+    def _motion(self) -> str:
+        each, record = self.oscillation, self.record
+        kind = "oscillates" if each.regular else "does not oscillate regularly"
+        return (
+            f"PV {kind}: period {each.period_s:.4g} s, regularity {each.regularity:.1f} (from "
+            f"{LIMITS.regular:g} on regular), {each.cycles:.0f} cycles, a sample each {record.period_s:g} s"
+        )
+
+    def _law(self) -> str:
+        law = self.law
+        if not law.seen:
+            return f"controller: no PI law is seen in the output ({100 * law.explained:.0f} % of its changes)"
+        return (
+            f"controller: gain {law.gain:.3g} % a unit of PV, reset time {law.reset_s:.4g} s, "
+            f"{100 * law.explained:.0f} % of the output's changes"
+        )
+
+    def frame_columns(self) -> Mapping[str, Any]:
+        """Return the record."""
+        record = self.record
+        columns = {
+            "time_s": record.time_s + record.period_s * np.arange(record.pv.size),
+            "op_pct": record.op_pct,
+            "pv": record.pv,
+        }
+        return columns if record.sp is None else columns | {"sp": record.sp}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the verdict for other programs."""
+        friction = self.causes.friction if self.causes else None
+        return {
+            "loop": self.record.name,
+            "verdict": self.verdict,
+            "cause": self.cause,
+            "probability_sticks": self.probability,
+            "stiction_pct": friction.stiction_pct if friction else None,
+            "stiction_pct_95": [friction.low_pct, friction.high_pct] if friction else None,
+            "slip_jump_pct": friction.slip_jump_pct if friction else None,
+            "evidence_nats": self.causes.evidence if self.causes else None,
+            "costs_nats": self.causes.costs if self.causes else {},
+            "period_s": self.oscillation.period_s,
+            "regularity": self.oscillation.regularity,
+            "variance_cost": self.variance_cost,
+            "controller": {"gain": self.law.gain, "reset_s": self.law.reset_s, "explained": self.law.explained},
+            "insufficient": [{"code": g.code, "says": g.says, "instead": g.instead} for g in self.gates],
+            "votes": {vote.method: {"index": vote.index, "says": vote.says} for vote in self.votes},
+            "sentence": self.sentence,
+        }
+
+    def plot(self) -> "Figure":
+        """Return OP and PV over time, and PV over OP."""
+        pyplot = needed("matplotlib.pyplot", "plot")
+        columns = self.frame_columns()
+        figure, (over_time, over_output) = pyplot.subplots(1, 2, figsize=(11, 3.6), width_ratios=(2.2, 1))
+        over_time.plot(columns["time_s"], columns["op_pct"])
+        over_time.set(xlabel="time, s", ylabel="OP, %")
+        over_time.twinx().plot(columns["time_s"], columns["pv"], color="tab:orange")
+        over_output.plot(columns["op_pct"], columns["pv"], linewidth=0.6)
+        over_output.set(xlabel="OP, %", ylabel="PV")
+        figure.suptitle(self.sentence)
+        return figure  # type: ignore[no-any-return]
+
+
+OPEN = "a record with larger moves, or 20 more cycles, would tell; so would the stem's own position"
+
+
+def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
+    """Return what is said of a loop's record."""
+    oscillation = find_oscillation(record.pv, record.period_s)
+    law = see_law(record)
+    setpoint = None
+    if record.sp is not None and record.sp.var() > LIMITS.setpoint_moves * record.pv.var():
+        setpoint = find_oscillation(record.sp, record.period_s)
+    gates = closed_gates(record, oscillation)
+    said = votes(record, oscillation) if np.ptp(record.op_pct) > 0.0 else ()
+    if gates:
+        return LoopDiagnosis(record, "cannot be told", "", None, oscillation, setpoint, law, gates, None, said, None)
+    causes = hold_causes(record, oscillation, law.action)
+    share = causes.friction.share if causes.friction else 0.0
+    probability = CALIBRATION.probability(causes.evidence, share)
+    sensitivity = sensitivity_of(law, causes, record.period_s) if law.seen else None
+    verdict: Verdict = "cannot be told"
+    cause = ""
+    if probability >= LIMITS.sticks_probability and causes.friction:
+        verdict = "sticks"
+    elif probability <= LIMITS.other_probability:
+        verdict, cause = "something else", _other(oscillation, setpoint, causes, sensitivity)
+    return LoopDiagnosis(
+        record, verdict, cause, probability, oscillation, setpoint, law, gates, causes, said, sensitivity
+    )
+
+
+def _other(
+    oscillation: Oscillation, setpoint: Oscillation | None, causes: Causes, sensitivity: tuple[float, float] | None
+) -> str:
+    """Return what else moves a loop whose valve does not stick."""
+    if setpoint is not None:
+        return "PV follows a set point that moves"
+    if not oscillation.regular:
+        return "irregular disturbances, which the valve answers"
+    if sensitivity is not None and sensitivity[0] > LIMITS.tight_sensitivity:
+        ratio = sensitivity[1] / oscillation.period_s
+        if 1.0 / LIMITS.tight_period < ratio < LIMITS.tight_period:
+            return f"tight tuning: the loop swings by itself (sensitivity {sensitivity[0]:.0f})"
+    curved = causes.costs["linear"] - causes.costs["nonlinear"] > 2.0 * LIMITS.interval_cost
+    return "a regular disturbance from outside" + (", through a curved process or valve" if curved else "")
+
+
+def sensitivity_of(law: ControllerLaw, causes: Causes, period_s: float) -> tuple[float, float]:
+    """Return the greatest |1 / (1 + C G)| of the identified loop, and the period at which it stands, s.
+
+    C = K (1 + 1/(T_i s)), G = g exp(-theta s) / (1 + T s); half a sampling period is added to the dead time.
+    """
+    angular = 2.0 * np.pi / np.geomspace(2.0 * period_s, 4000.0 * period_s, 2000)
+    s = 1j * angular
+    integral = 1.0 / (law.reset_s * s) if np.isfinite(law.reset_s) else 0.0
+    loop = law.gain * (1.0 + integral) * causes.gain * np.exp(-s * (causes.delay_s + 0.5 * period_s))
+    sensitivity = np.abs(1.0 / (1.0 + loop / (1.0 + causes.lag_s * s)))
+    at = int(np.argmax(sensitivity))
+    return float(sensitivity[at]), float(2.0 * np.pi / angular[at])
+
+
+def _second(item: tuple[str, float]) -> float:
+    return item[1]

@@ -1,0 +1,65 @@
+"""Every number by which something of a loop is decided, with its unit and its reason.
+
+`python -m benchmarks.loops` prints what they lead to.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Of the whole room; each reason stands under its number."""
+
+    fewest_samples: int = 100
+    """Below it a lag, a dead time and a disturbance have less than 20 samples each."""
+    fewest_cycles: float = 4.0
+    """Cycles: a regular oscillation shows from some four on (Thornhill 2003 asks for ten half periods)."""
+    fewest_a_cycle: float = 8.0
+    """Samples: below it rest and slip of one half cycle share a sample."""
+    gap_periods: float = 5.0
+    """Sampling periods without a sample that part a record."""
+    most_missing: float = 0.05
+    """Share of samples without a value, beyond which what is filled in would count."""
+    most_manual: float = 0.2
+    """Share of the record in manual: OP is then no answer to PV."""
+    most_saturated: float = 0.2
+    """Share of samples at a limit of OP: the controller is then not in charge."""
+    saturation_pct: float = 0.1
+    """% of OP from 0 or 100: the resolution of a controller's limit."""
+    most_straight: float = 0.5
+    """Share of moving samples exactly on a straight line, from which on a historian drew them."""
+    straight_tolerance: float = 1e-6
+    """Of the signal's span: what counts as exactly straight; stored numbers have six to seven digits."""
+    fewest_levels: int = 10
+    """Distinct values over the span of a signal: stiction is told from rounding only when it is several of them."""
+    setpoint_moves: float = 0.25
+    """Of the variance of PV, from which on the set point is said to move."""
+    regular: float = 1.0
+    """Mean over three standard deviations of the zero crossings' distance: Thornhill's limit of an oscillation."""
+    rows_a_cycle: float = 24.0
+    """Rows a cycle in which causes are compared: a third of one is then a dead time of eight rows."""
+    stem_rows_a_cycle: float = 120.0
+    """Rows a cycle in which the stem is told its output: a slip is found to 3 degrees."""
+    most_rows: int = 4000
+    """Of the comparison, 170 cycles: seconds of a processor."""
+    disturbance_order: int = 4
+    """Of the autoregressive disturbance: two resonances, an oscillation from outside and its harmonic or a drift."""
+    law_is_seen: float = 0.5
+    """Share of OP's changes that a PI law explains, from which on the law is taken as seen."""
+    tight_sensitivity: float = 4.0
+    """Greatest |1/(1+L)|: ordinary tuning has 1.4 to 2; at 4 the loop swings by itself (gain margin 1.33)."""
+    tight_period: float = 1.5
+    """Ratio of the oscillation's period to that of the greatest sensitivity within which they are one."""
+    sticks_probability: float = 0.95
+    """At which a loop is called sticking: the stated error rate is one less it."""
+    other_probability: float = 0.25
+    """Below which another cause is named: about the prevalence in plants, so the record has spoken against friction."""
+    interval_cost: float = 1.92
+    """Nats by which the likelihood may fall inside a 95 % interval: half the chi-square of one parameter."""
+    least_interval: float = 0.2
+    """Half width of an interval of S at least, logarithm: 95 % of the drawn loops called sticking lie within."""
+    together_period: float = 0.05
+    """Relative difference of periods below which loops oscillate together."""
+
+
+LIMITS = Thresholds()
