@@ -118,7 +118,7 @@ def simulate(  # noqa: C901, PLR0912, PLR0915  one compiled function
             elif stem == 1:
                 delta = u - last
                 now = (delta > 0.0) - (delta < 0.0)
-                if now not in (0, way):
+                if now * (now - way) != 0.0:
                     moving = False
                     way = now
                     stop = last
