@@ -7,8 +7,8 @@ forces; the processes are stepped ten times a sample.
            ^                                                   disturbance --^       |
            +------------------------ noise, quantum, sampling -----------------------+
 
-    choudhury   stem rests until the output has gone S since it stopped or turned, then jumps by J and follows (2005)
-    kano        the same written with the state of the last stop (2004)
+    choudhury   where the output turns the stem stops; it goes on after J the same way or S back, and follows (2005)
+    kano        the same, and it also stops where the output stands still (2004)
     he          rests while |OP - x| <= f_s, then lands at OP -+ f_d; S = f_s + f_d, J = f_s - f_d (2007)
     forces      mass, spring, Coulomb and static friction; S and J as the forces imply
 """
@@ -93,7 +93,7 @@ def simulate(  # noqa: C901, PLR0912, PLR0915  one compiled function
     integral = 50.0
     # of the stems
     stop = 50.0
-    way = 0.0
+    way = 1.0
     moving = False
     last = 50.0
     speed = 0.0
@@ -112,35 +112,19 @@ def simulate(  # noqa: C901, PLR0912, PLR0915  one compiled function
             u = round(u / op_quantum) * op_quantum
         op[n] = u
         pv[n] = measured
-        for _ in range(STEPS):
+        for step in range(STEPS):
             if stem == 0:
                 x = u
-            elif stem == 1:
-                delta = u - last
-                now = (delta > 0.0) - (delta < 0.0)
-                if now * (now - way) != 0.0:
+            elif stem in (1, 2):
+                # Kano's stem also stops where the output stands still, Choudhury's only where it turns.
+                onward = way * (u - last)
+                if moving and (onward < 0.0 or (stem == 2 and onward == 0.0)) and step == 0:
                     moving = False
-                    way = now
                     stop = last
-                if not moving and abs(u - stop) > stiction:
+                if not moving and way * (u - stop) > jump:
                     moving = True
-                if moving:
-                    x = u - way * f_d
-                last = u
-            elif stem == 2:
-                if not moving:
-                    if way * (u - stop) > stiction or (way == 0.0 and abs(u - stop) > f_s):
-                        if way == 0.0:
-                            way = 1.0 if u > stop else -1.0
-                        moving = True
-                    elif way * (u - stop) < 0.0:
-                        way = -way
-                        stop = u if abs(u - x) < f_d else stop
-                    if way != 0.0 and way * (u - x) > f_s:
-                        moving = True
-                elif way * (u - last) < 0.0:
-                    moving = False
-                    stop = last
+                elif not moving and way * (u - stop) < -stiction:
+                    moving = True
                     way = -way
                 if moving:
                     x = u - way * f_d

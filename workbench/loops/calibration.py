@@ -2,8 +2,8 @@
 
     p = 1 / (1 + exp(-(b_0 + b_1 log(1 + E) + b_2 q)))
 
-E evidence for friction, nats (0 where it is negative); q share of the output's span that the apparent stiction is:
-friction of a tenth of the span is seldom what moves the loop. Fitted on drawn loops, each counted once, half of them
+E evidence for friction, nats (0 where it is negative); q its share of all that the output explains of PV, 0 to 1: a
+small share of much is what a wrong model of the process leaves. Fitted on drawn loops, each counted once, half of them
 sticking; `python -m benchmarks.loops --calibrate` prints the numbers.
 """
 
@@ -29,7 +29,7 @@ class Calibration:
         return 1.0 / (1.0 + exp(-min(max(weighted, -30.0), 30.0)))
 
 
-CALIBRATION = Calibration(constant=-3.0, of_evidence=1.0, of_share=2.0)
+CALIBRATION = Calibration(constant=-2.5, of_evidence=0.5, of_share=5.5)
 
 
 def calibrate(evidence: Array, share: Array, sticks: Array) -> Calibration:

@@ -76,6 +76,12 @@ class Causes:
         """What friction is better by than the best of the others, nats."""
         return min(cost for name, cost in self.costs.items() if name != "friction") - self.costs["friction"]
 
+    @property
+    def share(self) -> float:
+        """What friction alone explains, of all that the output explains of PV with it, 0 to 1."""
+        explained = self.costs["disturbance"] - self.costs["friction"]
+        return min(1.0, max(0.0, self.evidence) / explained) if np.isfinite(explained) and explained > 0.0 else 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Rows:

@@ -33,7 +33,7 @@ class LoopDiagnosis(Result):
         verdict: one of three.
         cause: what it is, where the valve does not stick; "" where nothing is named.
         probability: that the valve sticks; None where the record is insufficient.
-        oscillation, setpoint: of PV, and of SP; None where there is none or it stands.
+        oscillation, setpoint: of OP, which has PV's period and less noise, and of SP; None where there is none or it stands.
         law: the controller's.
         gates: why the record is insufficient.
         causes: as they were held against each other; None where the record is insufficient.
@@ -100,7 +100,7 @@ class LoopDiagnosis(Result):
         each, record = self.oscillation, self.record
         kind = "oscillates" if each.regular else "does not oscillate regularly"
         return (
-            f"PV {kind}: period {each.period_s:.4g} s, regularity {each.regularity:.1f} (from "
+            f"the loop {kind}: period {each.period_s:.4g} s, regularity {each.regularity:.1f} (from "
             f"{LIMITS.regular:g} on regular), {each.cycles:.0f} cycles, a sample each {record.period_s:g} s"
         )
 
@@ -164,7 +164,7 @@ OPEN = "a record with larger moves, or 20 more cycles, would tell; so would the 
 
 def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
     """Return what is said of a loop's record."""
-    oscillation = find_oscillation(record.pv, record.period_s)
+    oscillation = find_oscillation(record.op_pct, record.period_s)
     law = see_law(record)
     setpoint = None
     if record.sp is not None and record.sp.var() > LIMITS.setpoint_moves * record.pv.var():
@@ -174,8 +174,7 @@ def diagnose_loop(record: LoopRecord) -> LoopDiagnosis:
     if gates:
         return LoopDiagnosis(record, "cannot be told", "", None, oscillation, setpoint, law, gates, None, said, None)
     causes = hold_causes(record, oscillation, law.action)
-    share = causes.friction.share if causes.friction else 0.0
-    probability = CALIBRATION.probability(causes.evidence, share)
+    probability = CALIBRATION.probability(causes.evidence, causes.share)
     sensitivity = sensitivity_of(law, causes, record.period_s) if law.seen else None
     verdict: Verdict = "cannot be told"
     cause = ""
