@@ -33,7 +33,7 @@ class LoopDiagnosis(Result):
         verdict: one of three.
         cause: what it is, where the valve does not stick; "" where nothing is named.
         probability: that the valve sticks; None where the record is insufficient.
-        oscillation, setpoint: of OP, which has PV's period and less noise, and of SP; None where there is none or it stands.
+        oscillation, setpoint: of OP, which has PV's period and less noise, and of SP; None where SP stands.
         law: the controller's.
         gates: why the record is insufficient.
         causes: as they were held against each other; None where the record is insufficient.
