@@ -222,7 +222,7 @@ def draw_loop(seed: int, cause: str, run: Simulate = simulate) -> DrawnLoop:
     begin = samples // 10
     offset = float(rng.uniform(20.0, 200.0))
     truth = Truth(cause, STEMS[stem], stiction, jump, integrating, period_s, seed)
-    time_s = period_s * np.arange(samples - begin)
+    time_s = np.asarray(period_s * np.arange(samples - begin), np.float64)
     return DrawnLoop(truth, time_s, op[begin:], pv[begin:] + offset, sp[begin:] + offset)
 
 
