@@ -45,7 +45,7 @@ def find_groups(
     try:
         header = _in_one_table(path, tables, names, clock)
     except ColumnMissing as missing:
-        apart = [] if clock is None else _in_tables_of_their_own(path, tables, clock, wanted, status)
+        apart = _in_tables_of_their_own(path, tables, clock, wanted, status)
         if not apart:
             raise missing from None
         return apart
@@ -121,7 +121,7 @@ def _cells(rows: Sequence[Sequence[Cell]], index: int) -> list[Cell]:
 
 
 def _in_tables_of_their_own(
-    path: Path, tables: Sequence[RawTable], clock: str, wanted: Sequence[str], status: Sequence[str]
+    path: Path, tables: Sequence[RawTable], clock: str | None, wanted: Sequence[str], status: Sequence[str]
 ) -> list[Header]:
     """Return where each column is with a clock of its own table; nothing where one is nowhere."""
     found: dict[object, Header] = {}
@@ -140,9 +140,13 @@ def _status_in(header: Header, status: Sequence[str]) -> dict[str, tuple[int, ..
     return {name: (at[0],) for name, at in places.items() if at}
 
 
-def _with_its_clock(path: Path, tables: Sequence[RawTable], clock: str, name: str) -> tuple[object, Header] | None:
+def _with_its_clock(
+    path: Path, tables: Sequence[RawTable], clock: str | None, name: str
+) -> tuple[object, Header] | None:
     """Return what tells the table that a column is in, and where it is there with its clock; None if none has it."""
     for number, table in enumerate(tables):
+        if clock is None:
+            continue  # one name alone stands anywhere
         try:
             return number, find_header(path, [table], [clock, name], clock)
         except InputError:
@@ -164,7 +168,9 @@ def _same(one: str, other: str) -> bool:
     return " ".join(one.split()).casefold() == " ".join(other.split()).casefold()
 
 
-def _by_its_clock(header: Header, clock: str, name: str, place: int) -> Header | None:
+def _by_its_clock(header: Header, clock: str | None, name: str, place: int) -> Header | None:
+    if clock is None:
+        return with_units(replace(header, at={name: (place,)}))
     clocks = matches(header.names, clock, header.as_written) or clock_places(header)
     if not clocks:
         return None

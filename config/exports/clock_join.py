@@ -3,6 +3,9 @@
     command, set point, state     held: what is in force at t is the last that was said at or before t
     what is measured              on straight lines between its samples, and nowhere beyond them
 
+A command that changes seldom keeps the instants of its changes: each is a row of its own, at which the stem was not
+measured.
+
 What is asked of the stem before the first sample of it, and for long after its last, nobody knows: the stem's samples
 there are left out, and counted.
 """
@@ -18,6 +21,8 @@ from config.recording import Column
 
 MEASURED = ("position", "velocity", "pressure", "load", "current", "force", "torque")
 """How the names of columns begin that are measured."""
+SELDOM = 0.5
+"""Changes of a command a sample of the stem, up to which each keeps its instant."""
 SAME = 1e-3
 """Of a clock's step: times that are closer are one, for two programs round them differently."""
 
@@ -55,32 +60,66 @@ def joined(path: Path, groups: Sequence[Group]) -> tuple[Column, dict[str, Colum
             f"{told!r} tells the day and {not_told!r} does not, so that their rows cannot be laid side by side: export "
             "both with one clock",
         )
-    time_s = base.time_s
+    others_s = [each.time_s + ((each.origin_s or 0.0) - (base.origin_s or 0.0)) for each in others]
+    time_s, measured = _with_changes(base.time_s, others, others_s)
     within = np.ones(time_s.size, dtype=np.bool_)
-    columns = dict(base.columns)
+    columns = {name: np.full(time_s.size, np.nan) for name in base.columns}
+    for name, column in base.columns.items():
+        columns[name][measured] = column
     said = []
-    for each in others:
-        own_s = each.time_s + ((each.origin_s or 0.0) - (base.origin_s or 0.0))
+    for each, own_s in zip(others, others_s, strict=True):
         for name, values in each.columns.items():
-            columns[name], known = _at(time_s, own_s, values, held=not name.startswith(MEASURED))
+            held = _is_held(name)
+            columns[name], known = _at(time_s, own_s, values, held=held)
             within &= known
-            how = "held" if not name.startswith(MEASURED) else "interpolated"
+            how = "held" if held else "interpolated"
             said.append(f"{name} from {own_s.size} samples of {each.named!r}, {how}")
     if not within.any():
         raise InputError(
             str(path),
             f"no time is common to its columns: {base.named!r} goes from {time_s[0]:.6g} to {time_s[-1]:.6g} s, "
-            f"{others[0].named!r} ends {_ends(base, others)} s after the beginning of that",
+            f"{others[0].named!r} from {others_s[0][0]:.6g} to {others_s[0][-1]:.6g} s",
         )
-    notes = {"clocks": f"each column by its own: {'; '.join(said)}; the stem's own clock, {base.named!r}, is kept"}
+    alike = all(own_s.size == base.time_s.size and np.allclose(own_s, base.time_s) for own_s in others_s)
+    own = f"each column by its own: {'; '.join(said)}; the stem's own clock, {base.named!r}, is kept"
+    notes = {} if alike else {"clocks": own}
     if left := int((~within).sum()):
         notes["rows at times of which the other columns say nothing, left out"] = str(left)
+    if added := int((~measured & within).sum()):
+        notes["rows at which a command changes between samples of the stem"] = str(added)
     return time_s[within], {name: column[within] for name, column in columns.items()}, notes
 
 
-def _ends(base: Group, others: Sequence[Group]) -> str:
-    other = others[0]
-    return f"{other.time_s[-1] + (other.origin_s or 0.0) - (base.origin_s or 0.0) - base.time_s[0]:.6g}"
+def _is_held(name: str) -> bool:
+    return not name.startswith(MEASURED)
+
+
+def _with_changes(
+    base_s: Column, others: Sequence[Group], others_s: Sequence[Column]
+) -> tuple[Column, "np.typing.NDArray[np.bool_]"]:
+    """Return the stem's times and the instants between them at which what is held changes, and which are the stem's.
+
+    Of a command that changes more often than every other sample no instants are added.
+    """
+    near_s = SAME * _step_s(base_s)
+    added = []
+    for each, own_s in zip(others, others_s, strict=True):
+        for values in (column for name, column in each.columns.items() if _is_held(name)):
+            known = np.isfinite(values)
+            at_s = own_s[known][1:][np.diff(values[known]) != 0.0]
+            following = np.minimum(np.searchsorted(base_s, at_s), base_s.size - 1)
+            apart = np.minimum(np.abs(base_s[following] - at_s), np.abs(base_s[np.maximum(following - 1, 0)] - at_s))
+            between = at_s[(apart > near_s) & (at_s > base_s[0]) & (at_s < base_s[-1])]
+            added += [between] if between.size <= SELDOM * base_s.size else []
+    instants = np.unique(np.concatenate(added)) if added else np.empty(0)
+    time_s = np.concatenate([base_s, instants])
+    order = np.argsort(time_s, kind="stable")
+    return time_s[order], (np.arange(time_s.size) < base_s.size)[order]
+
+
+def _step_s(time_s: Column) -> float:
+    steps = np.diff(time_s)
+    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
 
 
 def _at(time_s: Column, own_s: Column, values: Column, *, held: bool) -> tuple[Column, "np.typing.NDArray[np.bool_]"]:
@@ -88,10 +127,8 @@ def _at(time_s: Column, own_s: Column, values: Column, *, held: bool) -> tuple[C
 
     What is held is known from its first sample to the longest of its steps after its last.
     """
-    steps = np.diff(own_s)
-    steps = steps[steps > 0.0] if (steps > 0.0).any() else np.zeros(1)
-    before = np.searchsorted(own_s, time_s + SAME * float(np.median(steps)), side="right") - 1
-    longest_s = float(steps.max())
+    before = np.searchsorted(own_s, time_s + SAME * _step_s(own_s), side="right") - 1
+    longest_s = float(np.diff(own_s).max()) if own_s.size > 1 else 0.0
     if held:
         return values[np.maximum(before, 0)], (before >= 0) & (time_s < own_s[-1] + longest_s)
     known = np.isfinite(values)

@@ -80,7 +80,7 @@ def find_header(path: Path, tables: Sequence[RawTable], wanted: Sequence[str], c
         plural = "sheets" if found[0].table.what.startswith("sheet ") else "groups"
         raise InputError(str(path), f"the {plural} {sheets} all have these columns: say which, --sheet NAME")
     if not found:
-        raise broken[0] if broken else ColumnMissing(str(path), _missing(tables, wanted))
+        raise broken[0] if broken and len(broken) == len(tables) else ColumnMissing(str(path), _missing(tables, wanted))
     return with_units(found[0])
 
 

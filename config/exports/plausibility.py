@@ -283,7 +283,9 @@ def _of_sampling(time_s: Column, position_m: Column, asked: _Asked) -> Iterator[
             "clocks differ, or one column was shifted against the other"
         )
         return
-    changes = np.flatnonzero(np.abs(du[1:-1]) > MOVED * np.ptp(u)) + 1
+    told_when = np.diff(np.flatnonzero(whole)) > 1  # a row of the command's own between two of the stem's
+    changes = np.flatnonzero((np.abs(du) > MOVED * np.ptp(u)) & ~told_when)
+    changes = changes[(changes > 0) & (changes < du.size - 1)]
     rested = changes[~moves[changes - 1]]
     early, late = int(moves[rested].sum()), int((moves[rested] | moves[rested + 1]).sum())
     if rested.size >= 5 and early > RESPONDS_TOO_EARLY * rested.size:

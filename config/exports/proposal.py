@@ -8,11 +8,14 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import inf
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from config.drive import KINDS, VALVE
+from config.errors import InputError
 from config.exports.cell_kinds import begins_number, may_be_clock, numbers_of
 from config.exports.column_clock import time_base
 from config.exports.column_mapping import RANGE_PA
@@ -20,12 +23,14 @@ from config.exports.column_names import COMMON, COUNTER, SETPOINT, STATUS, is_ca
 from config.exports.column_preview import GOOD, ColumnPreview, shown_decimal
 from config.exports.export_units import SHARES, UNITS, allowed_units, ending_of, unit_named
 from config.exports.raw_table import Cell
-from config.exports.time_stamps import proposed_formats
+from config.exports.time_stamps import proposed_formats, seconds_of
 
 Array = npt.NDArray[np.float64]
 STAMP = r"\d{4}-\d\d-\d\d"
 VOLTS = (("1-5V", 0.9, 5.1), ("0-10V", -0.2, 10.3), ("0-5V", -0.1, 5.1), ("2-10V", 1.9, 10.2))
 """Ranges of a signal in volts, by the least and the greatest of it."""
+ALIKE = 0.1
+"""Of a span: two clocks of the same rows go on alike."""
 LEAST_PER_CENT, MOST_SHARE = 3.0, 130.0
 """Between which the greatest of some numbers in % lies: below are shares of 1, or bar."""
 
@@ -96,9 +101,30 @@ def _cut(clock: ColumnPreview) -> bool:
 
 
 def _finer(clock: ColumnPreview, others: Sequence[ColumnPreview]) -> ColumnPreview:
-    """Return another clock where the fractions of this one were cut off."""
-    finer = [each for each in others if may_be_clock(each.cells) and not _cut(each)]
-    return finer[0] if _cut(clock) and finer else clock
+    """Return another clock of the same span where the fractions of this one were cut off."""
+    if not _cut(clock):
+        return clock
+    span_s = _span_s(clock)
+    finer = (each for each in others if may_be_clock(each.cells) and not _cut(each))
+    return next((each for each in finer if abs(_span_s(each) - span_s) < ALIKE * span_s), clock)
+
+
+def _span_s(clock: ColumnPreview) -> float:
+    """Return how long the first rows of a clock last, s; infinite where that is not told."""
+    cells = [cell for cell in clock.cells if cell != ""]
+    for decimal in ".," if clock.numbers else "":
+        values = numbers_of(cells, decimal)
+        if np.isfinite(values).all():
+            base = time_base(values)
+            return abs(float(values[-1] - values[0])) * UNITS["_s"][base.unit if base else clock.unit or "s"]
+    texts = [str(cell) for cell in cells]
+    formats = [None] if all(re.match(STAMP, text) for text in texts) else proposed_formats(texts)
+    if not formats:
+        return inf
+    try:
+        return abs(float(seconds_of(Path(), texts, range(len(texts)), formats[0])[0][-1]))
+    except InputError:
+        return inf
 
 
 def _shares(words: Sequence[str], open_: list[str]) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from config.errors import InputError
-from config.exports.column_mapping import read_mapping
+from config.exports.column_mapping import ExportOptions, read_mapping
 from config.exports.export_preview import preview
 from config.historian_export import read_export
 
@@ -146,3 +146,47 @@ def test_clocks_that_cannot_be_laid_side_by_side_are_refused(tmp_path: Path) -> 
     (tmp_path / "a.csv").write_text("\n".join(lines))
     with pytest.raises(InputError, match="no time is common"):
         read_export(tmp_path / "a.csv", read_mapping(["time_s=Name", "position_m=x:mm", "command_pa=u:bar"]), None)
+
+
+def test_a_command_that_changes_between_samples_keeps_its_instants(tmp_path: Path) -> None:
+    """A historian keeps the changes of a command: the stem answers by its next sample, and not before it was asked."""
+    asked_s, asked_bar = np.arange(0.3, 30.0, 4.0), ASKED_BAR[: len(np.arange(0.3, 30.0, 4.0))]
+    lines = ["T_OUT,OUT,T_ZT,ZT"]
+    for i in range(len(STEM_S)):
+        first = f"{asked_s[i]},{asked_bar[i]}" if i < len(asked_s) else ","
+        lines.append(f"{first},{STEM_S[i]},{STEM_MM[i]}")
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    words = ("time_s=T_ZT", "position_m=ZT:mm", "command_pa=OUT:bar")
+    read = read_export(tmp_path / "a.csv", read_mapping(words), None)
+    changes = np.flatnonzero(np.diff(read.command_pa)) + 1
+    np.testing.assert_allclose(read.time_s[changes], asked_s[1:])
+    assert np.isnan(read.position_m[changes]).all()
+    measured = np.isfinite(read.position_m)
+    np.testing.assert_allclose(read.position_m[measured], 1e-3 * STEM_MM[1:])
+
+
+def test_signals_of_an_archive_without_a_readable_time_are_laid_side_by_side_by_a_period(tmp_path: Path) -> None:
+    values = [each for u, x in zip(STEM_MM / 50, STEM_MM, strict=True) for each in (("U", u), ("X", x))]
+    lines = [f"{tag};12:00:00;{value}" for tag, value in values]
+    (tmp_path / "a.csv").write_text("\n".join(["Tag;Time;Value", *lines]))
+    sources = read_mapping(["position_m=X:mm", "command_pa=U:bar"], 0.5)
+    read = read_export(tmp_path / "a.csv", sources, None, options=ExportOptions(period_s=0.5))
+    np.testing.assert_allclose(read.time_s, STEM_S)
+    np.testing.assert_allclose(read.position_m, 1e-3 * STEM_MM)
+    np.testing.assert_allclose(read.command_pa, 2e3 * STEM_MM)
+
+
+def test_of_two_clocks_that_contradict_each_other_the_finer_is_not_proposed(tmp_path: Path) -> None:
+    """Whole seconds beside millionths of days is a better clock, unless it tells another span."""
+    for factor, finer in ((1e6, True), (1e3, False)):
+        days = 46086.34375e6 + factor * STEM_S / 86400
+        rows = zip(day(STEM_S), days, STEM_MM, STEM_MM / 50, strict=True)
+        lines = ["TimeString;Time_ms;Hub;Stelldruck", *(f"{a};{b:.6f};{c};{d}" for a, b, c, d in rows)]
+        (tmp_path / "a.csv").write_text("\n".join(lines))
+        proposed = preview(tmp_path / "a.csv").words
+        assert ("time_s=Time_ms:ud" in proposed) == finer
+        assert ("time_s=TimeString" in proposed) != finer
+
+
+def day(times_s: np.ndarray) -> list[str]:
+    return [(BEGIN + datetime.timedelta(seconds=float(t))).strftime("%d.%m.%Y %H:%M:%S") for t in times_s]
