@@ -1,12 +1,14 @@
 """The tables of the documents that repeat a code, written from the code: `python -m docs.code_tables`.
 
-`codes.md` is written whole; in `health.md`, `history.md` and `reliability.md` what stands between two marks is.
+`codes.md` is written whole; in `health.md`, `history.md`, `law.md` and `reliability.md` what stands between marks is.
 """
 
 from dataclasses import fields
 from pathlib import Path
 
 from config.codes import CAUSES, Code, EventKind, Ne107Cause, Ne107Status, Refusal
+from positioner.control.laws.slides.states import State
+from positioner.control.laws.slides.transitions import COMMANDING, TABLE
 from positioner.control.permissives import table as permissives
 from positioner.daemon.health.ne107 import CLASS
 from positioner.daemon.service_state import table
@@ -22,6 +24,8 @@ PERMISSIVES_BEGIN = "<!-- permissives: written by `python -m docs.code_tables` -
 PERMISSIVES_END = "<!-- end of the permissives -->"
 EVENTS_BEGIN = "<!-- events: written by `python -m docs.code_tables` -->"
 EVENTS_END = "<!-- end of the events -->"
+TRANSITIONS_BEGIN = "<!-- transitions: written by `python -m docs.code_tables` -->"
+TRANSITIONS_END = "<!-- end of the transitions -->"
 TABLES_BEGIN = "<!-- tables: written by `python -m docs.code_tables` -->"
 TABLES_END = "<!-- end of the tables -->"
 HEAD = """# What the numbers say
@@ -78,6 +82,21 @@ def with_events(document: str) -> str:
     return _between(document, TABLES_BEGIN, TABLES_END, columns)
 
 
+def with_transitions(document: str) -> str:
+    """Return `law.md` with the transitions of the law of slides between their marks."""
+    rows = [
+        f"| {_named(each.of)} | {each.when} | {_named(each.to) or 'the same, and more is known'} |" for each in TABLE
+    ]
+    head = ["| from | when | to |", "|---|---|---|"]
+    return _between(document, TRANSITIONS_BEGIN, TRANSITIONS_END, [*head, *rows])
+
+
+def _named(states: tuple[type[State], ...]) -> str:
+    if states == COMMANDING:
+        return "any"
+    return ", ".join(each.__name__ for each in states) or "the same, and more is known"
+
+
 def _cause(kind: EventKind) -> str:
     return f"a number of `{CAUSES[kind].__name__}`" if kind in CAUSES else "a text"
 
@@ -97,5 +116,7 @@ if __name__ == "__main__":
     health.write_text(renewed(health.read_text(encoding="utf-8")), encoding="utf-8")
     reliability = HERE / "reliability.md"
     reliability.write_text(with_states(reliability.read_text(encoding="utf-8")), encoding="utf-8")
+    law = HERE / "law.md"
+    law.write_text(with_transitions(law.read_text(encoding="utf-8")), encoding="utf-8")
     history = HERE / "history.md"
     history.write_text(with_events(history.read_text(encoding="utf-8")), encoding="utf-8")

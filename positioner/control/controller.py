@@ -312,7 +312,7 @@ def _law(now: Now, reference: Reference, ratios: Ratios | None, outcome: SlideOu
         usable=now.stem_m is not None,
         command_pa=now.memory.wanted_pa,
         reference_m=reference.value_m,
-        direction=(reference.delta_m > 0.0) - (reference.delta_m < 0.0),
+        direction=1 if reference.delta_m > 0.0 else -1 if reference.delta_m < 0.0 else 0,
         ratios=ratios,
         outcome=outcome,
         statics=now.statics,

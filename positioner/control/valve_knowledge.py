@@ -5,21 +5,19 @@ Times of what was seen are negative after a restart, seconds before what was kep
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
 from positioner.estimation.estimates import Estimate, Estimates
+from positioner.estimation.landings.breakaway_distance import BreakawayDistance
 from positioner.estimation.landings.extended_balance import extended_scatter_m
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
 from positioner.estimation.landings.parting import FINEST
-from positioner.estimation.landings.slide_margins import Margins
 from positioner.estimation.landings.static_identification import StaticIdentification
 
 Covariance = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
-MIDDLE = 0.5
-"""Of the stroke: where the margins are that are kept."""
 LARGEST_STD = 0.05
 """Of κ and φ: the deviation of what was applied, where nobody knows it any more."""
 UNANSWERED = Answers()
@@ -38,7 +36,7 @@ class ValveKnowledge:
         residual_m: how far landings lie off these, a standard deviation.
         landings, held: slides that landed and changes of the command that moved nothing, the latest first.
         answers: how long the stem takes to answer.
-        margins: of the law of slides, at the middle of the travel.
+        distances: to break loose, as slides have taught.
         tracked: what else is followed, by name, for whoever knows the name.
     """
 
@@ -48,7 +46,7 @@ class ValveKnowledge:
     landings: tuple[SlideOutcome, ...] = ()
     held: tuple[SlideOutcome, ...] = ()
     answers: Answers = UNANSWERED
-    margins: Margins | None = None
+    distances: BreakawayDistance | None = None
     tracked: Mapping[str, float] = field(default_factory=dict)
 
     def landing_m(self, command_pa: float, direction: int) -> float:
@@ -68,7 +66,7 @@ class ValveKnowledge:
 
     def shortest_m(self, direction: int) -> float:
         """Return the shortest slide that breaks loose in a direction as far as is known, m: no more than friction."""
-        if self.margins is not None and (way_m := self.margins.of(direction, turning=True).way_m):
+        if self.distances is not None and (way_m := self.distances.at(direction, turning=True).likely_m) < inf:
             return way_m
         slid_m = (abs(each.position_m - each.from_m) for each in self.landings if each.direction == direction)
         return min(slid_m, default=self.friction_m)

@@ -99,7 +99,7 @@ def test_an_identification_waits_for_the_supply() -> None:
 
 def test_a_stem_that_does_not_come_to_rest_off_its_reference_is_said() -> None:
     loop = Loop(FAST)
-    error = loop.step_to(0.6, 60.0)
+    error = loop.step_to(0.6, 20.0)
     decision = loop.decision
     assert abs(error) > 0.03
     assert decision.inhibit_reason is InhibitReason.NOT_AT_REST

@@ -8,9 +8,7 @@ from benchmarks.extended_valve import STROKE_M, Course, Loop, typical
 from config.codes import InhibitReason
 from config.extended_valve import ExtendedValve, Inverse
 from config.valve_file import ValveFile
-from positioner.control.laws.slides.margins_over_travel import with_margins_at
 from positioner.control.laws.slides.slide_balance import Balance
-from positioner.control.laws.slides.slide_memory import Held, SlideMemory
 from positioner.estimation.landings.extended_balance import straight_law
 from sim.composition import Composition
 from sim.static_inverse import extended_valve
@@ -61,21 +59,14 @@ def test_a_reference_beyond_a_known_stop_ends_there_and_teaches_nothing() -> Non
         assert loop.cycle.snapshot.decision.command_pa <= extended.landing_pa(share * STROKE_M, 1) + 1e3
 
 
-def test_margins_go_along_with_the_reference_and_keep_what_was_learnt() -> None:
+def test_break_away_is_the_valves_own_over_its_travel() -> None:
     _, extended = switched_on("position_friction")
     balance = Balance(straight_law(extended), (), (), STROKE_M, extended)
-    first = with_margins_at(SlideMemory(), 0.2 * STROKE_M, balance)
-    up = first.margins.turning_up
-    assert up.way_m == pytest.approx(1.02 * extended.margin_m(0.2 * STROKE_M, 1))
-    learnt = replace(first, margins=first.margins.replaced(1, up.times(1.06), turning=True))
-    there = with_margins_at(learnt, 0.8 * STROKE_M, balance)
-    up, down = there.margins.turning_up, there.margins.turning_down
-    assert up.way_m == pytest.approx(1.06 * 1.02 * extended.margin_m(0.8 * STROKE_M, 1), rel=0.01)
-    assert down.way_m == pytest.approx(1.02 * extended.margin_m(0.8 * STROKE_M, -1))
-    assert with_margins_at(there, 0.8 * STROKE_M, balance) is there
-    grown = replace(first, margins=first.margins.replaced(1, up.times(3.0), turning=True))
-    held = with_margins_at(replace(grown, held=Held(2, learnt.margins)), 0.8 * STROKE_M, balance)
-    assert held.learnt == there.margins, "so does what was known before slides that held"
+    first = balance.first_distances(1e-3, told=False)
+    for share in (0.2, 0.8):
+        for s in (1, -1):
+            there = first.at(s, turning=True, local=balance.local(share * STROKE_M))
+            assert there.sure_m == pytest.approx(1.02 * extended.margin_m(share * STROKE_M, s), rel=1e-6)
 
 
 def test_lead_makes_a_slow_pressure_fast_enough() -> None:

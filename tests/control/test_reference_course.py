@@ -11,8 +11,9 @@ SCAN_S, WAY_M = 0.5, 5e-3
 
 def written(values_m: Iterable[float], every_s: float = SCAN_S) -> tuple[ReferenceCourse, float]:
     """Return the course of references, m, and when the last came."""
-    course, now_s = ReferenceCourse(), 0.0
-    for index, value_m in enumerate(values_m):
+    first_m, *later_m = values_m
+    course, now_s = ReferenceCourse(first_m, 0.0), 0.0
+    for index, value_m in enumerate(later_m, 1):
         now_s = index * every_s
         course = course.after(now_s, value_m)
     return course, now_s

@@ -23,6 +23,7 @@ def said(name: str) -> str:
 def test_the_tables_are_those_of_today() -> None:
     assert said("codes.md") == code_tables.codes(), STALE
     assert said("health.md") == code_tables.renewed(said("health.md")), STALE
+    assert said("law.md") == code_tables.with_transitions(said("law.md")), STALE
     assert said("history.md") == code_tables.with_events(said("history.md")), STALE
 
 

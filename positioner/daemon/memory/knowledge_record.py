@@ -1,15 +1,14 @@
 """What is known of a valve as JSON, and back. Nothing is taken that could not be true."""
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
-from positioner.estimation.landings.slide_margins import Margin, Margins
 
 MOST = 40
 """Landings, and changes that held."""
@@ -39,10 +38,11 @@ class _Slide(_Record):
     short_m: Length = 0.0
 
 
-class _Margin(_Record):
+class _Interval(_Record):
     held_m: Length
-    broke_m: Length
-    guessed: bool = False
+    broke_m: Length | None
+    """None: nothing has broken loose."""
+    seen: bool
 
 
 class KnowledgeRecord(_Record):
@@ -56,7 +56,7 @@ class KnowledgeRecord(_Record):
     landings: list[_Slide] = Field(max_length=MOST)
     held: list[_Slide] = Field(max_length=MOST)
     answers: list[Annotated[float, Field(ge=0.0, le=1e9)]] = Field(min_length=3, max_length=3)
-    margins: list[_Margin] | None = Field(min_length=4, max_length=4)
+    distances: list[_Interval] | None = Field(min_length=4, max_length=4)
     tracked: dict[str, Figure]
 
 
@@ -72,7 +72,7 @@ def record_of(knowledge: ValveKnowledge) -> dict[str, Any]:
         "landings": [each._asdict() for each in knowledge.landings[:MOST] if _finite(each)],
         "held": [each._asdict() for each in knowledge.held[:MOST] if _finite(each)],
         "answers": list(knowledge.answers),
-        "margins": _each(None if knowledge.margins is None else knowledge.margins.all, "held_m", "broke_m", "guessed"),
+        "distances": None if knowledge.distances is None else [_kept(each) for each in knowledge.distances.all],
         "tracked": dict(knowledge.tracked),
     }
 
@@ -97,19 +97,20 @@ def knowledge_in(content: object) -> ValveKnowledge:
         landings=_outcomes(record.landings),
         held=_outcomes(record.held),
         answers=Answers(*record.answers),
-        margins=_margins(record.margins),
+        distances=_distances(record.distances),
         tracked=record.tracked,
     )
 
 
-def _each(learnt: Sequence[Margin] | None, *names: str) -> list[dict[str, Any]] | None:
-    return None if learnt is None else [{name: getattr(each, name) for name in names} for each in learnt]
+def _kept(each: Interval) -> dict[str, Any]:
+    return {"held_m": each.held_m, "broke_m": each.broke_m if each.broke_m < math.inf else None, "seen": each.seen}
 
 
-def _margins(four: list[_Margin] | None) -> Margins | None:
+def _distances(four: list[_Interval] | None) -> BreakawayDistance | None:
     if four is None:
         return None
-    return Margins(*(Margin(each.held_m, each.broke_m, guessed=each.guessed) for each in four))
+    intervals = (Interval(each.held_m, math.inf if each.broke_m is None else each.broke_m, each.seen) for each in four)
+    return BreakawayDistance(*intervals)
 
 
 def _row(row: list[float]) -> Row:

@@ -10,7 +10,7 @@ Neither mass nor viscous friction, lag nor sampling stands in it, and a preload 
     pressure_delivered                is the pressure measured at a rest the one commanded
     static_law, local_balance         κ, φ_up, φ_down with their deviations; the pressure that lands at a position
     short_slides                      how much farther a short slide goes than it was sent
-    slide_margins                     how far a slide must be sent to break the stem loose
+    breakaway_distance                how far a slide must be sent to break the stem loose
     mean_nearby                       the mean of what was seen nearby and of late
     extended_balance                  the same of a valve whose effects are known
     swing                             how far past its balance a stem swings and sticks there

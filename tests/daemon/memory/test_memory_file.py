@@ -15,8 +15,8 @@ from positioner.control.valve_knowledge import ValveKnowledge
 from positioner.daemon.memory.conditions import conditions_of
 from positioner.daemon.memory.memory_file import SET_ASIDE, read_memory, write_memory
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval
 from positioner.estimation.landings.landing_detector import Answers, SlideOutcome
-from positioner.estimation.landings.slide_margins import Margin, Margins
 
 SLIDE = SlideOutcome(-1.25, 1, 0.05, 70e3, 0.06, 1e-6, True, True)
 KNOWLEDGE = ValveKnowledge(
@@ -26,7 +26,7 @@ KNOWLEDGE = ValveKnowledge(
     landings=(SLIDE,),
     held=(SLIDE._replace(moved=False, landing=False, time_s=-3.5),),
     answers=Answers(0.04, 1e-7, 2e4),
-    margins=Margins(Margin(5e-3, 6e-3), turning_down=Margin(0.0, 7e-3, guessed=True)),
+    distances=BreakawayDistance(Interval(5e-3, 6e-3, seen=True), turning_down=Interval(0.0, 7e-3)),
     tracked={"friction_up_n": 1.5e3},
 )
 FILE: dict[str, Any] = {"valve": {"name": "FV-1", "stroke_m": 0.1}, "cycle": {"period_s": 0.05}}
@@ -41,7 +41,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_what_was_written_is_read_to_the_last_bit(path: Path) -> None:
-    for knowledge in (KNOWLEDGE, replace(KNOWLEDGE, margins=None, landings=(), tracked={})):
+    for knowledge in (KNOWLEDGE, replace(KNOWLEDGE, distances=None, landings=(), tracked={})):
         write_memory(path, "FV-1", NOW, knowledge)
         kept = read_memory(path, "FV-1", NOW)
         assert (kept.knowledge, kept.problem) == (knowledge, None)
@@ -142,7 +142,7 @@ def test_another_valves_is_set_aside(path: Path) -> None:
         (replace(KNOWLEDGE, ratios=Ratios(814542.6, -22068.2)), "knowledge.b_over_c_pa_per_m: "),
         (replace(KNOWLEDGE, landings=(SLIDE._replace(time_s=3.0),)), "knowledge.landings.0.time_s: "),
         (replace(KNOWLEDGE, residual_m=-1.0), "knowledge.residual_m: "),
-        (replace(KNOWLEDGE, margins=Margins(Margin(-1.0))), "knowledge.margins.0.held_m: "),
+        (replace(KNOWLEDGE, distances=BreakawayDistance(Interval(-1.0))), "knowledge.distances.0.held_m: "),
         (replace(KNOWLEDGE, landings=(SLIDE._replace(direction=0),)), "knowledge.direction: "),
         (replace(KNOWLEDGE, ratios=Ratios(-1e300, -22068.2)), "knowledge.b_over_c_pa_per_m: "),
         (replace(KNOWLEDGE, ratios=Ratios(-1e-300, -22068.2)), "knowledge.b_over_c_pa_per_m: "),

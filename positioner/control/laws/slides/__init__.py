@@ -1,15 +1,19 @@
 """The law of slides: a stem that slides into rest lands where spring and friction balance, however slow the loop.
 
-    law                                     the law behind the boundary
-    slide_law, slide_memory                 nothing, one slide or two; what is remembered of a move
-    slide_balance                           where a slide lands, and how margins go over the travel
-    margins_over_travel                     how far a slide must be sent to break loose: learnt here, used there
-    slide_inverse                           what the law takes from an extended valve
-    reference_course                        does the reference rest, or take back what would be corrected
+    slide_law           the law: begin, observe, command
+    states              its states, a type each
+    transitions         which state follows which, and when: one table
+    plan                one slide, or two by way of an excursion
+    teaching            what a slide taught of break-away
+    slide_memory        what is remembered beside the state: the move, the last slide, what excursions have cost
+    slide_balance       where a slide lands, and how break-away goes over the travel
+    stem_observation    what one step sees of the stem, also of an extended valve's
+    reference_course    does the reference rest, or take back what would be corrected
+    slide_bounds        what the site sets, and the thresholds
 
-Its settings are the site's bounds.
+Read them in this order.
 """
 
-from positioner.control.laws.slides.slide_memory import SlideSettings as Settings
+from positioner.control.laws.slides.slide_law import SlideSettings as Settings
 
 __all__ = ["Settings"]

@@ -32,7 +32,6 @@ with the same travel: no stem that can only be moved by m comes nearer. N D is a
 
 from dataclasses import dataclass
 from itertools import accumulate
-from math import inf, nan
 from operator import sub
 from statistics import median
 
@@ -56,8 +55,8 @@ A_TREND = 3
 class ReferenceCourse:
     """The last changes of the reference, m, and the intervals between them, s; the latest first."""
 
-    value_m: float = nan
-    changed_s: float = -inf
+    value_m: float
+    changed_s: float
     changes_m: tuple[float, ...] = ()
     intervals_s: tuple[float, ...] = ()
 
@@ -66,7 +65,7 @@ class ReferenceCourse:
         if reference_m == self.value_m:
             return self
         interval_s = now_s - self.changed_s
-        if not interval_s <= SCAN_S:
+        if interval_s > SCAN_S:
             return ReferenceCourse(reference_m, now_s)
         return ReferenceCourse(
             reference_m,

@@ -1,24 +1,26 @@
-"""What the law of slides knows of the valve: where a slide lands, and how margins go over the travel.
+"""What the law of slides knows of the valve: where a slide lands, and how break-away distances go over the travel.
 
     B(x, s)    pressure under which a slide in direction s lands at x            (estimation/landings/local_balance.py;
                                         of an extended valve, [law] valve:        extended_balance.py)
     φ, κ       friction and slope of B, as bent over the travel
-    m_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s
+    d_s        shortest slide that breaks loose in direction s, (F_s - F_c)/k_s
 
-Where friction grows over the travel its static part grows alike, so m_s goes as φ/κ.
+Where friction grows over the travel its static part grows alike, so d_s goes as φ/κ.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import isnan
+from dataclasses import dataclass, replace
 
 from config.extended_valve import ExtendedValve
 from positioner.estimation.acceptance import Ratios
+from positioner.estimation.landings.breakaway_distance import BreakawayDistance, Interval, Local
 from positioner.estimation.landings.extended_balance import extended_landing_pa
 from positioner.estimation.landings.landing_detector import VISIBLE, SlideOutcome
 from positioner.estimation.landings.local_balance import bent_by_pa, landing_pa, scatter_m, sliding_pa
 from positioner.estimation.landings.short_slides import ALIKE
 
+MIDDLE = 0.5
+"""Of the stroke: where break-away distances are kept."""
 KNOWN = 1e-3
 """Of the stroke: how well an extended valve is known."""
 SURE = 1.02
@@ -55,17 +57,9 @@ class Balance:
             return extended_landing_pa(position_m, direction, self.valve, self.landings, self.now_s)
         return landing_pa(position_m, direction, self.ratios, self.landings, self.stroke_m)
 
-    def way_m(self, each: SlideOutcome) -> float:
-        """Return how far a slide would have gone, m, by the balance at the place it starts from."""
-        s, from_pa = each.direction, self.pressure_pa(each.from_m, each.direction)
-        if self.valve is not None:
-            followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
-            return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
-        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
-
     def tried(self, way_m: float, direction: int) -> int:
         """Return how many of the last slides that landed in a direction were sent about so far, m."""
-        sent_m = (self.way_m(each) for each in self.landings if each.direction == direction)
+        sent_m = (self._sent_m(each) for each in self.landings if each.direction == direction)
         return sum(abs(each_m - way_m) < ALIKE * way_m for each_m in sent_m)
 
     @property
@@ -97,9 +91,48 @@ class Balance:
         straight_pa = -self.ratios.b_over_c * 4 * BESIDE * self.stroke_m
         return self.friction_at_m(position_m) / max(FLATTEST, (up_pa - down_pa) / straight_pa)
 
-    def grows(self, from_m: float, to_m: float, direction: int) -> float:
-        """Return the factor on the margin of a slide that goes on from one place to another, 1: not known."""
-        return 1.0 if isnan(to_m) else self.going_on_m(to_m, direction) / self.going_on_m(from_m, direction)
+    def local(self, position_m: float) -> Local:
+        """Return what break-away distances at a place are of those in the middle of the travel."""
+        middle_m = MIDDLE * self.stroke_m
+        up, down = (self.going_on_m(position_m, s) / self.going_on_m(middle_m, s) for s in (1, -1))
+        return Local(up, down, self.friction_at_m(position_m) / self.friction_at_m(middle_m))
+
+    def first_distances(self, guess_m: float, *, told: bool) -> BreakawayDistance:
+        """Return the break-away distances before a slide of the law: those of the extended valve, or of the staircase.
+
+        Args:
+            guess_m: where no slide has landed in a direction.
+            told: whether that is known, and no guess.
+        """
+        if self.valve is not None:
+            up_m, down_m = (self.going_on_m(MIDDLE * self.stroke_m, s) for s in (1, -1))
+            up, down = (Interval(each / SURE, each, seen=True) for each in (up_m, down_m))
+            return BreakawayDistance(up, down, up, down)
+        return BreakawayDistance(*(self._first(s, Interval(broke_m=guess_m, seen=told)) for s in (1, -1)))
+
+    def _first(self, direction: int, guess: Interval) -> Interval:
+        """Return the shortest way that has landed in a direction, and the longest below it that held."""
+        slid = self._of(self.landings, direction)
+        slid_m = [self._in_the_middle_m(each, abs(each.position_m - each.from_m)) for each in slid]
+        first = Interval(broke_m=min(slid_m) / (1.0 - self.swing), seen=True) if slid_m else guess
+        held_m = (self._in_the_middle_m(each, self._sent_m(each)) for each in self._of(self.held, direction))
+        seen_m = (each_m for each_m in held_m if VISIBLE * self.stroke_m < each_m < first.broke_m)
+        return replace(first, held_m=max(seen_m, default=0.0))
+
+    def _in_the_middle_m(self, each: SlideOutcome, way_m: float) -> float:
+        """Return what a way, m, that slide began would be in the middle of the travel."""
+        return way_m / self.local(each.from_m).on(each.direction)
+
+    def _of(self, slides: Sequence[SlideOutcome], direction: int) -> list[SlideOutcome]:
+        return [each for each in slides if each.direction == direction]
+
+    def _sent_m(self, each: SlideOutcome) -> float:
+        """Return how far a slide would have gone, m, by the balance at the place it starts from."""
+        s, from_pa = each.direction, self.pressure_pa(each.from_m, each.direction)
+        if self.valve is not None:
+            followed_pa = from_pa - self.valve.landing_pa(each.from_m, s)
+            return s * (self.valve.lands_m(each.command_pa - followed_pa, s) - each.from_m)
+        return s * (each.command_pa - from_pa) / -self.ratios.b_over_c / (1.0 - self.swing)
 
     def _shape_pa(self, position_m: float, direction: int) -> float:
         """Return B as it goes over the travel, Pa, without what only the last landings near a place say."""

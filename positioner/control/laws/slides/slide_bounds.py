@@ -1,0 +1,83 @@
+"""What a site sets for the law of slides, and its thresholds: each with its unit and why it is so large."""
+
+from dataclasses import dataclass
+
+DAY_S = 86400.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlideThresholds:
+    """The law's numbers. "Of the way" is of how far a slide is sent; "of the stroke" of the full travel."""
+
+    return_margin: float = 1.02
+    """Break-away distances that the second of two slides is given: the stem must not stay where the first took it."""
+    missed: float = 0.05
+    """Of the way, by which a slide may miss its aim: slides on drawn valves miss by a third of that."""
+    missed_deviations: float = 2.0
+    """Deviations of landings, by which it may, too: what scatters teaches nothing of break-away."""
+    gave_way: float = 0.5
+    """Of the way: a stem that went no farther was not broken loose, its packing gave way."""
+    far_short: float = 0.25
+    """Of the way: no balance is so far off, so that a slide which falls so short has only begun to break loose."""
+    longest_giving: float = 0.03
+    """Of the stroke: no packing gives way farther."""
+    gone_on: float = 2.0
+    """Of the way: a stem that went farther crept there, or was pushed."""
+    shortest: float = 5.1e-3
+    """Of the stroke: a slide shorter than 5e-3 would not be told from a packing that gives way (`VISIBLE`)."""
+    first_distance: float = 0.1
+    """Of F_c/k_s: the first guess of a break-away distance, where neither a slide nor F_s has told one."""
+    rounded_quanta: float = 0.5
+    """Quanta by which a position may be rounded."""
+    other_side: float = 1.05
+    """Factor on how far an excursion by the other side leaves the way between: it takes longer."""
+    no_farther: float = 2e-3
+    """Of the stroke: a first slide that will go on by less has done its work ..."""
+    watched_s: float = 0.02
+    """... by the speed seen in this time, s: a quantum of 12 bits in it is 1.2 % of stroke a second."""
+    tried: int = 2
+    """Landings of a move after which a slide goes as far as has surely broken loose: what may do is tried once."""
+    far: float = 2.0
+    """Break-away distances from a stem that moves, beyond which a new reference is followed at once."""
+    noise_deviations: float = 2.5
+    """Deviations of the mean position of a rest within which an error is none."""
+    noise_quanta: float = 0.6
+    """Quanta within which an error is none: half by rounding, and a tenth for the mean."""
+    widening: float = 1.5
+    """Factor on the dead band for every two landings beyond the free ones: why the moves come to an end."""
+    free_landings: int = 2
+    """Landings of a move after which what slides scatter by counts."""
+    most_slides: int = 14
+    """Slides for one reference; on drawn valves 99 % of the moves take six or fewer."""
+    refill_s: float = 60.0
+    """s, in which two slides come back to a move that has used them up."""
+    stuck_after: int = 3
+    """Slides in a row that hold, each as long as has broken loose: one may be luck, and friction grows."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlideBounds:
+    """What the site sets: m, Pa, s."""
+
+    stroke_m: float
+    dead_band_m: float
+    minimum_pa: float
+    maximum_pa: float
+    breakaway_pa: float | None = None
+    """F_s/A where it is known."""
+    excursion_limit_m: float
+    excursion_interval_s: float = 0.0
+    """Least time between two excursions."""
+    budget_m_per_s: float = 0.0
+    """Travel that they may cost, of which a day's may be spent at once; 0: no limit."""
+    command_step_pa: float = 0.0
+    """The least difference of two commands that the device is told."""
+    thresholds: SlideThresholds = SlideThresholds()
+
+    def allowed_pa(self, pressure_pa: float) -> float:
+        """Return the allowed pressure, Pa, that is nearest to one."""
+        return min(max(pressure_pa, self.minimum_pa), self.maximum_pa)
+
+    def allows(self, pressure_pa: float) -> bool:
+        """Whether a pressure, Pa, is within the limits."""
+        return self.minimum_pa <= pressure_pa <= self.maximum_pa

@@ -1,0 +1,428 @@
+"""Which state of the law of slides follows which, and when: `TABLE`, whose first rule that holds is followed.
+
+While the stem moves, the second of two slides is given as soon as the first has slid, is farther than break-away beyond
+the reference, and will go no farther; a reference far from the stem is followed at once; a nearer one waits for the
+rest. At rest the move ends, or the next slide is given (`plan.py`).
+
+Why there is no limit cycle: what a slide missed corrects B for the next (each miss is a fraction of the one before),
+the dead band widens from landing to landing, and the slides of a move are numbered. After its end nothing happens until
+the reference changes, or something else has visibly moved the stem.
+
+A stem that slides in a row do not break loose is sent farther each time, until a bound bars the next: the limit of an
+excursion, the pressure, the number of slides. Then it is stuck, whichever bound it was, and what is known of break-away
+is what was known before the row.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from config.codes import InhibitReason
+from positioner.control.laws.slides.plan import Plan, beside_m
+from positioner.control.laws.slides.slide_balance import Balance
+from positioner.control.laws.slides.slide_bounds import SlideBounds
+from positioner.control.laws.slides.slide_memory import Excursions, Move, Row, SlideMemory, day_m
+from positioner.control.laws.slides.states import (
+    STATES,
+    Idle,
+    Out,
+    Returning,
+    Slide,
+    Sliding,
+    State,
+    Stuck,
+    Waiting,
+    Watching,
+    slide_of,
+)
+from positioner.control.laws.slides.stem_observation import StemObservation
+from positioner.control.laws.slides.teaching import held, sent_elsewhere, slid_away
+from positioner.estimation.landings.landing_detector import STOP
+from positioner.estimation.landings.stem_at_rest import Rest
+
+NOTHING = InhibitReason.NOTHING
+COMMANDING = tuple(each for each in STATES if each is not Watching)
+
+
+class Now(NamedTuple):
+    """What one step is decided from."""
+
+    seen: StemObservation
+    reference_m: float
+    """What the move is to: the reference, or what references scatter about."""
+    balance: Balance
+    bounds: SlideBounds
+
+    def plan(self, memory: SlideMemory, from_m: float) -> Plan:
+        """Return a plan for a stem that stands somewhere, m."""
+        assert memory.distances is not None, "known since the first step"
+        return Plan(
+            bounds=self.bounds,
+            balance=self.balance,
+            distances=memory.distances,
+            local=self.balance.local(self.reference_m),
+            anchor=memory.anchor,
+            from_m=from_m,
+            target_m=self.reference_m,
+            quantum_m=self.seen.quantum_m,
+            surely=memory.move.held or memory.move.landed >= self.bounds.thresholds.tried,
+        )
+
+
+# While the stem moves, or may yet move.
+
+
+def gone_far_enough(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Give the second of two slides: the first has done its work, and the stem need not rest there.
+
+    What follows a slow pressure goes on, at a speed v, for about as long as it has taken until now: by v t.
+    """
+    state, seen, thresholds = memory.state, now.seen, now.bounds.thresholds
+    if not isinstance(state, Out) or not _seen_for_a_while(state, now):
+        return None
+    slide, s = state.slide, state.slide.direction
+    if s * (slide.from_m - now.reference_m) > 0.0 and not slid_away(slide, seen.position_m, now.bounds):
+        return None  # it was beyond before
+    beyond_m = min(s * (each - now.reference_m) for each in (seen.position_m, state.seen_m))
+    went_m = abs(seen.position_m - state.seen_m)
+    goes_on = (seen.now_s - state.given_s) / (seen.now_s - state.seen_s)
+    if (went_m - seen.quantum_m) * goes_on >= thresholds.no_farther * now.bounds.stroke_m:
+        return None
+    if beyond_m <= now.plan(memory, seen.position_m).way_m(-s, turning=True):
+        return None
+    return _slide(sent_elsewhere(memory, slide, now), now, seen.position_m, now.reference_m, -s)
+
+
+def reference_far_off(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Follow a reference that changes while the stem moves, where that can be done at once."""
+    seen, reference_m = now.seen, now.reference_m
+    if memory.target_m is None or reference_m == memory.target_m:
+        return None
+    s = 1 if reference_m > seen.position_m else -1
+    sure_m = now.plan(memory, seen.position_m).interval(s, turning=True).sure_m
+    if abs(reference_m - seen.position_m) < now.bounds.thresholds.far * sure_m:
+        return None
+    slide = slide_of(memory.state)
+    if slide is not None and slid_away(slide, seen.position_m, now.bounds):
+        memory = sent_elsewhere(memory, slide, now)
+    command_pa = now.bounds.allowed_pa(now.balance.pressure_pa(reference_m, s))
+    move = Move(now.bounds.thresholds.most_slides).given(seen.now_s, None)
+    return replace(memory, command_pa=command_pa, target_m=reference_m, move=move, state=Sliding(None))
+
+
+def overdue(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Say why the stem is off its reference and is not moved; said once, that stays until it rests."""
+    why, target_m = now.seen.waits_for, memory.target_m
+    if why is NOTHING or target_m is None:
+        return None
+    if abs(target_m - now.seen.position_m) <= now.bounds.dead_band_m + now.seen.quantum_m:
+        return None
+    state = memory.state
+    if isinstance(state, Waiting | Out) and state.reason is why:
+        return on_its_way(memory, now)
+    waiting = replace(state, reason=why) if isinstance(state, Out) else Waiting(slide_of(state), why)
+    return replace(memory, state=waiting)
+
+
+def on_its_way(memory: SlideMemory, now: Now) -> SlideMemory:
+    """Go on; of an excursion, with what brings it back from where it is."""
+    state, seen = memory.state, now.seen
+    if not isinstance(state, Out):
+        return memory if memory.target_m is not None else replace(memory, target_m=now.reference_m)
+    plan = now.plan(memory, seen.position_m)
+    back_pa = plan.back_pa(state.slide.direction, seen.position_m, seen.position_m - state.seen_m)
+    if _seen_for_a_while(state, now):
+        state = replace(state, seen_m=seen.position_m, seen_s=seen.now_s)
+    return replace(memory, state=replace(state, back_pa=back_pa))
+
+
+def _seen_for_a_while(state: Out, now: Now) -> bool:
+    """Whether where the stem was is known from long enough ago to tell how fast it goes; by rounding, not quite."""
+    return now.seen.now_s - state.seen_s > (1.0 - 1e-6) * now.bounds.thresholds.watched_s
+
+
+# At rest.
+
+
+def settled(memory: SlideMemory, now: Now, rest: Rest) -> SlideMemory:
+    """Return the memory of a stem that has come to rest: what it is to do from here."""
+    bounds, row = now.bounds, memory.row
+    moved_m = bounds.thresholds.longest_giving * bounds.stroke_m
+    if row is not None and row.stuck_at_m is not None and abs(rest.position_m - row.stuck_at_m) > moved_m:
+        memory = replace(memory, row=None, move=Move(bounds.thresholds.most_slides))
+    move = memory.move.refilled(now.seen.now_s, bounds)
+    anchor = memory.anchor_at(rest.position_m, bounds)
+    if move is memory.move and anchor is memory.anchor and memory.target_m == now.reference_m:
+        return memory
+    return replace(memory, move=move, anchor=anchor, target_m=now.reference_m)
+
+
+def there(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """End the move: the stem is within the dead band, or as near as it is known."""
+    return _idle(memory, NOTHING) if abs(_error_m(now)) <= _band_m(now) else None
+
+
+def as_near_as_slides_land(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """End the move: another slide would miss as the ones before have, or end on the stop, as the last one has."""
+    thresholds, landed = now.bounds.thresholds, memory.move.landed
+    beyond = max(0, landed - thresholds.free_landings)
+    band_m = max(_band_m(now), now.balance.scatter_m if beyond else 0.0) * thresholds.widening ** (beyond // 2)
+    near = abs(_error_m(now)) <= band_m or _on_stop(memory, now)
+    return _idle(memory, InhibitReason.TRIM_ENDED) if near else None
+
+
+def no_slide_left(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """End the move: it has had its slides, save the second of two."""
+    ended = memory.move.left <= 0 and not isinstance(memory.state, Out)
+    return _barred(memory, now, InhibitReason.TRIM_ENDED) if ended else None
+
+
+def held_where_it_stands(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Learn that the stem is held: it rests under the very pressure that one slide to the reference would be given."""
+    slide, reaches = _one_slide(memory, now)
+    rests = memory.command_pa == now.balance.slide_pa(slide.from_m, slide.to_m, slide.direction)
+    stuck = memory.row is not None and memory.row.stuck
+    return held(memory, slide, now) if reaches and rests and not stuck else None
+
+
+def one_slide(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Give the one slide that reaches the reference, or the second of two."""
+    slide, reaches = _one_slide(memory, now)
+    if not reaches:
+        return None
+    wanted_pa = now.balance.slide_pa(slide.from_m, slide.to_m, slide.direction)
+    if now.bounds.allowed_pa(wanted_pa) == memory.command_pa:  # what the stem does not do now it will not do then
+        limited = not now.bounds.allows(wanted_pa)
+        return _barred(memory, now, InhibitReason.LAW_BEYOND_LIMITS if limited else InhibitReason.TRIM_ENDED)
+    return _slide(memory, now, slide.from_m, slide.to_m, slide.direction)
+
+
+def _one_slide(memory: SlideMemory, now: Now) -> tuple[Slide, bool]:
+    """Return the one slide to the reference, and whether it is long enough to break loose."""
+    from_m, s = _standing_m(memory, now), _side(now)
+    plan = now.plan(memory, from_m)
+    way_m = plan.way_m(s)
+    if isinstance(memory.state, Out) and s == -memory.state.slide.direction:
+        # Planned by what may do: it is tried before more is asked for.
+        likely_m = plan.interval(s, turning=plan.turns(s)).likely_m
+        way_m = min(way_m, max(likely_m, plan.shortest_m - plan.rounded_m))
+    to_m = now.reference_m + (0.0 if memory.course is None else plan.lead_m(memory.course, now.seen.now_s, s))
+    return _slide_from(memory, from_m, to_m, s), s * (to_m - from_m) >= way_m
+
+
+def taken_back(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Leave the error to the references to come."""
+    course, s = memory.course, _side(now)
+    if course is None:
+        return None
+    way_m = now.plan(memory, _standing_m(memory, now)).way_m(s)
+    away_s = memory.excursions.away_s if memory.excursions is not None else 0.0
+    takes_back = course.takes_back(now.seen.now_s, _error_m(now), way_m, away_s)
+    return _idle(memory, InhibitReason.REFERENCE_COMES) if takes_back else None
+
+
+def excursion_waits(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Wait: the last excursion was too recent. Not where it has left the stem away, for the second was too short."""
+    before = memory.excursions
+    if before is None or now.seen.now_s - before.begun_s >= now.bounds.excursion_interval_s or _left_away(memory, now):
+        return None
+    return _idle(memory, InhibitReason.EXCURSION_WAITS)
+
+
+def two_slides(memory: SlideMemory, now: Now) -> SlideMemory | None:
+    """Give the first of two slides, by whichever side it may, and what is left of the day's travel allows."""
+    seen, bounds = now.seen, now.bounds
+    if memory.move.left < 2:  # it is to come back
+        return _barred(memory, now, InhibitReason.TRIM_ENDED)
+    from_m = _standing_m(memory, now)
+    plan, spent = now.plan(memory, from_m), memory.excursions
+    begun = memory.move.begun or bool(memory.course and memory.course.changes_m)
+    for each in plan.excursions(begun=begun):
+        spent_m = (spent.spent_at_m(seen.now_s, bounds) if spent else 0.0) + 2 * each.beyond_m
+        broke = 0.0 < day_m(bounds) < spent_m and not _left_away(memory, now)
+        if plan.barred(each) is not NOTHING or broke:
+            continue
+        slide = _slide_from(memory, from_m, each.by_m, each.direction)
+        command_pa = bounds.allowed_pa(now.balance.slide_pa(from_m, each.by_m, each.direction))
+        if command_pa == memory.command_pa:
+            return _barred(memory, now, InhibitReason.TRIM_ENDED)
+        out = Out(
+            slide=slide,
+            given_s=seen.now_s,
+            seen_m=seen.position_m,
+            seen_s=seen.now_s,
+            back_pa=plan.back_pa(each.direction, from_m, 0.0),
+        )
+        return replace(
+            memory,
+            command_pa=command_pa,
+            state=out,
+            move=memory.move.given(seen.now_s, None),
+            excursions=Excursions(seen.now_s, spent.away_s if spent else 0.0, spent_m),
+        )
+    return None
+
+
+def no_excursion(memory: SlideMemory, now: Now) -> SlideMemory:
+    """End the move: a bound of the site bars each excursion."""
+    plan = now.plan(memory, _standing_m(memory, now))
+    reasons = [plan.barred(each) for each in plan.excursions(begun=memory.move.begun)]
+    if NOTHING in reasons:
+        return _idle(memory, InhibitReason.EXCURSION_BUDGET_SPENT)
+    beyond_pressure = InhibitReason.LAW_BEYOND_LIMITS in reasons
+    why = InhibitReason.LAW_BEYOND_LIMITS if beyond_pressure else InhibitReason.EXCURSION_BEYOND_LIMIT
+    return _barred(memory, now, why)
+
+
+def _rest(now: Now) -> Rest:
+    assert now.seen.rest is not None, "only asked of a stem at rest"
+    return now.seen.rest
+
+
+def _error_m(now: Now) -> float:
+    return now.reference_m - _rest(now).position_m
+
+
+def _side(now: Now) -> int:
+    return 1 if _error_m(now) > 0 else -1
+
+
+def _standing_m(memory: SlideMemory, now: Now) -> float:
+    """Return where a slide begins, m: where the last one ended, whatever the packing has given way since."""
+    return _rest(now).position_m if memory.anchor is None else memory.anchor.position_m
+
+
+def _band_m(now: Now) -> float:
+    """Return within what an error is none, m."""
+    thresholds = now.bounds.thresholds
+    known_m = max(
+        thresholds.noise_deviations * _rest(now).std_m, thresholds.noise_quanta * now.seen.quantum_m
+    ) + beside_m(now.bounds, now.balance)
+    return max(now.bounds.dead_band_m, known_m)
+
+
+def _on_stop(memory: SlideMemory, now: Now) -> bool:
+    """Whether the last slide went onto a stop, beyond a target beside it, though sent no farther, or short of one.
+
+    Another one would, too: the stop bears the rest, so that it says nothing of the balance.
+    """
+    slide, rest_m, target_m = memory.move.last, _rest(now).position_m, now.reference_m
+    if slide is None:
+        return False
+    s, within_m = slide.direction, STOP * now.balance.stroke_m
+    stop_m = now.balance.stops_m[s > 0]
+    if abs(stop_m - rest_m) > within_m:
+        return False
+    if s * (target_m - stop_m) > 0.0:
+        return s * (slide.to_m - stop_m) > 0.0
+    beyond = s * (slide.to_m - target_m) <= 0.0 < s * (rest_m - target_m)
+    return beyond and abs(stop_m - target_m) <= within_m
+
+
+def _left_away(memory: SlideMemory, now: Now) -> bool:
+    """Whether a slide of the move has left the stem away."""
+    from_m = _standing_m(memory, now)
+    back_m = now.plan(memory, from_m).back_m(_side(now))
+    return memory.move.begun and abs(now.reference_m - from_m) > 0.5 * back_m
+
+
+def _slide_from(memory: SlideMemory, from_m: float, to_m: float, direction: int) -> Slide:
+    turning = None if memory.anchor is None else memory.anchor.turns(direction)
+    return Slide(from_m=from_m, to_m=to_m, direction=direction, turning=turning)
+
+
+def _slide(memory: SlideMemory, now: Now, from_m: float, to_m: float, direction: int) -> SlideMemory:
+    """Give a slide: the second of two, if the first is under way."""
+    now_s, bounds, state = now.seen.now_s, now.bounds, memory.state
+    wanted_pa = now.balance.slide_pa(from_m, to_m, direction)
+    command_pa = bounds.allowed_pa(wanted_pa)
+    slide: Slide | None
+    slide, reason = _slide_from(memory, from_m, to_m, direction), NOTHING
+    if command_pa != wanted_pa:
+        slide, reason = None, InhibitReason.LAW_BEYOND_LIMITS
+    excursions = memory.excursions
+    if isinstance(state, Out) and excursions is not None:
+        excursions = replace(excursions, away_s=now_s - state.given_s)
+    return replace(
+        memory,
+        command_pa=command_pa,
+        target_m=now.reference_m,
+        state=Returning(slide, reason) if isinstance(state, Out) else Sliding(slide, reason),
+        move=memory.move.given(now_s, slide),
+        excursions=excursions,
+    )
+
+
+def _idle(memory: SlideMemory, reason: InhibitReason) -> SlideMemory:
+    """Return the memory of a stem that is left alone: the same one, if it is already, as in most steps."""
+    if isinstance(memory.state, Idle) and memory.state.reason is reason:
+        return memory
+    return replace(memory, state=Idle(reason))
+
+
+def _barred(memory: SlideMemory, now: Now, reason: InhibitReason) -> SlideMemory:
+    """End the move where a bound bars a longer slide: for that reason, or, where nothing breaks loose, for that.
+
+    A stem is stuck that slides in a row have not moved, each as long as has broken it loose before, or one that was to
+    go the whole way. Whichever bound they met, what they seem to teach is not believed: the next reference is tried
+    with what was known before, and what is held until then brings a stem that comes free to its reference, not to where
+    the last push would have.
+    """
+    row, rest_m, error_m, s = memory.row, _rest(now).position_m, _error_m(now), _side(now)
+    if row is None:
+        return _idle(memory, reason)
+    before = row.before.at(s, turning=memory.anchor is None or memory.anchor.turns(s), local=now.balance.local(rest_m))
+    whole_way = before.seen and abs(error_m) >= before.broke_m
+    if not (row.stuck or row.held >= now.bounds.thresholds.stuck_after or whole_way):
+        return _idle(memory, reason)
+    if isinstance(memory.state, Stuck) and memory.distances is row.before and memory.move.left == 0:
+        return memory
+    return replace(
+        memory,
+        command_pa=now.bounds.allowed_pa(now.balance.slide_pa(rest_m, now.reference_m, s)),
+        state=Stuck(rest_m),
+        move=replace(memory.move, left=0),
+        distances=row.before,
+        row=Row(row.before, stuck_at_m=rest_m),
+    )
+
+
+class Rule(NamedTuple):
+    """A row of the table: in which states it is asked, what it does, to which states it leads, and when it holds."""
+
+    of: tuple[type[State], ...]
+    follow: Callable[[SlideMemory, Now], SlideMemory | None]
+    to: tuple[type[State], ...]
+    when: str
+
+
+MOVING = (
+    Rule((Out,), gone_far_enough, (Returning,), "the first of two slides is far enough beyond, and goes on no more"),
+    Rule(COMMANDING, reference_far_off, (Sliding,), "a new reference lies far from a stem that moves"),
+    Rule((Idle, Sliding, Out, Returning, Waiting), overdue, (Waiting, Out), "no rest for longer than any stem takes"),
+)
+AT_REST = (
+    Rule(COMMANDING, there, (Idle,), "the stem is within the dead band"),
+    Rule(COMMANDING, as_near_as_slides_land, (Idle,), "it is as near as slides land, or on its stop"),
+    Rule(COMMANDING, no_slide_left, (Idle, Stuck), "the move has had its slides"),
+    Rule(COMMANDING, held_where_it_stands, (), "it rests under the pressure of the slide that it would be given: held"),
+    Rule(COMMANDING, one_slide, (Sliding, Returning, Idle, Stuck), "the reference is farther than break-away"),
+    Rule(COMMANDING, taken_back, (Idle,), "references to come take the error back"),
+    Rule(COMMANDING, excursion_waits, (Idle,), "the last excursion was too recent"),
+    Rule(COMMANDING, two_slides, (Out, Idle, Stuck), "an excursion is within the site's bounds"),
+    Rule(COMMANDING, no_excursion, (Idle, Stuck), "none is"),
+)
+TABLE = (*MOVING, *AT_REST)
+
+
+def after(memory: SlideMemory, now: Now) -> SlideMemory:
+    """Return the memory after the first rule that holds and leads to a state; one that leads to none only teaches."""
+    rest = now.seen.rest
+    if rest is not None:
+        memory = settled(memory, now, rest)
+    for rule in MOVING if rest is None else AT_REST:
+        if isinstance(memory.state, rule.of) and (followed := rule.follow(memory, now)) is not None:
+            if rule.to:
+                return followed
+            memory = followed
+    return on_its_way(memory, now)

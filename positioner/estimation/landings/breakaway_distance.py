@@ -1,0 +1,185 @@
+"""How far a stem at rest must be sent to break loose, as slides teach it: the break-away distance.
+
+    d = (F_s - F_c)/k_s               of a slide that goes on in the direction of the last
+      + (F_s + F_c)/k_p - w           of one that turns round: a packing of stiffness k_p gives way, play w is taken up
+
+F_s, F_c of the direction. So there are four: up and down, going on and turning round. None of what stands above is
+known; what is, is an interval, held < d <= broke: the longest way that held the stem, and the shortest that broke it
+loose. What a slide sent by a way a taught, that went b:
+
+    it arrived                        broke = b
+    it did not move                   held = a
+    it went farther than it was sent  both: none is so short, it jumped (behind a slow I/P, where stems stick short)
+    it fell short, having turned      held = a: the packing gave way
+    it fell short, going on           nothing: friction has grown, which the balance learns
+    it was not seen to its end        nothing
+
+The interval shrinks by that. It widens by contradiction: where a way holds though so short a one has broken loose, d
+lies within `RAISE` of it, to either side; a way that breaks loose though so long a one has held makes held a little
+shorter than it. And by time, for friction changes: with each slide held fades.
+An interval of which one side is missing has its next of kin's, if that agrees. It is kept as in the middle of the
+travel, and goes over it as friction over slope does, φ/κ; what turning takes besides as friction.
+"""
+
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+from typing import NamedTuple
+
+LOWER, RAISE = 0.5, 1.3
+"""Factors on a distance as long as nothing has held, and where what broke loose holds."""
+GROWS = 2.0
+"""Factor, at most, from what held to what is tried next: what broke loose may have been far longer than needed."""
+ALIKE = 1.25
+"""Factor by which kin may differ: what holds one, less that, holds the other."""
+CLOSE = 1.1
+"""Broke over held: near enough, nothing between them is tried."""
+BESIDE = 1.05
+"""Factor to a bound that a slide has contradicted."""
+FADES = 0.999
+"""Factor on held with each slide that breaks loose: a shorter way is tried again after some hundred."""
+LONG = 2.0
+"""Times broke: a slide longer than this says nothing."""
+SHRINKS = 0.25
+"""Factor on a distance from place to place, at the least."""
+
+
+class Local(NamedTuple):
+    """What a place of the travel has of what the middle has: factors."""
+
+    up: float = 1.0
+    down: float = 1.0
+    """Of φ/κ, in the direction."""
+    friction: float = 1.0
+    """Of φ."""
+
+    def on(self, direction: int) -> float:
+        """Return the factor on what going on takes."""
+        return self.up if direction > 0 else self.down
+
+
+class Went(NamedTuple):
+    """What became of a slide: m."""
+
+    sent_m: float
+    went_m: float
+    moved: bool
+    """Whether it went farther than a packing gives way."""
+    arrived: bool
+    """Whether it came where it was sent, as far as that can be told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """held < d <= broke, m."""
+
+    held_m: float = 0.0
+    """0: nothing has held."""
+    broke_m: float = inf
+    """Infinite: nothing has broken loose."""
+    seen: bool = False
+    """Whether a slide has shown that, and none since that it holds; else it is a guess."""
+
+    @property
+    def likely_m(self) -> float:
+        """The way to try, m: one that halves the interval, or, of a narrow one, what broke loose."""
+        if not self.held_m:
+            return LOWER * self.broke_m
+        if self.broke_m <= CLOSE * self.held_m:
+            return self.broke_m
+        return min(sqrt(self.held_m * self.broke_m), GROWS * self.held_m) if self.broke_m < inf else RAISE * self.held_m
+
+    @property
+    def sure_m(self) -> float:
+        """The way that has broken loose, m, no more than twice the one to try."""
+        return min(self.broke_m, GROWS * self.likely_m)
+
+    def breaking(self, way_m: float) -> "Interval":
+        """Return it after a way, m, that broke loose."""
+        if way_m > LONG * self.broke_m:
+            return self
+        held_m = FADES * self.held_m if way_m > self.held_m else way_m / BESIDE
+        return Interval(held_m, min(self.broke_m, way_m), self.seen or way_m <= self.broke_m)
+
+    def holding(self, way_m: float) -> "Interval":
+        """Return it after a way, m, that held."""
+        if self.broke_m > BESIDE * way_m:
+            return replace(self, held_m=max(self.held_m, way_m))
+        if self.seen:  # one such may be luck
+            return Interval(max(self.held_m, way_m / RAISE), RAISE * way_m)
+        return Interval(max(self.held_m, way_m), GROWS * way_m)
+
+    def taught(self, went: Went, *, turning: bool) -> "Interval":
+        """Return it after a slide."""
+        if went.arrived:
+            return self.breaking(went.went_m)
+        if not went.moved:
+            return self.holding(went.sent_m)
+        if went.went_m < went.sent_m:
+            return self.holding(went.sent_m) if turning else self
+        return self.holding(went.sent_m).breaking(went.went_m)
+
+    def times(self, factor: float) -> "Interval":
+        """Return it so much longer."""
+        return Interval(factor * self.held_m, factor * self.broke_m, self.seen)
+
+    def filled(self, kin: "Interval") -> "Interval":
+        """Return it with what it lacks of a kin's, if that agrees."""
+        if (self.held_m and self.broke_m < inf) or kin.broke_m <= self.held_m:
+            return self
+        better = kin.seen >= self.seen if kin.broke_m < self.broke_m else kin.seen > self.seen
+        broke_m, seen = (kin.broke_m, kin.seen) if better else (self.broke_m, self.seen)
+        held_m = kin.held_m if better else kin.held_m / ALIKE
+        return Interval(self.held_m or (held_m if held_m < broke_m else 0.0), broke_m, seen)
+
+
+UNKNOWN = Interval()
+MIDDLE = Local()
+
+
+@dataclass(frozen=True, slots=True)
+class BreakawayDistance:
+    """The four intervals, as in the middle of the travel."""
+
+    onward_up: Interval = UNKNOWN
+    onward_down: Interval = UNKNOWN
+    turning_up: Interval = UNKNOWN
+    turning_down: Interval = UNKNOWN
+
+    @property
+    def all(self) -> tuple[Interval, Interval, Interval, Interval]:
+        """In the order of the fields."""
+        return self.onward_up, self.onward_down, self.turning_up, self.turning_down
+
+    def at(self, direction: int, *, turning: bool, local: Local = MIDDLE) -> Interval:
+        """Return the interval of slides in a direction at a place; what it lacks is its next of kin's."""
+        own = self._own(direction, turning=turning)
+        for s, t in ((direction, not turning), (-direction, turning), (-direction, not turning)):
+            own = own.filled(self._own(s, turning=t))
+        return own.times(self._factor(direction, local, turning=turning))
+
+    def taught(self, direction: int, went: Went, *, turning: bool, local: Local) -> "BreakawayDistance":
+        """Return the distances after a slide in a direction."""
+        factor = self._factor(direction, local, turning=turning)
+        there = self._own(direction, turning=turning).times(factor).taught(went, turning=turning)
+        name = f"{'turning' if turning else 'onward'}_{'up' if direction > 0 else 'down'}"
+        return replace(self, **{name: there.times(1.0 / factor)})
+
+    def _own(self, direction: int, *, turning: bool) -> Interval:
+        if turning:
+            return self.turning_up if direction > 0 else self.turning_down
+        return self.onward_up if direction > 0 else self.onward_down
+
+    def _factor(self, direction: int, local: Local, *, turning: bool) -> float:
+        """Return by what factor a distance at a place differs from that in the middle.
+
+        Going on is taken for as much of turning as what held and what broke loose let it be; play is alike everywhere.
+        """
+        by = local.on(direction)
+        if not turning or by == local.friction == 1.0:
+            return by
+        turns_m, on = self._own(direction, turning=True).broke_m, self._own(direction, turning=False)
+        if turns_m == inf:
+            return by
+        on_m = max(on.held_m, min(turns_m, on.broke_m))
+        rest_m = turns_m - on_m
+        return max(SHRINKS, (on_m * by + rest_m * (local.friction if rest_m > 0.0 else 1.0)) / turns_m)
