@@ -16,6 +16,7 @@ from config.exports.export_preview import preview
 from config.recording import Recording
 from config.valve_file import shipped_valve
 from positioner.cli.parts.export_arguments import add_export_arguments, read_mapped
+from positioner.pages.workbench_page import desk as desk_module
 from positioner.pages.workbench_page.background import Limits, News, Raced, Work, diagnosed
 from positioner.pages.workbench_page.command_lines import command_lines
 from positioner.pages.workbench_page.desk import SAVED, Desk, named_valve
@@ -25,6 +26,7 @@ from positioner.pages.workbench_page.provenance import NamedValve
 from positioner.pages.workbench_page.search import Search
 from positioner.pages.workbench_page.search_panel import SearchPanel
 from tests.pages.laid_out import hidden
+from workbench.diagnosis.extension import extend
 
 
 @cache
@@ -106,6 +108,36 @@ def test_a_kept_curve_stays_when_the_valve_gets_better_and_goes_with_another_rec
     assert desk.variants[SAVED] is kept_m
     desk.take_recording(other())
     assert SAVED not in desk.variants
+
+
+def test_blind_practice_draws_what_can_be_seen(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = {3: [0.2, 0.1], 4: [0.9, 0.1], 5: [0.9, 0.8]}
+    blind: list[int] = []
+    answers = {
+        seed: {"visible": {str(i): {"is_visible": each > 0.5} for i, each in enumerate(shows)}}
+        for seed, shows in drawn.items()
+    }
+    monkeypatch.setattr(desk_module, "hide", lambda seed: SimpleNamespace(answer=answers[seed]))
+    monkeypatch.setattr(Desk, "blind", lambda _, seed: blind.append(seed))
+    desk.blind_practice(3)
+    assert blind == [5]
+
+
+def test_a_form_that_was_discovered_goes_home_as_a_file_and_as_the_command_that_finds_it(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk.may_write_effects = True
+    monkeypatch.setattr(desk_module, "Work", lambda *_, **__: SimpleNamespace(is_over=True, is_alive=False))
+    form = SimpleNamespace(text=lambda source: f'"""Of {source}."""\n')
+    desk.discover()
+    assert desk.search is not None
+    desk.search.result = SimpleNamespace(found=[form])
+    desk.extend_by_form(desk.search)
+    assert desk.effects["found_1"].read_text() == '"""Of fit.csv."""\n'
+    desk.add(extend(hidden().fit, hidden().base, []), desk.search, None)
+    discover, added, _ = command_lines(desk)
+    assert discover == "positioner discover fit.csv --valve valve.toml -o found_1.py"
+    assert added.startswith("positioner extend valve.toml ")
 
 
 def test_a_time_that_is_over_at_once_says_that_nothing_is_known() -> None:

@@ -63,6 +63,29 @@ def test_a_slider_goes_over_the_whole_range_and_static_friction_never_falls_belo
         assert live.valve.valve.static_n >= live.valve.valve.coulomb_n * (1.0 - 1e-12)
 
 
+def test_a_slider_goes_as_far_as_such_a_valve_may_and_a_number_as_far_as_is_physical() -> None:
+    """A sensor's offset went to 10 m, a preload to a million newtons."""
+    offset = EffectTable.model_validate({"name": "sensor_offset", "offset_m": 1e-3})
+    valve = hidden().base.valve
+    live = LiveModel(record(), ValveFile(valve=valve, effect=(offset,)))
+    moved, coulomb, static = (live.parameters[name] for name in ("sensor_offset.offset_m", "coulomb_n", "static_n"))
+    ends = [live.value_at(moved, share) for share in (0.0, 1.0)]
+    assert ends == pytest.approx([-0.12 * valve.stroke_m, 0.12 * valve.stroke_m])
+    assert live.value_at(coulomb, 1.0) == pytest.approx(10.0 * valve.coulomb_n)
+    live.put(moved, 0.5)
+    assert live.value(moved) == pytest.approx(0.5)
+    assert live.share(moved) == 1.0, "the slider stands at its end"
+    live.put(coulomb, 1000.0)
+    assert live.value(static) / live.value(coulomb) == pytest.approx(valve.static_n / valve.coulomb_n)
+    live.put(static, 1500.0)
+    assert live.valve.valve.static_n == pytest.approx(1500.0)
+    for name, value in (("static_n", 900.0), ("mass_kg", -1.0), ("sensor_offset.offset_m", 11.0)):
+        with pytest.raises(InputError, match=rf"{name}: allowed is .* to .*, got {value:g}"):
+            live.put(live.parameters[name], value)
+    assert live.undo()
+    assert live.value(static) == pytest.approx(1000.0 * valve.static_n / valve.coulomb_n)
+
+
 def test_an_effect_switched_off_is_the_valve_without_it() -> None:
     live = LiveModel(record(), preloaded())
     live.switch("preload", False)

@@ -53,7 +53,6 @@ LAYOUT = """
 .scrolling table { border-collapse: collapse; margin: 8px 0; font-variant-numeric: tabular-nums; }
 .scrolling table td, .scrolling table th { padding: 2px 12px 2px 0; white-space: nowrap; }
 @media (max-width: 599px) {
-  .together > .side { order: -1; }
   .q-header { flex-wrap: nowrap; } .q-header .title { display: none; } .q-header .q-select { min-width: 0; }
 }
 """

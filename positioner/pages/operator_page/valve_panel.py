@@ -69,7 +69,7 @@ class ValvePanel:
                 with ui.element("div").classes("wide column"):
                     self._trend(theme)
                     self._moves(theme)
-                with ui.element("div").classes("side column"):
+                with ui.element("div").classes("side column before-plots"):
                     self._controls = Controls(valve, signed, units)
                     self._status = FactsCard("Status", "status")
             with ui.element("div").classes("cards"):

@@ -26,6 +26,7 @@ body.body--dark { --q-primary: #3f92d0 !important; }
 .said { margin: 0; padding-left: 1.2rem; }
 .said li { margin: 2px 0; }
 .steady { height: 17.5rem; overflow-y: auto; flex-wrap: nowrap; gap: 4px; width: 100%; }
+.typed .q-field__control, .typed .q-field__native { height: 26px; min-height: 26px; padding: 0 6px; }
 .jump { all: unset; vertical-align: top; cursor: pointer; text-align: left; }
 .jump { text-decoration: underline dotted; text-underline-offset: 3px; }
 .nicegui-error-popup { bottom: 5rem !important; }
@@ -39,6 +40,7 @@ h2 { font-size: 1.05rem; font-weight: 600; margin: 6px 0 2px; line-height: 1.3; 
 .body--dark .q-btn.text-negative { color: #ff8a80 !important; }
 .body--dark .q-uploader__header { background: #1b5e8a; }
 @media (max-width: 599px) {
+  .side.before-plots { order: -1; } .steady { height: auto; max-height: 17.5rem; }
   .panel { padding: 8px 8px 24px; } .q-header { padding: 4px 8px; gap: 4px; }
   .candidates thead { display: none; }
   .candidates tr { display: flex; flex-flow: row wrap; align-items: center; border-top: 1px solid #80808066; }

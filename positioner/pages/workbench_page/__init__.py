@@ -12,6 +12,7 @@ Its files; those up to `search` know no browser:
     page                            the page of one tab
     open_panel                      where a recording and a valve come onto the desk
     columns_panel, export_figure    which column of an export is which; what it would look like, read so
+    explained                       words that say what they mean where they stand
     compare_panel, findings_panel   measured and simulated; what `compare` says, and where it shows
     sliders                         the parameters
     effect_panel                    an effect of one's own

@@ -20,6 +20,7 @@ from sim.effect import written_here
 from sim.own_effect import checked
 from workbench.diagnosis.diagnosis import Diagnosis, diagnose
 from workbench.diagnosis.extension import Extension, extend
+from workbench.discover.discovery import Discovery, discover
 from workbench.fit.breaking_off import BrokenOff
 from workbench.select.tangent_preview import TangentScore
 
@@ -193,6 +194,21 @@ def extended(
         tell(Progressed(what, done))
 
     return extend(recording, valve, effects, test=limits.test, diagnosis=diagnosis, progress=progressed)
+
+
+def discovered(tell: Tell, recording: Recording, valve: ValveFile, limits: Limits) -> Discovery:
+    """Look for the form of what no effect of the library explains.
+
+    Args:
+        tell: is told the progress.
+        recording: of the valve.
+        valve: where the search begins.
+        limits: of which the held-out recording counts.
+
+    Raises:
+        InputError: as `discover`.
+    """
+    return discover(recording, valve, test=limits.test, progress=lambda what, done: tell(Progressed(what, done)))
 
 
 def effect_checked(tell: Tell, valve: ValveFile, path: Path) -> None:

@@ -31,6 +31,10 @@ def command_lines(desk: Desk) -> tuple[str, ...]:
         ("hide", "--seed", str(seed), "-o", blind_folder(seed)) for seed in _seeds(valve, desk.opened)
     ]
     for each in valve.chain:
+        if isinstance(each.made, Extended) and each.made.form:
+            lines.append(
+                ("discover", *_of(each.made.recording, each.made.held_out, each.made.before), "-o", each.made.form)
+            )
         lines += [words for words in (_made(each),) if words]
     if not desk.journal:
         lines.append(("diagnose", *_of(desk.opened, desk.held_out, valve), *_searched(desk)))

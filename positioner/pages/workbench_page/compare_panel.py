@@ -10,6 +10,7 @@ from positioner.pages.parts.live_text import LiveText
 from positioner.pages.parts.telling import aside, errors_told
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.desk import SAVED, Desk
+from positioner.pages.workbench_page.explained import word
 from positioner.pages.workbench_page.findings_panel import FindingsPanel
 from positioner.pages.workbench_page.force_figures import Seen, force_figure
 from positioner.pages.workbench_page.live_model import LiveModel
@@ -53,14 +54,14 @@ class ComparePanel:
         self._show_curve()
         for name, position_m in desk.variants.items():
             self._figure.show(name, position_m)
+        self._figures = ui.row().classes("w-full items-end").style("gap: 24px")
+        with self._figures:
+            self._error = _figure_of_merit("error, rms", "error", "error")
+            self._floor = _figure_of_merit("floor", "floor")
+            self._fit = _figure_of_merit("fit", "fit")
+            jumps = ui.row().classes("items-center")
         with ui.element("section").classes("together").props('data-testid="compared"'):
             with ui.column().classes("wide"):
-                self._figures = ui.row().classes("w-full items-end").style("gap: 24px")
-                with self._figures:
-                    self._error = _figure_of_merit("error, rms", "error")
-                    self._floor = _figure_of_merit("floor", "floor")
-                    self._fit = _figure_of_merit("fit", "fit")
-                    jumps = ui.row().classes("items-center")
                 self._time = FigureView(theme, self._drawn, TIME_PX, "position, error and pressure over time")
                 self._time.plot.on("plotly_relayout", self._looked_at)
                 self._time.plot.on("plotly_click", self._clicked, js_handler=POINT)
@@ -72,7 +73,7 @@ class ComparePanel:
                         lambda event, other=other: self._selected(event, other),
                         js_handler=TIMES,
                     )
-            with ui.column().classes("side"):
+            with ui.column().classes("side before-plots"):
                 self._findings = FindingsPanel(self._go_to, stroke_m, desk.units)
                 self._findings.jumps.move(jumps)
                 ui.button("Keep this curve to compare with", icon="bookmark", on_click=self._keep).props(
@@ -198,7 +199,7 @@ class ComparePanel:
         other.redraw()
 
 
-def _figure_of_merit(what: str, name: str) -> LiveText:
+def _figure_of_merit(what: str, name: str, meaning: str = "") -> LiveText:
     with ui.column().style("gap: 0"):
-        ui.label(what).classes("quiet")
+        word(what, meaning)
         return LiveText().classes("figure number").props(f'data-testid="{name}"')

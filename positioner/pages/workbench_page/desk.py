@@ -21,7 +21,15 @@ from config.recording import Column, Recording
 from config.valve_file import find_valve, load_valve, valve_alone
 from config.writing import valve_toml, write_valve
 from positioner.pages.parts.units import NO_NUMBER, Units
-from positioner.pages.workbench_page.background import Limits, Task, Work, diagnosed, effect_checked, extended
+from positioner.pages.workbench_page.background import (
+    Limits,
+    Task,
+    Work,
+    diagnosed,
+    discovered,
+    effect_checked,
+    extended,
+)
 from positioner.pages.workbench_page.live_model import LiveModel
 from positioner.pages.workbench_page.opening import Export, Opened
 from positioner.pages.workbench_page.provenance import (
@@ -39,6 +47,7 @@ from sim.effect import written_here
 from workbench.blind.hiding import hide
 from workbench.blind.sealing import seal
 from workbench.compare.comparison import Comparison
+from workbench.diagnosis.diagnosis import Diagnosis
 from workbench.diagnosis.extension import Extension, extension_of
 from workbench.diagnosis.extension_journal import Journal, write_extended
 from workbench.fit.fitted_parameter import Fitted
@@ -166,6 +175,16 @@ class Desk:
         """
         self._held(self.opened, valve)
 
+    def blind_practice(self, seed: int) -> None:
+        """Put a sealed case on the desk whose effect shows in the recording: the first from a seed on.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        while not all(each["is_visible"] for each in hide(seed).answer["visible"].values()):
+            seed += 1
+        self.blind(seed)
+
     def blind(self, seed: int) -> None:
         """Put a sealed case on the desk: a recording with a hidden effect, and what is known of the valve.
 
@@ -277,15 +296,34 @@ class Desk:
         search = self.begin("extend", extended, tuple(effects), found and found.result)
         search.went_on = Diagnosed(found.tried, is_verdict=False) if found else None
 
+    def discover(self) -> None:
+        """Begin to look for the form of what no effect explains.
+
+        Raises:
+            InputError: as `begin`.
+        """
+        self.begin("discover", discovered)
+
+    def extend_by_form(self, search: Search) -> None:
+        """Begin to add the form that a search has found, as an effect of one's own.
+
+        Raises:
+            InputError: nobody may write an effect here, or as `begin`.
+        """
+        name = f"found_{sum(each.startswith('found_') for each in self.effects) + 1}"
+        path = self.write_effect(name, search.result.found[0].text(search.recording.name))
+        self.keep_effect(name)
+        self.begin("extend", extended, (str(path),), None).form = f"{name}.py"
+
     def take(self, search: Search) -> None:
-        """Go on with what a search has come to: a diagnosis is kept, a refitted valve is the next.
+        """Go on with what a search has come to: a diagnosis is kept, a refitted valve is the next; a form is shown.
 
         Raises:
             InputError: as `add`.
         """
         if isinstance(search.result, Extension):
             self.add(search.result, search, search.went_on)
-        else:
+        elif isinstance(search.result, Diagnosis):
             self.found = search
 
     def add_verdict(self, search: Search) -> None:
@@ -324,7 +362,7 @@ class Desk:
         """
         path = self._path("better")
         write_extended(extension, search.begins.path, path)
-        made = Extended(search.begins, extension, search.recording, search.held_out, went_on)
+        made = Extended(search.begins, extension, search.recording, search.held_out, went_on, search.form)
         self._go_on(NamedValve(path.name, path, extension.valve, made), extension.extended.parameters)
 
     def undo(self) -> bool:

@@ -7,6 +7,7 @@ from nicegui import ui
 
 from positioner.pages.parts.page_words import in_page_words
 from positioner.pages.parts.units import Units
+from positioner.pages.workbench_page.explained import word
 from workbench.compare.comparison import Comparison
 from workbench.compare.comparison_sentences import Stretch, slip_sentences
 from workbench.report.comparison_report import headline
@@ -59,7 +60,7 @@ class FindingsPanel:
                     self._jump(f"{len(times_s)} {kind}", [Stretch(each, each) for each in times_s], texts)
                 else:
                     ui.label(f"0 {kind}").classes("quiet")
-            ui.label("slips").classes("quiet")
+            word("slips")
             at_s = _largest_s(compared)
             self._jump("largest error", [Stretch(at_s, at_s)], [f"at {at_s:.2f} s"])
 

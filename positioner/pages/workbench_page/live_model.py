@@ -1,14 +1,18 @@
 """A valve against a recording, its parameters moved by hand: the whole model runs anew at each move, in milliseconds.
 
-A parameter is moved in the coordinate of a fit (`workbench.model.parameters`), so that a slider's way goes over its
-whole physical range. An effect that is switched off has the parameters with which it vanishes; nothing is compiled.
+A parameter is moved in the coordinate of a fit (`workbench.model.parameters`). A slider's way is what such a valve may
+be: a tenth to ten times a parameter of the valve on the desk, up to four times the strongest that an effect's file
+begins a search with. A number that is typed may lie wherever it is physical.
+
+An effect that is switched off has the parameters with which it vanishes; nothing is compiled.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from config.errors import InputError
 from config.recording import Column
 from config.valve_file import ValveFile
 from sim.composition import BASE, Composition
@@ -20,6 +24,10 @@ from workbench.data.record import Record, require_units
 from workbench.model.free_run import FreeRun, Run
 from workbench.model.parameters import Parameter, free_parameters
 
+WITHIN = 10.0
+"""A parameter of the bare valve: slider from this part of the valve file's value to this many times it."""
+STRONGEST = 4.0
+"""An effect's: slider to so many times its strongest start, away from where it vanishes."""
 FIXED = ("diaphragm_area_m2", "deadzone_ratio")
 """Of the bare valve: only ratios of forces are in a recording, and the dead zone is the method's."""
 
@@ -59,6 +67,11 @@ class LiveModel:
         """The names of its effects."""
         return tuple(each.name for each in self._composition.effects)
 
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The same as the valve file names them; one of one's own by its path."""
+        return tuple(each.written for each in self._composition.effects)
+
     def value(self, parameter: Parameter) -> float:
         """Return what a parameter is set to, SI."""
         return float(self.setting.theta[parameter.index])
@@ -80,6 +93,23 @@ class LiveModel:
         theta[parameter.index] = value
         least, most = parameter.bounds
         return (parameter.coordinate(theta) - least) / (most - least)
+
+    def put(self, parameter: Parameter, value: float) -> None:
+        """Set a parameter to a value, SI.
+
+        Raises:
+            InputError: it is beyond the physical range; says what is allowed.
+        """
+        physical, theta = self._physical[parameter.name], np.array(self.setting.theta)
+        coulomb_n = float(theta[BASE.index("coulomb_n")]) if parameter.name == "static_n" else 1.0
+        least, most = coulomb_n * physical.least, coulomb_n * physical.most
+        if not least <= value <= most:
+            raise InputError(parameter.name, f"allowed is {least:.4g} to {most:.4g}, got {value:.6g}")
+        there = np.array(theta)
+        there[parameter.index] = value
+        physical.put(theta, physical.coordinate(there))  # sliding friction takes the static along
+        self.keep()
+        self.setting = replace(self.setting, theta=theta)
 
     def keep(self) -> None:
         """Remember the setting: `undo` comes back to it."""
@@ -181,7 +211,35 @@ class LiveModel:
     def _movable(self) -> Mapping[str, Parameter]:
         bare = [name for name in BASE if name not in FIXED and getattr(self._composition.valve, name) > 0.0]
         rest = [name for name in self._composition.names if name not in BASE]
-        return {each.name: each for each in free_parameters(self._composition, [*bare, *rest])}
+        self._physical = {each.name: each for each in free_parameters(self._composition, [*bare, *rest])}
+        return {name: self._on_slider(each) for name, each in self._physical.items()}
+
+    def _on_slider(self, parameter: Parameter) -> Parameter:
+        """Return a parameter with the range of its slider, in which its value lies."""
+        value = float(self._composition.theta[parameter.index])
+        effect, _, key = parameter.name.rpartition(".")
+        if parameter.name == "static_n":
+            return parameter  # a ratio
+        if not effect:
+            low, high = value / WITHIN, value * WITHIN
+        else:
+            declared = next(each for each in self._composition.effects if each.name == effect).parameters[key]
+            low, high = _reach(parameter.starts, declared.off, positive=parameter.least > 0.0)
+        low, high = min(low, value), max(high, value)
+        return replace(parameter, least=max(low, parameter.least), most=min(high, parameter.most))
+
+
+def _reach(starts: Sequence[float], off: float | None, *, positive: bool) -> tuple[float, float]:
+    """Return how far a slider reaches about the starts of a search; from `off` where the effect vanishes somewhere.
+
+    >>> _reach((-0.1, 0.1, 0.5), 0.0, positive=False), _reach((0.1, 10.0), None, positive=True)
+    ((-2.0, 2.0), (0.025, 40.0))
+    """
+    if positive:
+        return min(starts) / STRONGEST, max(starts) * STRONGEST
+    middle = 0.0 if off is None else off
+    far = STRONGEST * max(abs(each - middle) for each in starts)
+    return middle - far, middle + far
 
 
 def _put(theta: Vector, parameter: Parameter, share: float) -> None:

@@ -73,7 +73,7 @@ class OpenPanel:
         self._offered(files)
         with ui.row().classes("items-center"):
             ui.button("Blind practice", icon="visibility_off", on_click=self._blind).props("outline no-caps")
-            ui.label("a recording with a hidden effect, its answer sealed").classes("quiet")
+            ui.label("a recording with a hidden effect that shows in it, its answer sealed").classes("quiet")
 
     def _offered(self, files: Sequence[Path]) -> None:
         """Offer the files of a command line, a line a folder: each is a button, of many folders' a list."""
@@ -193,7 +193,7 @@ class OpenPanel:
 
     async def _blind(self) -> None:
         with errors_told():
-            await aside(self._desk.blind, secrets.randbelow(MOST_BLIND))
+            await aside(self._desk.blind_practice, secrets.randbelow(MOST_BLIND))
             self._changed()
 
     def _show_name(self, name: str | None) -> None:

@@ -7,6 +7,7 @@ command of its own that ends at the same file, bit by bit:
     DataSheetMade    positioner valve --area-cm2 ... -o FILE
     SetByHand        positioner valve --of BEFORE --set NAME=VALUE ... --without EFFECT ... -o FILE
     Extended         positioner extend BEFORE --effect NAME ... --fit REC -o FILE
+                     of a form: positioner discover REC --valve BEFORE -o FORM.py before that
                      after a diagnosis: positioner diagnose REC --valve BEFORE ... --add NAME ... -o FILE
 """
 
@@ -73,6 +74,8 @@ class Extended:
     held_out: Opened | None
     """None: the last third of the recording."""
     diagnosed: Diagnosed | None = None
+    form: str = ""
+    """The file of the form that it adds, found by `discover` in the same recording."""
 
 
 Made = Hidden | DataSheetMade | SetByHand | Extended

@@ -26,6 +26,8 @@ class Search:
     """The effects that a diagnosis tries."""
     went_on: Diagnosed | None = None
     """The diagnosis that an extension goes on from."""
+    form: str = ""
+    """The file of the form that an extension adds, as `discover` wrote it."""
     doing: str = ""
     done: float = 0.0
     step: int = 0
@@ -42,9 +44,9 @@ class Search:
 
     @property
     def previewed(self) -> str:
-        """The preview in words; empty before."""
-        named = ", ".join(f"{each.name} {each.score:.2f}" for each in self.preview[:PREVIEWED])
-        return f"tangent preview, not a verdict: {named}" if named else ""
+        """The preview in words; empty before. How much of the error each would explain."""
+        named = ", ".join(f"{each.name} {each.score:.0%}" for each in self.preview[:PREVIEWED])
+        return f"no verdict: {named}" if named else ""
 
     def look(self) -> bool:
         """Take in what it has told since; whether there was anything."""

@@ -13,9 +13,11 @@ from positioner.pages.parts.telling import aside, errors_told, heading, is_looke
 from positioner.pages.parts.theme import Theme
 from positioner.pages.workbench_page.desk import Desk
 from positioner.pages.workbench_page.effect_panel import effect_section
+from positioner.pages.workbench_page.explained import ADDING_CELL, EFFECT_CELL, about_effect, word
 from positioner.pages.workbench_page.search import Search
 from sim.effect import tried_effects
 from workbench.diagnosis.diagnosis import Diagnosis
+from workbench.discover.discovery import Discovery
 from workbench.report.charts import EXTENDED, MEASURED, axis, layout, marked
 from workbench.report.diagnosis_report import ranked
 from workbench.report.effects_table import headline
@@ -23,9 +25,6 @@ from workbench.report.ranking import log_ticks
 
 LOOK_S = 0.2
 LEAST_BUDGET_S = 1.0
-ADDING = """<q-td :props="props"><q-btn flat dense no-caps icon="add" color="primary" :label="props.value"
-    :aria-label="`add ${props.value}`" @click="() => $parent.$emit('add', props.row)" /></q-td>"""
-"""A candidate's cell: a button, so that a keyboard reaches it."""
 ROW_PX, FRAME_PX = 18, 70
 
 
@@ -46,6 +45,10 @@ class SearchPanel:
             self._fit = ui.button("Fit the valve as it is", icon="tune", on_click=lambda: self._extend(())).props(
                 "outline no-caps"
             )
+            self._seek = ui.button("Discover a form", icon="functions", on_click=self._discover)
+            self._seek.props('outline no-caps data-testid="discover"').tooltip(
+                "where no effect of the library explains it: looks for the form of what is missing; minutes"
+            )
             self._cancel = ui.button("Cancel", icon="close", on_click=self._stop).props(
                 "outline no-caps color=negative"
             )
@@ -57,7 +60,9 @@ class SearchPanel:
         with ui.column().classes("w-full") as self._progress:
             self._doing = ui.label().props('data-testid="doing" aria-live="polite"')
             self._bar = ui.linear_progress(show_value=False, size="10px").props("rounded")
-            self._preview = ui.label().classes("quiet")
+            with ui.row().classes("items-baseline").style("gap: 6px") as self._previewed:
+                word("preview")
+                self._preview = ui.label().classes("quiet")
         self._result = ui.column().classes("w-full")
         self._race = ui.column().classes("w-full")
         self._raced: tuple[int, int] = (0, 0)
@@ -107,6 +112,11 @@ class SearchPanel:
             self._desk.extend(effects)
         self._began()
 
+    def _discover(self) -> None:
+        with errors_told():
+            self._desk.discover()
+        self._began()
+
     def _began(self) -> None:
         self._result.clear()
         self._show()
@@ -134,7 +144,9 @@ class SearchPanel:
         """Do what the search was for."""
         with errors_told():
             await aside(self._desk.take, search)
-            if self._desk.found is search:
+            if isinstance(search.result, Discovery):
+                self._tell_form(search)
+            elif self._desk.found is search:
                 self._tell(search)
                 self._told()
             else:
@@ -145,6 +157,7 @@ class SearchPanel:
         running = search is not None and search.is_running
         self._begin.set_enabled(not running)
         self._fit.set_enabled(not running)
+        self._seek.set_enabled(not running)
         self._cancel.set_visibility(running)
         self._progress.set_visibility(search is not None)
         if search is not None:
@@ -153,6 +166,7 @@ class SearchPanel:
             said = f"{self._desk.plain(search.doing) or 'starting'}: {search.done:.0%}" if running else search.failed
             self._doing.set_text(said)
             self._preview.set_text(self._desk.plain(search.previewed))
+            self._previewed.set_visibility(bool(search.preview))
 
     def _show_race(self) -> None:
         """Draw the bars; a step with other candidates is another figure."""
@@ -214,8 +228,35 @@ class SearchPanel:
                 ui.label(f"An experiment would tell them apart: {diagnosis.experiment.name}.")
             for number, step in enumerate(diagnosis.steps, start=1):
                 before = self._desk.errors.shown(step.before.errors.test_rmse_m).text
-                ui.label(f"step {number}: {before} {self._desk.errors.unit} held out before").classes("quiet")
+                with ui.row().classes("items-baseline").style("gap: 6px"):
+                    word(f"step {number}", "step")
+                    ui.label(f"before it {before} {self._desk.errors.unit} rms").classes("quiet")
+                    word("held out")
+                    ui.label("; what decides is the").classes("quiet")
+                    word("evidence")
                 self._candidates(diagnosis, number, may_add=may_add)
+
+    def _tell_form(self, search: Search) -> None:
+        """Show which form was found, and what adds it: it is a program, and goes home as one."""
+        discovery: Discovery = search.result
+        self._result.clear()
+        with self._result:
+            ui.label(in_page_words(discovery.sentence)).props('data-testid="form"')
+            if not discovery.found:
+                return
+            ui.code("\n".join(discovery.found[0].form.equations)).classes("w-full")
+            if self._desk.may_write_effects:
+                add = ui.button("Add this form", icon="add", on_click=lambda: self._add_form(search))
+                add.props('no-caps data-testid="add-form"')
+            else:
+                text = discovery.found[0].text(search.recording.name)
+                ui.button("Take it home", icon="download", on_click=lambda: ui.download.content(text, "found.py"))
+
+    def _add_form(self, search: Search) -> None:
+        with errors_told():
+            self._desk.extend_by_form(search)
+        self._joined()
+        self._began()
 
     def _candidates(self, diagnosis: Diagnosis, number: int, *, may_add: bool) -> None:
         step, of = diagnosis.steps[number - 1], self._desk.errors
@@ -231,6 +272,7 @@ class SearchPanel:
             {
                 "effects": diagnosis.with_those_before(number, each.name),
                 "effect": self._desk.plain(each.name),
+                "about": about_effect(each.name),
                 "fitted": of.shown(each.train).text,
                 "test": of.shown(each.test).text,
                 "bic": "–" if each.evidence is None else f"{each.evidence:.1f}",
@@ -240,8 +282,8 @@ class SearchPanel:
         ]
         table = ui.table(rows=rows, columns=columns, row_key="effect", pagination=10)
         table.props('dense flat bordered wrap-cells data-testid="candidates"').classes("w-full candidates")
+        table.add_slot("body-cell-effect", ADDING_CELL if may_add else EFFECT_CELL)
         if may_add:
-            table.add_slot("body-cell-effect", ADDING)
             table.on("add", lambda event: self._extend(event.args["effects"]))
             ui.label("press an effect to add it all the same").classes("quiet")
 

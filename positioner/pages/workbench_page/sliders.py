@@ -7,8 +7,10 @@ from nicegui import events, ui
 from nicegui.elements.mixins.value_element import ValueElement
 
 from positioner.pages.parts.live_text import LiveText
-from positioner.pages.parts.telling import heading
+from positioner.pages.parts.number_field import NumberField
+from positioner.pages.parts.telling import errors_told, heading
 from positioner.pages.parts.units import Units
+from positioner.pages.workbench_page.explained import about_effect, explained
 from positioner.pages.workbench_page.live_model import LiveModel
 from workbench.fit.fitted_parameter import Fitted
 from workbench.model.parameters import Parameter
@@ -73,10 +75,12 @@ class Sliders:
         self._switches: dict[str, ui.switch] = {}
         if live.effects:
             heading("Effects")
-            for name in live.effects:
-                self._switches[name] = ui.switch(
-                    name.rpartition("/")[2], value=True, on_change=lambda event, name=name: self._switched(name, event)
-                ).props(f'data-testid="switch-{name}"')
+            for name, written in zip(live.effects, live.written, strict=True):
+                with ui.row().classes("items-center").style("gap: 4px"):
+                    self._switches[name] = ui.switch(
+                        "", value=True, on_change=lambda event, name=name: self._switched(name, event)
+                    ).props(f'data-testid="switch-{name}" aria-label="{name}"')
+                    explained(name, about_effect(written))
         undo = ui.button("Undo", icon="undo", on_click=self._undo).props('outline no-caps dense data-testid="undo"')
         undo.classes("q-mt-sm")
         self._follow()
@@ -85,9 +89,17 @@ class Sliders:
         words, per_si, shown = in_words(parameter.name)
         factor, unit = self._units.as_chosen(per_si, shown)
         with ui.column().classes("w-full").style("gap: 0"):
-            with ui.row().classes("w-full items-baseline justify-between no-wrap"):
+            with ui.row().classes("w-full items-center justify-between no-wrap"):
                 ui.label(words)
-                value = LiveText().classes("number").props(f'data-testid="value-{parameter.name}"')
+                with ui.row().classes("items-center no-wrap").style("gap: 8px"):
+                    value = LiveText().classes("number").props(f'data-testid="value-{parameter.name}"')
+                    typed = NumberField("", name=f"{words}, {unit}" if unit else words)
+                    typed.props(
+                        f'dense outlined placeholder="type" data-testid="type-{parameter.name}" aria-label="{words}"'
+                    )
+                    typed.props(remove="label").classes("typed").style("width: 72px").on(
+                        "keydown.enter", lambda: self._typed(parameter, typed, factor)
+                    )
             slider = Slider(self._live.share(parameter), parameter.name, words)
             low, high = (factor * self._live.value_at(parameter, share) for share in (0.0, 1.0))
             told = f"{low:.3g} to {high:.3g} {unit}".rstrip()
@@ -111,6 +123,19 @@ class Sliders:
         self._live.move(parameter, share)
         self._show_values()
         self._moved()
+
+    async def _typed(self, parameter: Parameter, typed: NumberField, factor: float) -> None:
+        """Take a number that was typed beside a slider."""
+        with errors_told({parameter.name: f"{in_words(parameter.name)[0]}, SI"}):
+            value = typed.number()
+            if value is None:
+                return
+            self._live.put(parameter, value / factor)
+            typed.set_value("")
+            self._held = False
+            self._follow()
+            self._moved()
+            await self._settled()
 
     async def _released(self, parameter: Parameter, slider: Slider, share: float) -> None:
         """Take where the slider was let go: the last move may still be on its way."""
