@@ -280,10 +280,13 @@ def exponential_step(
     return x1, v1, acceleration(valve, SLIP, sigma, stem_at(drive, tau + s, x1, v1), q, z), abs(change)
 
 
-def wait(valve: Karnopp, drive: Drive, tau: float, h: float, x: float, q: Any, z: Any) -> tuple[float, int, float]:
+def wait(
+    valve: Karnopp, drive: Drive, tau: float, h: float, x: float, sigma: float, q: Any, z: Any
+) -> tuple[float, int, float]:
     """Hold the stuck stem until it breaks away or the step ends; return tau, mode, sigma."""
-    if excess(valve, stem_at(drive, h, x, 0.0), q, z) <= 0.0:
-        return h, STUCK, 0.0
+    at_end = excess(valve, stem_at(drive, h, x, 0.0), q, z)
+    if not at_end > 0.0:
+        return h, STUCK, sigma + unknown(at_end)
     late = h
     if excess(valve, stem_at(drive, tau, x, 0.0), q, z) > 0.0:
         late = tau
@@ -295,8 +298,8 @@ def wait(valve: Karnopp, drive: Drive, tau: float, h: float, x: float, q: Any, z
                 late = middle
             else:
                 early = middle
-    sigma = 1.0 if external_force(valve, stem_at(drive, late, x, 0.0), q, z) > 0.0 else -1.0
-    return late, BREAKING, sigma
+    way = 1.0 if external_force(valve, stem_at(drive, late, x, 0.0), q, z) > 0.0 else -1.0
+    return late, BREAKING, way + unknown(sigma)
 
 
 def move(
@@ -413,7 +416,7 @@ def step(
     tau = 0.0
     while tau < h:
         if mode == STUCK:
-            tau, mode, sigma = wait(valve, drive, tau, h, x, q, z)
+            tau, mode, sigma = wait(valve, drive, tau, h, x, sigma, q, z)
             continue
         tau, x, v, over = move(valve, mode, sigma, drive, tau, h, x, v, tolerance, q, z)
         if over and mode == SLIP:
@@ -497,7 +500,7 @@ def carry(
     h = duration / n
     for i in range(n):
         t0, left = t + i * h, h
-        while left > 0.0:
+        while True:
             x0 = x
             _, s = straight(command, left, Stem(t0, x, v, p), q, z)
             p0, p = pressure(command, command, s, Stem(t0, x, v, p), q, z)
@@ -505,21 +508,24 @@ def carry(
             x, v = settle(valve, Stem(t0 + s, x, v, p), q, z)
             if v == 0.0:
                 mode = STUCK
-            t0 += s
-            left -= s
-            stem = Stem(t0, x, v, p)
-            x += unknown_m(excess(valve, stem, q, z))
+            stem = Stem(t0 + s, x, v, p)
             remember(x0, s, stem, q, z)
             _, indicated = sensor(x0, x, s, stem, q, z)
-    return Condition(t + duration, x, v, p, mode, sigma, indicated)
+            if not s < left:  # nothing cuts a step: LLVM then sees that there is no loop
+                break
+            t0 += s
+            left -= s
+    off = unknown(sigma + excess(valve, Stem(t + duration, x, v, p), q, z))
+    return Condition(t + duration, x + off, v, p, mode, sigma, indicated + off)
 
 
-def unknown_m(force: float) -> float:
-    """Return 0, or NaN where a force is no finite number: nobody can say where such a stem is.
+def unknown(value: float) -> float:
+    """Return 0, or NaN where a force, or a direction by it, is no finite number: nobody can say where such a stem is.
 
-    What is compared with NaN is not greater: without this the stem would count as one that friction holds.
+    What is compared with NaN is not greater: without this the stem would count as one that friction holds. The NaN goes
+    by way of sigma, for through x each step of a stuck stem would wait for the one before: half the speed.
     """
-    return 0.0 * force
+    return 0.0 * value
 
 
 def respond(

@@ -152,7 +152,7 @@ def _compiled(
         bitcode = _bitcode(file, linked)
         with suppress(OSError, RuntimeError):  # not there, or torn by a machine that went down
             return digest, bitcode, loaded(code.read_bytes(), kinds)
-        machine_code = translated(bitcode)
+        machine_code = translated(bitcode, kinds)
         _keep(code, machine_code)
     return digest, bitcode, loaded(machine_code, kinds)
 

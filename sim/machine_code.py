@@ -2,15 +2,18 @@
 
 Neither takes numba, whose start takes longer than all of this. The functions are of its convention: where a result and
 an exception would go, then the arguments, an array as its address and its shape; they return a status, 0 if all is
-well. Other threads go on while one runs. No operations are fused: the numbers are those of the kernel's text.
+well. Python hands over one address, where the arguments stand one after the other: ctypes takes as long for each
+argument as a valve for some twenty steps. Other threads go on while one runs. No operations are fused: the numbers are
+those of the kernel's text.
 """
 
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from ctypes import CFUNCTYPE, addressof, byref, c_double, c_int32, c_ssize_t, c_void_p, cast
+from ctypes import CFUNCTYPE, addressof, c_double, c_int32, c_void_p, cast
 from functools import cache
 from itertools import count
+from struct import Struct
 from threading import Lock
 from typing import Any, Generic, Self, TypeVarTuple
 
@@ -22,15 +25,15 @@ from config.errors import InputError
 
 NUMBER, VECTOR, MATRIX = range(3)
 """Kinds of arguments, by their dimensions: of float64, arrays contiguous."""
-TYPES: Mapping[int, tuple[Any, ...]] = {
-    kind: (c_void_p, *[c_ssize_t] * kind) if kind else (c_double,) for kind in (NUMBER, VECTOR, MATRIX)
-}
+WORDS: Mapping[int, str] = {NUMBER: "d", VECTOR: "Pn", MATRIX: "Pnn"}
+"""Of each, where the arguments stand: `struct`'s letters, all of eight bytes."""
+IN_LLVM: Mapping[str, str] = {"d": "double", "P": "ptr", "n": "i64"}
+CALLED = "{}.called"
+"""What is called from Python in place of an entry: the name of the function that reads the arguments."""
 FLOAT64 = np.dtype(np.float64)
 INTRINSIC = "llvm."
 UNREACHED = ("NRT_MemInfo_call_dtor", "NRT_Free")
 """What is named of numba's run time and never comes to: the arrays are numpy's, nothing is freed."""
-NOWHERE = (byref(c_void_p()), byref(c_void_p()))
-"""Where a result and an exception go, that nobody reads."""
 Arguments = TypeVarTuple("Arguments")
 _nothing = CFUNCTYPE(None, c_void_p)(lambda _: None)
 _libraries = count()
@@ -49,21 +52,21 @@ class Entry(Generic[*Arguments]):
         self._name, self._kinds = name, kinds
         self._code = code
         """Kept as long as anybody may call it."""
-        types = [each for kind in kinds for each in TYPES[kind]]
-        self._function = CFUNCTYPE(c_int32, c_void_p, c_void_p, *types)(code[name])
+        self._packed = Struct(_letters(kinds)).pack
+        self._function = CFUNCTYPE(c_int32, c_void_p)(code[CALLED.format(name)])
 
     def __call__(self, *values: *Arguments) -> None:
         """Call it once."""
-        if self._function(*NOWHERE, *self._words(values)):
+        if self._function(self._packed(*self._words(values))):
             raise self._failed()
 
     def bound(self, *values: *Arguments) -> Callable[[], None]:
         """Return the call with these values, to be made many times: of arrays, with what is in them then."""
-        given = (*NOWHERE, *self._words(values))
+        given = self._packed(*self._words(values))
         function = self._function
 
         def call(_kept: object = values) -> None:
-            if function(*given):
+            if function(given):
                 raise self._failed()
 
         return call
@@ -108,7 +111,7 @@ def is_bitcode(content: bytes) -> bool:
     return True
 
 
-def translated(bitcode: bytes) -> bytes:
+def translated(bitcode: bytes, entries: Mapping[str, Sequence[int]]) -> bytes:
     """Return the machine code of bitcode: a line of the names that it takes from elsewhere, then an object file.
 
     Raises:
@@ -116,6 +119,7 @@ def translated(bitcode: bytes) -> bytes:
     """
     with _one_at_a_time:
         module = binding.parse_bitcode(bitcode)
+        module.link_in(binding.parse_assembly("\n".join(_caller(name, kinds) for name, kinds in entries.items())))
         names = [each.name for each in module.functions if each.is_declaration]
         code = bytes(target_machine(*features()).emit_object(module))
     return " ".join(each for each in names if not each.startswith(INTRINSIC)).encode() + b"\n" + code
@@ -134,9 +138,36 @@ def loaded(code: bytes, entries: Mapping[str, Sequence[int]]) -> dict[str, Any]:
         for each in names.decode(errors="replace").split():
             builder.import_symbol(each, _address(each))
         for name in entries:
-            builder.export_symbol(name)
+            builder.export_symbol(CALLED.format(name))
         library = builder.add_current_process().link(compiler, f"kernel {next(_libraries)}")
     return {name: Entry(name, kinds, library) for name, kinds in entries.items()}
+
+
+def _letters(kinds: Iterable[int]) -> str:
+    return "".join(WORDS[kind] for kind in kinds)
+
+
+def _caller(name: str, kinds: Sequence[int]) -> str:
+    """Return LLVM's text of the function that calls an entry with the arguments that stand at an address.
+
+    Where a result and an exception go nobody reads.
+    """
+    types = [IN_LLVM[letter] for letter in _letters(kinds)]
+    read = [
+        f"%at{i} = getelementptr i64, ptr %words, i64 {i}\n%word{i} = load {kind}, ptr %at{i}"
+        for i, kind in enumerate(types)
+    ]
+    given = ", ".join(["ptr %nowhere", "ptr %nowhere", *(f"{kind} %word{i}" for i, kind in enumerate(types))])
+    return "\n".join(
+        (
+            f"declare i32 @{name}({', '.join(['ptr', 'ptr', *types])})",
+            f'define i32 @"{CALLED.format(name)}"(ptr %words) {{',
+            "%nowhere = alloca ptr",
+            *read,
+            f"%status = call i32 @{name}({given})",
+            "ret i32 %status }",
+        )
+    )
 
 
 def nothing() -> int:

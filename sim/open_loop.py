@@ -19,8 +19,8 @@ from sim.karnopp import TOLERANCE, Vector
 STEP_S = 1e-5
 PATH_ROWS, PRESSURE, INDICATED = 5, 1, 4
 """Rows that the kernel writes: t, p, x, v, indicated; which of them are the second and the last."""
-AT_ONCE = 100
-"""Periods in one compiled call: nobody can break one off."""
+STEPS_AT_ONCE, PERIODS_AT_ONCE = 100_000, 10_000
+"""In one compiled call: steps of the integration, some 5 ms, for nobody can break one off; rows that are copied."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -98,16 +98,31 @@ def follow(
     """
     commands = checked_commands(command_pa)
     periods = checked_periods(period_s, commands)
-    path = np.empty((PATH_ROWS, commands.size + 1))
-    for begin in range(0, commands.size, AT_ONCE):
-        held = slice(begin, begin + AT_ONCE)
-        piece = np.empty((PATH_ROWS, commands[held].size + 1))
-        composition.kernel.respond(theta, state, commands[held], periods[held], checked_step(step_s), tolerance, piece)
-        path[:, begin : begin + piece.shape[1]] = piece
+    longest_step_s = checked_step(step_s)
+    path, written = (
+        np.empty((PATH_ROWS, commands.size + 1)),
+        np.empty(PATH_ROWS * (min(commands.size, PERIODS_AT_ONCE) + 1)),
+    )
+    begin = 0
+    while begin < commands.size:
+        end = _end_of_call(periods, begin, longest_step_s)
+        held, rows = slice(begin, end), slice(begin, end + 1)
+        piece = written[: PATH_ROWS * (end + 1 - begin)].reshape(PATH_ROWS, -1)
+        composition.kernel.respond(theta, state, commands[held], periods[held], longest_step_s, tolerance, piece)
+        path[:, rows] = piece
+        begin = end
     commanded = np.append(commands, commands[-1])
     time, pressure, position, velocity, indicated = path
     require_numbers(composition, time, position, indicated)
     return Response(time, commanded, pressure, position, velocity, indicated)
+
+
+def _end_of_call(periods_s: Vector, begin: int, longest_step_s: float) -> int:
+    """Return where a compiled call from a period on ends: one period later at the least."""
+    count = PERIODS_AT_ONCE
+    while count > 1 and periods_s[begin : begin + count].sum() > STEPS_AT_ONCE * longest_step_s:
+        count //= 2
+    return min(begin + count, periods_s.size)
 
 
 def require_numbers(composition: Composition, time_s: Vector, *answers: Vector) -> None:
@@ -116,8 +131,8 @@ def require_numbers(composition: Composition, time_s: Vector, *answers: Vector) 
     Raises:
         InputError: one holds what is no finite number, as an effect of one's own may make it; says from when on.
     """
-    lost = np.flatnonzero(~np.isfinite(answers).all(axis=0))
-    if lost.size:
+    if not all(np.isfinite(each).all() for each in answers):
+        lost = np.flatnonzero(~np.isfinite(answers).all(axis=0))
         effects = ", ".join(each.name for each in composition.effects) or "none"
         raise InputError(
             composition.source,

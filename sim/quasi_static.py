@@ -49,7 +49,7 @@ from sim.karnopp import (
     remember,
     sensor,
     settle,
-    unknown_m,
+    unknown,
     write,
 )
 
@@ -420,7 +420,7 @@ def over_period(
             now = free_step(valve, here, way, h, v_l, slide_s, fed_back, q, z)
     if told < FREE:
         now = told_step(valve, begin, told, p, duration, v_l, slide_s, q, z)
-    x = now.x + unknown_m(excess(valve, Stem(now.t, now.x, now.v, now.p), q, z))
+    x = now.x + unknown(excess(valve, Stem(now.t, now.x, now.v, now.p), q, z))
     return Condition(now.t, x, now.v, now.p, now.mode, now.sigma, now.indicated + (x - now.x))
 
 

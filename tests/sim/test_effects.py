@@ -254,6 +254,8 @@ NO_NUMBER = {
     "of friction": "def friction(F_c, F_s, x): return F_c, F_s * math.sqrt(0.03 - x)",
     "of the pressure": "def pressure(u): return math.sqrt(60e3 - u)",
     "of the indication": "def sensor(y): return math.sqrt(0.03 - y)",
+    "for a while between two samples": "def force(x, t): return 0.0 * math.sqrt(abs(t - 0.105) - 0.002)",
+    "a friction without end": "def friction(F_c, F_s, x): return F_c, F_s / (x - x)",
 }
 
 

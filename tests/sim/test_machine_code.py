@@ -93,8 +93,8 @@ def test_an_effect_that_makes_arrays_runs_where_it_was_compiled_and_where_it_is_
 @pytest.mark.parametrize("part", [0.0, 0.01, 0.5, 0.99])
 def test_what_is_torn_is_an_error_and_not_the_end_of_the_process(part: float) -> None:
     bitcode = Composition.from_file(SEED).kernel.bitcode
-    code = translated(bitcode)
+    code = translated(bitcode, ENTRIES)
     with pytest.raises(RuntimeError):
-        translated(bitcode[: round(part * len(bitcode))])
+        translated(bitcode[: round(part * len(bitcode))], ENTRIES)
     with pytest.raises(RuntimeError):
         loaded(code[: round(part * len(code))], ENTRIES)

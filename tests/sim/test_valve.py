@@ -9,7 +9,7 @@ import pytest
 
 from config.errors import InputError
 from config.valve_file import EffectTable, ValveFile, load_valve, shipped_valve
-from sim import karnopp
+from sim import karnopp, open_loop
 from sim.composition import Composition
 from sim.open_loop import respond
 from sim.valve import Valve
@@ -27,6 +27,19 @@ def test_advance_in_pieces_is_run() -> None:
         pieces.advance(float(command), 2.5e-3)
     for name in ("time_s", "position_m", "velocity_m_per_s", "pressure_pa", "indicated_m"):
         assert getattr(pieces, name) == getattr(whole, name) == getattr(response, name)[-1]
+
+
+def test_a_run_is_the_same_however_it_is_cut_into_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long periods and short ones: a call takes so many steps or rows, and one period where that alone is more."""
+    apart_s = np.tile([1e-4, 3e-3, 1e-5, 0.2, 1e-4, 1e-4], 6)
+    command_pa = np.linspace(0.0, 90e3, apart_s.size)
+    whole = Valve.from_file(SEED).run(command_pa, apart_s)
+    monkeypatch.setattr(open_loop, "STEPS_AT_ONCE", 320)
+    monkeypatch.setattr(open_loop, "PERIODS_AT_ONCE", 4)
+    cut = Valve.from_file(SEED).run(command_pa, apart_s)
+    assert whole.position_m[-1] > 0.0
+    for name in ("time_s", "pressure_pa", "position_m", "velocity_m_per_s", "indicated_m"):
+        np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name))
 
 
 def test_rows_are_the_start_and_the_ends_of_the_periods() -> None:
